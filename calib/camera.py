@@ -1,0 +1,91 @@
+"""A calibrated camera: multi-sensor projection of eq. 10 and its inverse."""
+
+import hashlib
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import pose
+from calib.lens import Lens
+from calib.pose import Pose
+
+
+class CameraError(ValueError):
+    """Numbers that describe no camera."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Projection `P_s` of one sensor s: camera matrix, lens and pose in the rig.
+
+    Pixel centres lie at integer coordinates: the image covers [-0.5, width - 0.5] × [-0.5, height - 0.5].
+
+    Attributes:
+        width, height: image size [px].
+        fx, fy, cx, cy: camera matrix `K_s` [px].
+        lens: distortion `D_s`.
+        T_rs: pose that maps sensor coordinates (z forward, x right, y down) to rig coordinates, shape (4, 4) [m].
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    lens: Lens = field(default_factory=Lens)
+    T_rs: Pose = field(default_factory=pose.identity)
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise CameraError(f"an image of {self.width} × {self.height} pixels has no content")
+        if not (self.fx > 0 and self.fy > 0 and np.all(np.isfinite([self.fx, self.fy, self.cx, self.cy]))):
+            raise CameraError(f"fx and fy must be positive and all finite, not {self.fx, self.fy, self.cx, self.cy}")
+        if not pose.is_pose(self.T_rs):
+            raise CameraError("T_rs must be a rigid 4 × 4 pose (orthonormal rotation, last row 0 0 0 1)")
+
+    @property
+    def center(self) -> NDArray[np.float64]:
+        """Camera centre `c_s` in rig coordinates, shape (3,) [m]."""
+        return self.T_rs[:3, 3]
+
+    @property
+    def T_sr(self) -> Pose:
+        """Pose that maps rig coordinates to sensor coordinates."""
+        return pose.inverse(self.T_rs)
+
+    @property
+    def calib_id(self) -> str:
+        """Short hash of everything that defines the projection; frames and estimates carry it."""
+        numbers = [self.width, self.height, self.fx, self.fy, self.cx, self.cy, *self.lens.coefficients]
+        payload = np.concatenate([numbers, self.T_rs.ravel()]).astype("<f8").tobytes()
+        return hashlib.sha256(payload).hexdigest()[:16]
+
+    def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points at or behind the camera plane."""
+        points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
+        depth = points_s[..., 2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ideal = np.where(depth > 0, points_s[..., :2] / depth, np.nan)
+        return self.lens.distort(ideal) * (self.fx, self.fy) + (self.cx, self.cy)
+
+    def distance(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Radial distance (…,) [m] from the camera centre, eq. 11."""
+        return np.linalg.norm(np.asarray(points_r, np.float64) - self.center, axis=-1)
+
+    def rays(self) -> NDArray[np.float64]:
+        """Unit direction of every pixel's line of sight in sensor coordinates, shape (height, width, 3).
+
+        Raises:
+            LensError: if the lens has no inverse somewhere on the image.
+        """
+        columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
+        distorted = np.stack([(columns - self.cx) / self.fx, (rows - self.cy) / self.fy], axis=-1)
+        ideal = self.lens.undistort(distorted)
+        directions = np.concatenate([ideal, np.ones((*ideal.shape[:2], 1))], axis=-1)
+        return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+    def unproject(self, distance: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Rig points (height, width, 3) [m] of a radial distance image [m]; NaN stays NaN."""
+        return pose.transform(self.T_rs, self.rays() * np.asarray(distance, np.float64)[..., None])

@@ -1,0 +1,84 @@
+"""Lens distortion `D_s` of eq. 10, on normalised image coordinates (x/z, y/z), and its inverse."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+
+COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+
+
+class LensError(ValueError):
+    """Coefficients that are no lens, or a point for which the distortion has no inverse."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """Brown–Conrady distortion with an optional rational part; OpenCV's first eight coefficients, in its order.
+
+    All coefficients zero is the ideal pinhole. Missing trailing coefficients are zero, so the usual 4, 5 and 8 numbers
+    can be given as they are.
+
+    Attributes:
+        coefficients: (k1, k2, p1, p2, k3, k4, k5, k6), dimensionless, shape (8,).
+    """
+
+    coefficients: NDArray[np.float64] = field(default_factory=lambda: np.zeros(8))
+
+    def __post_init__(self) -> None:
+        given = np.atleast_1d(np.asarray(self.coefficients, np.float64))
+        if given.ndim != 1 or given.size > 8 or not np.all(np.isfinite(given)):
+            raise LensError(f"a lens has at most 8 finite coefficients {COEFFICIENTS}, not {given.tolist()}")
+        full = np.zeros(8)
+        full[: given.size] = given
+        full.setflags(write=False)
+        object.__setattr__(self, "coefficients", full)
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens does not distort at all."""
+        return not np.any(self.coefficients)
+
+    def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Forward distortion of ideal normalised coordinates, shape (…, 2)."""
+        flat = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
+        return distort_points(flat, self.coefficients).reshape(np.shape(xy))
+
+    def undistort(self, xy: NDArray[np.floating], tolerance: float = 1e-10) -> NDArray[np.float64]:
+        """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method.
+
+        Raises:
+            LensError: where the iteration does not reach `tolerance` (normalised units), with the first such point.
+        """
+        target = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
+        ideal = target.copy()
+        for _ in range(30):
+            residual = self.distort(ideal) - target
+            if np.all(np.abs(residual) < tolerance):
+                return ideal.reshape(np.shape(xy))
+            ideal -= np.einsum("nij,nj->ni", np.linalg.inv(self._jacobian(ideal)), residual)
+        worst = target[np.abs(self.distort(ideal) - target).max(axis=1).argmax()]
+        raise LensError(f"the distortion {self.coefficients.tolist()} has no inverse at normalised {worst.tolist()}")
+
+    def _jacobian(self, xy: NDArray[np.float64], step: float = 1e-6) -> NDArray[np.float64]:
+        columns = [
+            (self.distort(xy + delta) - self.distort(xy - delta)) / (2 * step)
+            for delta in (np.array([step, 0.0]), np.array([0.0, step]))
+        ]
+        return np.stack(columns, axis=-1)
+
+
+@kernel
+def distort_points(xy: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Brown–Conrady forward distortion of (n, 2) ideal normalised coordinates; coefficients as in `Lens`."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = coefficients
+    out = np.empty_like(xy)
+    for i in range(xy.shape[0]):
+        x, y = xy[i, 0], xy[i, 1]
+        r2 = x * x + y * y
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        out[i, 0] = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
+        out[i, 1] = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+    return out

@@ -1,0 +1,68 @@
+"""Rigid poses as 4×4 matrices. `T_ab` maps coordinates in b to coordinates in a; lengths in metres, angles in rad."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Pose = NDArray[np.float64]
+
+
+def identity() -> Pose:
+    """The pose that maps every point to itself."""
+    return np.eye(4)
+
+
+def from_rotation_vector(rotation_vector: ArrayLike, translation: ArrayLike) -> Pose:
+    """The pose with the given rotation vector [rad] (axis times angle) and translation [m], both of shape (3,)."""
+    T_ab = np.eye(4)
+    T_ab[:3, :3] = Rotation.from_rotvec(np.asarray(rotation_vector, float)).as_matrix()
+    T_ab[:3, 3] = np.asarray(translation, float)
+    return T_ab
+
+
+def to_rotation_vector(T_ab: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rotation vector [rad] and translation [m] of a pose; inverse of `from_rotation_vector`."""
+    return Rotation.from_matrix(T_ab[:3, :3]).as_rotvec(), T_ab[:3, 3].copy()
+
+
+def to_quaternion(T_ab: Pose) -> NDArray[np.float64]:
+    """The unit quaternion (x, y, z, w) of a pose's rotation."""
+    return Rotation.from_matrix(T_ab[:3, :3]).as_quat()
+
+
+def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:
+    """The pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
+    eye_r = np.asarray(eye, float)
+    forward = np.asarray(target, float) - eye_r
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(np.asarray(down, float), forward)
+    right = right / np.linalg.norm(right)
+    T_rs = np.eye(4)
+    T_rs[:3, :3] = np.stack([right, np.cross(forward, right), forward], axis=1)
+    T_rs[:3, 3] = eye_r
+    return T_rs
+
+
+def inverse(T_ab: Pose) -> Pose:
+    """The pose `T_ba`."""
+    T_ba = np.eye(4)
+    T_ba[:3, :3] = T_ab[:3, :3].T
+    T_ba[:3, 3] = -T_ab[:3, :3].T @ T_ab[:3, 3]
+    return T_ba
+
+
+def transform(T_ab: Pose, points_b: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Points of shape (…, 3) [m], given in b, expressed in a."""
+    return points_b @ T_ab[:3, :3].T + T_ab[:3, 3]
+
+
+def is_pose(T_ab: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
+    """Whether a (4, 4) matrix is a rigid pose: orthonormal rotation of determinant one, last row (0, 0, 0, 1)."""
+    rotation = T_ab[:3, :3]
+    return bool(
+        T_ab.shape == (4, 4)
+        and np.all(np.isfinite(T_ab))
+        and np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance)
+        and np.linalg.det(rotation) > 0
+        and np.allclose(T_ab[3], (0, 0, 0, 1), atol=tolerance)
+    )

@@ -1,0 +1,1 @@
+"""Devices: everything that yields frames, real, simulated or recorded."""

@@ -1,0 +1,1 @@
+"""Version 1 of the wire format. Fields are only ever added; numbers are never reused."""

@@ -1,0 +1,78 @@
+from abs.v1 import common_pb2 as _common_pb2
+from google.protobuf.internal import containers as _containers
+from google.protobuf.internal import enum_type_wrapper as _enum_type_wrapper
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class DeformationState(_message.Message):
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share")
+    class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
+        STATUS_INITIALIZING: _ClassVar[DeformationState.Status]
+        STATUS_TRACKING: _ClassVar[DeformationState.Status]
+        STATUS_DEGRADED: _ClassVar[DeformationState.Status]
+        STATUS_LOST: _ClassVar[DeformationState.Status]
+    STATUS_UNSPECIFIED: DeformationState.Status
+    STATUS_INITIALIZING: DeformationState.Status
+    STATUS_TRACKING: DeformationState.Status
+    STATUS_DEGRADED: DeformationState.Status
+    STATUS_LOST: DeformationState.Status
+    class Sensor(_message.Message):
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing")
+        SENSOR_FIELD_NUMBER: _ClassVar[int]
+        SEQ_FIELD_NUMBER: _ClassVar[int]
+        T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
+        SAMPLES_FIELD_NUMBER: _ClassVar[int]
+        MEAN_LOG_LIKELIHOOD_FIELD_NUMBER: _ClassVar[int]
+        NORMALIZED_RESIDUAL_FIELD_NUMBER: _ClassVar[int]
+        MISSING_FIELD_NUMBER: _ClassVar[int]
+        sensor: str
+        seq: int
+        t_host_ns: int
+        samples: int
+        mean_log_likelihood: float
+        normalized_residual: float
+        missing: bool
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ...) -> None: ...
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    TRACKER_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    REASONS_FIELD_NUMBER: _ClassVar[int]
+    MODEL_FIELD_NUMBER: _ClassVar[int]
+    MODEL_ID_FIELD_NUMBER: _ClassVar[int]
+    CALIB_ID_FIELD_NUMBER: _ClassVar[int]
+    THETA_FIELD_NUMBER: _ClassVar[int]
+    LOG_LIKELIHOOD_FIELD_NUMBER: _ClassVar[int]
+    SEARCH_DEVIATION_FIELD_NUMBER: _ClassVar[int]
+    GENERATIONS_FIELD_NUMBER: _ClassVar[int]
+    EVALUATIONS_FIELD_NUMBER: _ClassVar[int]
+    SOLVE_MS_FIELD_NUMBER: _ClassVar[int]
+    AGE_MS_FIELD_NUMBER: _ClassVar[int]
+    SKIPPED_FIELD_NUMBER: _ClassVar[int]
+    MESH_VERSION_FIELD_NUMBER: _ClassVar[int]
+    SENSORS_FIELD_NUMBER: _ClassVar[int]
+    INLIER_SHARE_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    tracker: str
+    status: DeformationState.Status
+    reasons: _containers.RepeatedScalarFieldContainer[str]
+    model: str
+    model_id: str
+    calib_id: str
+    theta: _containers.RepeatedScalarFieldContainer[float]
+    log_likelihood: float
+    search_deviation: float
+    generations: int
+    evaluations: int
+    solve_ms: float
+    age_ms: float
+    skipped: int
+    mesh_version: int
+    sensors: _containers.RepeatedCompositeFieldContainer[DeformationState.Sensor]
+    inlier_share: float
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ...) -> None: ...
