@@ -1,0 +1,39 @@
+# Everything happens in .venv, from hash-pinned requirements: `make run` and `make test` on a bare machine are all the set-up.
+PYTHON ?= python3
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input install --quiet
+COMPILE := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --fork-strategy fewest \
+	--generate-hashes --no-annotate --custom-compile-command "make constraints" $(ARGS)
+
+help: ## list the targets; ARGS="…" is passed on to the command behind a target
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
+run: .venv/.run ## start the service on the simulated camera: make run ARGS="--duration 20", ARGS=my-rig.toml
+	@$(BIN)/abs-service run $(ARGS)
+test: .venv/.dev ## the tests without the slow ones: make test ARGS="tests/calib -x"
+	@$(BIN)/pytest -m "not slow and not hardware" $(ARGS)
+check: lint test ## everything a change has to pass
+lint: .venv/.dev ## format, style, types, import contracts
+	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright && $(BIN)/lint-imports
+format: .venv/.dev ## rewrite the code in the project's format
+	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
+bench: .venv/.dev ## measure the hot parts; compare minima, machines differ
+	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,rounds $(ARGS)
+proto: .venv/.dev ## regenerate the wire code from proto/abs/v1/*.proto
+	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/abs/v1/*.proto
+constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
+	@$(COMPILE) --group build --output-file constraints.txt
+	@$(COMPILE) --group dev --constraints constraints.txt --output-file constraints-dev.txt
+clean: ## remove .venv and every cache
+	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.venv/.created:
+	@$(PYTHON) -c 'import sys; v = sys.version_info; v < (3, 11) and sys.exit("abs-service needs Python 3.11 or newer, but $(PYTHON) is %d.%d: name another one, for example  make PYTHON=python3.12" % v[:2])'
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) lacks the venv module:  sudo apt install python3-venv"; exit 1; }
+	$(PYTHON) -m venv --clear .venv && touch $@
+.venv/.run: .venv/.created constraints.txt pyproject.toml
+	@echo "Installing the pinned requirements, a few minutes the first time"
+	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
+.venv/.dev: .venv/.run constraints-dev.txt
+	@$(PIP) --require-hashes --only-binary :all: -r constraints-dev.txt && touch $@
+.PHONY: help run test check lint format bench proto constraints clean
