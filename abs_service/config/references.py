@@ -1,0 +1,67 @@
+"""Names that one table of a configuration uses for another: each must exist, and none may mean two things."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from abs_service.problems import Problem, none_of
+
+
+def check(file: dict[str, Any]) -> list[Problem]:
+    """All names in a file that lead nowhere or to two places.
+
+    Works on the raw tables, so that these mistakes are reported together with all others.
+    """
+    return [*_sensors(file), *_references(file), *_trackers(file)]
+
+
+def _tables(file: dict[str, Any], section: str) -> dict[str, dict[str, Any]]:
+    tables = file.get(section)
+    return {k: v for k, v in tables.items() if isinstance(v, dict)} if isinstance(tables, dict) else {}
+
+
+def _sensors(file: dict[str, Any]) -> Iterator[Problem]:
+    devices, owners = _tables(file, "devices"), {}
+    for name, sensor in _tables(file, "sensors").items():
+        device, head = sensor.get("device"), sensor.get("head", name)
+        if not isinstance(device, str):
+            continue
+        if device not in devices:
+            yield Problem(("sensors", name, "device"), f"no such device, {none_of(device, devices)}", device)
+        elif (owner := owners.setdefault((device, head), name)) != name:
+            yield Problem(("sensors", name), f'sensor "{owner}" is head "{head}" of device "{device}" already')
+
+
+def _references(file: dict[str, Any]) -> Iterator[Problem]:
+    sensors = _tables(file, "sensors")
+    places = {("trackers", name): table for name, table in _tables(file, "trackers").items()}
+    for place, table in {("synchronisation",): file.get("synchronisation", {}), **places}.items():
+        reference = table.get("reference", "") if isinstance(table, dict) else ""
+        sensor, slash, _ = reference.partition("/") if isinstance(reference, str) else ("", "", "")
+        if slash and sensor not in sensors:
+            yield Problem((*place, "reference"), f"no such sensor, {none_of(sensor, sensors)}", reference)
+
+
+def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
+    sensors, synchronisation = _tables(file, "sensors"), file.get("synchronisation")
+    shared = isinstance(synchronisation, dict) and synchronisation.get("reference")
+    for name, tracker in _tables(file, "trackers").items():
+        if name in sensors:
+            yield Problem(("trackers", name), "a sensor has this name; sensors and trackers need different names")
+        given = tracker.get("sensors")
+        used = [sensor for sensor in given if isinstance(sensor, str)] if isinstance(given, list) else []
+        for index, sensor in enumerate(used):
+            if sensor not in sensors:
+                yield Problem(
+                    ("trackers", name, "sensors", index), f"no such sensor, {none_of(sensor, sensors)}", sensor
+                )
+            elif "noise" not in sensors[sensor]:
+                yield Problem(
+                    ("sensors", sensor, "noise"), f'missing, but tracker "{name}" weighs its measurements with it'
+                )
+            if sensor in used[:index]:
+                yield Problem(("trackers", name, "sensors", index), "named twice", sensor)
+        if not (tracker.get("reference") or shared):
+            yield Problem(
+                ("trackers", name, "reference"),
+                "missing: the stream that paces the tracker, here or as synchronisation.reference",
+            )

@@ -1,0 +1,152 @@
+"""The tables of a configuration file, one model each."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from abs_service.config.camera import CameraTable
+from abs_service.config.values import DeviceUri, Endpoint, Name, Plugin, RelativePath, SettingsOf, Stream
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    """What all tables share: they are frozen and know their keys. No logic."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+
+class BusTable(Table):
+    """`[bus]`: how the processes of a rig reach each other.
+
+    Attributes:
+        endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
+        shared_memory: whether images travel through shared memory on one host.
+    """
+
+    endpoint: Endpoint = "tcp/127.0.0.1:7447"
+    shared_memory: bool = True
+
+
+class DeviceTable(Table):
+    """`[devices.<name>]`: one thing that delivers images; the URI names its driver and which device."""
+
+    uri: DeviceUri
+
+
+class SensorTable(Table):
+    """`[sensors.<name>]`: one optical head of a device, by the name that it has on the wire.
+
+    Attributes:
+        device: name of the device that it belongs to.
+        head: what the device calls it; "" if it is the sensor's name.
+        camera: calibration in place of the device's own.
+        noise: `Settings` of a module of `calib.noise`; None if the sensor is recorded, but no tracker uses it.
+    """
+
+    device: str
+    head: str = ""
+    camera: CameraTable = CameraTable()
+    noise: Annotated[Any, Plugin("calib.noise")] | None = None
+
+
+class SynchronisationTable(Table):
+    """`[synchronisation]`: which images show one moment.
+
+    Attributes:
+        reference: stream whose exposures pace the trackers; "" if each tracker names its own.
+        tolerance_ms: largest difference between its stamp and another stream's.
+    """
+
+    reference: Stream | Literal[""] = ""
+    tolerance_ms: Positive = 12.0
+
+
+class MeshTable(Table):
+    """`mesh` of a tracker: the triangle mesh whose deformation is estimated; `vertices` is their number."""
+
+    vertices: Annotated[int, Field(ge=4, le=100_000)] = 300
+
+
+class TrackerTable(Table):
+    """`[trackers.<name>]`: one estimate of a deformation from some of the sensors.
+
+    Attributes:
+        sensors: names of the sensors whose measurements count.
+        reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
+        model, region, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, `.regions`, ….
+        mesh: the triangle mesh.
+        priors, status: `Settings` of `abs_service.tracker.priors` and of `.status`.
+    """
+
+    sensors: Annotated[tuple[str, ...], Field(min_length=1)]
+    reference: Stream | Literal[""] = ""
+    model: Annotated[Any, Plugin("abs_service.tracker.models")]
+    region: Annotated[Any, Plugin("abs_service.tracker.regions")] = Field(default={"type": "nearest"})
+    mesh: MeshTable = MeshTable()
+    objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
+    priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
+    status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
+    optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "cma"})
+
+
+class RecordTable(Table):
+    """`[record]`: what is kept on disk.
+
+    Attributes:
+        enabled: whether `run` records.
+        directory: folder of the recordings, created if it does not exist.
+        compression: of MCAP chunks.
+        chunk_bytes: size of a chunk before compression.
+        flush_s: longest time until a message is on disk, and so the most that a crash can lose.
+        rotate_bytes, rotate_s: size and age at which a new file begins.
+        minimum_free_bytes: free space at which recording ends.
+    """
+
+    enabled: bool = True
+    directory: RelativePath = Path("recordings")
+    compression: Literal["none", "lz4", "zstd"] = "lz4"
+    chunk_bytes: Annotated[int, Field(ge=4096, le=1 << 30)] = 1 << 20
+    flush_s: Positive = 1.0
+    rotate_bytes: Annotated[int, Field(ge=1 << 16)] = 4_000_000_000
+    rotate_s: Positive = 3600.0
+    minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
+
+
+class RunTable(Table):
+    """`[run]`: how `run` looks after its processes.
+
+    Attributes:
+        restarts, window_s: a process that ends this often within this time is given up.
+        stall_s: a process that says nothing for this long is restarted.
+        grace_s: time that a process has to end in order before it is killed.
+    """
+
+    restarts: Annotated[int, Field(ge=0)] = 5
+    window_s: Positive = 60.0
+    stall_s: Positive = 10.0
+    grace_s: Positive = 1.5
+
+
+class ServiceConfig(Table):
+    """Everything that a rig is: who it is on the wire, its devices, its sensors, its trackers and what it keeps."""
+
+    version: Literal[1]
+    name: Name
+    bus: BusTable = BusTable()
+    devices: dict[Name, DeviceTable]
+    sensors: dict[Name, SensorTable]
+    synchronisation: SynchronisationTable = SynchronisationTable()
+    trackers: dict[Name, TrackerTable] = {}
+    record: RecordTable
+    run: RunTable = RunTable()
+
+    def heads(self, device: str) -> dict[str, str]:
+        """Sensor names of a device by what the device calls its heads."""
+        return {sensor.head or name: name for name, sensor in self.sensors.items() if sensor.device == device}
+
+    def reference(self, tracker: str) -> tuple[str, str]:
+        """Sensor and stream whose exposures pace a tracker."""
+        sensor, stream = (self.trackers[tracker].reference or self.synchronisation.reference).split("/")
+        return sensor, stream

@@ -1,0 +1,84 @@
+"""Single values of a configuration: what each may be, in words a person can act on."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
+from pydantic_core import CoreSchema, core_schema
+
+from abs_service import keys, plugins
+
+
+def _endpoint(value: str) -> str:
+    match = re.fullmatch(r"(?:tcp|tls|quic|udp|ws)/(?:\[[0-9a-fA-F:.]+\]|[^:/\s]+):(\d{1,5})(?:[?#]\S*)?", value)
+    if match is None or int(match[1]) > 65535:
+        raise ValueError('an endpoint is protocol/address:port, for example "tcp/127.0.0.1:7447"')
+    return value
+
+
+def _uri(value: str) -> str:
+    if not re.fullmatch(r"[a-z][a-z0-9_]*:\S+", value):
+        raise ValueError('a device URI begins with the name of its driver, for example "simulated://sheet?seed=1"')
+    return value
+
+
+def _stream(value: str) -> str:
+    if not re.fullmatch(r"[^/]+/[^/]+", value):
+        raise ValueError('a stream is sensor/stream, for example "tof/depth"')
+    return value
+
+
+def _from_file(value: Any, base: Path) -> Path:
+    if not (isinstance(value, (str, Path)) and str(value)):
+        raise ValueError("must be a path; a relative one starts from the folder of this file")
+    return base / value
+
+
+def _base(info: ValidationInfo) -> Path:
+    # The folder of the TOML file comes down as pydantic's context.
+    return info.context["base"] if info.context else Path()
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """Marks a value as a table whose `type` names a module of a package; the value is that module's `Settings`."""
+
+    package: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return _plain(lambda value, base: plugins.load(self.package, value, base), plugins.table)
+
+
+@dataclass(frozen=True)
+class SettingsOf:
+    """Marks a value as a table without `type`; the value is the `Settings` of one module."""
+
+    module: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return _plain(lambda value, base: plugins.settings(self.module, value, base), plugins.plain)
+
+
+@dataclass(frozen=True)
+class FromFile:
+    """Marks a path that starts from the folder of the TOML file."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return _plain(_from_file, str)
+
+
+def _plain(load: Callable[[Any, Path], Any], dump: Callable[[Any], Any]) -> CoreSchema:
+    return core_schema.with_info_plain_validator_function(
+        lambda value, info: load(value, _base(info)),
+        serialization=core_schema.plain_serializer_function_ser_schema(dump),
+    )
+
+
+Name = Annotated[str, AfterValidator(keys.check_name)]
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
+DeviceUri = Annotated[str, AfterValidator(_uri)]
+Stream = Annotated[str, AfterValidator(_stream)]
+RelativePath = Annotated[Path, FromFile()]

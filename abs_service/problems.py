@@ -1,0 +1,93 @@
+"""What is wrong with a configuration, in words for the person who wrote it."""
+
+import difflib
+import json
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pydantic import ValidationError
+
+Key = tuple[str | int, ...]
+
+#: Stands for "no value was given", which a TOML file can say and None cannot.
+ABSENT: Any = object()
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One mistake: where it is, what was given and what is allowed instead.
+
+    Attributes:
+        key: path of the key from the root of the table.
+        message: what is allowed, without the key.
+        value: what was given; `ABSENT` if nothing was.
+    """
+
+    key: Key
+    message: str
+    value: Any = ABSENT
+
+    def under(self, prefix: Iterable[str | int]) -> "Problem":
+        """The same problem seen from a table further out."""
+        return replace(self, key=(*prefix, *self.key))
+
+    def __str__(self) -> str:
+        given = "" if self.value is ABSENT else f" = {_shown(self.value)}"
+        return f"{dotted(self.key)}{given}: {self.message}"
+
+
+class ProblemsError(ValueError):
+    """Several mistakes at once. A `ValueError`, so that pydantic's validators may raise it."""
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("; ".join(map(str, self.problems)))
+
+
+def dotted(key: Key) -> str:
+    """The key as a TOML file names it: `trackers.sheet.model.degree`, `sensors.tof.camera.lens[2]`."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in key)
+    return text.removeprefix(".") or "(file)"
+
+
+def none_of(name: str, allowed: Collection[str]) -> str:
+    """What to use instead of an unknown name: the closest allowed one and the list of all."""
+    close = difflib.get_close_matches(name, allowed, n=1)
+    guess = f'did you mean "{close[0]}"? ' if close else ""
+    return f"{guess}allowed: {', '.join(sorted(allowed)) or 'none'}"
+
+
+def unknown_key(key: Key, allowed: Collection[str]) -> Problem:
+    """The problem of a key that means nothing where it stands."""
+    return Problem(key, f"unknown key, {none_of(str(key[-1]), allowed)}")
+
+
+def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection[str]]) -> list[Problem]:
+    """All problems that pydantic found.
+
+    Args:
+        error: what validation raised.
+        allowed_at: the keys that the table at a path may hold.
+    """
+    found: list[Problem] = []
+    for detail in error.errors(include_url=False):
+        key = tuple(part for part in detail["loc"] if part != "[key]")
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, ProblemsError):
+            found += [problem.under(key) for problem in cause.problems]
+        elif detail["type"] == "extra_forbidden":
+            found.append(unknown_key(key, allowed_at(key[:-1])))
+        elif detail["type"] == "missing":
+            found.append(Problem(key, "missing, but needed"))
+        else:
+            message = detail["msg"].removeprefix("Value error, ")
+            for subject in ("Input", "String", "Tuple", "List", "Object"):
+                message = message.replace(f"{subject} should", "must")
+            found.append(Problem(key, message, detail["input"]))
+    return found
+
+
+def _shown(value: Any, limit: int = 60) -> str:
+    text = json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -1,0 +1,178 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abs_service import config
+from calib import pose
+from calib.camera import Camera
+
+SENSORS = """
+version = 1
+name = "bench"
+
+[devices.sim]
+uri = "simulated://sheet?seed=1"
+
+[sensors.tof]
+device = "sim"
+noise = { type = "gaussian_polynomial", sigma = [[0.01]] }
+
+[sensors.color]
+device = "sim"
+head = "rgb"
+
+[synchronisation]
+reference = "tof/depth"
+"""
+
+
+def loads(text: str) -> config.ServiceConfig:
+    return config.loads(text, "rig.toml", Path("/rig"))
+
+
+def mistakes(text: str) -> list[str]:
+    with pytest.raises(config.ConfigError) as caught:
+        loads(text)
+    first, *others = str(caught.value).splitlines()
+    assert first.startswith("rig.toml: ")
+    return [line.strip() for line in others] or [first.removeprefix("rig.toml: ")]
+
+
+def test_what_is_not_said_has_a_default():
+    made = loads(SENSORS)
+    assert made.bus.endpoint == "tcp/127.0.0.1:7447"
+    assert made.record.directory == Path("/rig/recordings")
+    assert made.trackers == {}
+
+
+def test_sensors_are_found_by_what_the_device_calls_its_heads():
+    assert loads(SENSORS).heads("sim") == {"tof": "tof", "rgb": "color"}
+
+
+def test_paths_start_from_the_folder_of_the_file(tmp_path):
+    file = tmp_path / "rig.toml"
+    file.write_text(SENSORS + '[record]\ndirectory = "takes"\n')
+    assert config.load(file).record.directory == tmp_path / "takes"
+
+
+def test_the_effective_configuration_loads_to_an_equal_one_from_anywhere():
+    turned = "{ rotation_vector = [0.1, -0.2, 0.3], translation = [0.05, 0.0, 0.0] }"
+    made = loads(SENSORS + f"[sensors.tof.camera]\nT_rs = {turned}\n[record]\nrotate_s = 12.5\n")
+    assert config.loads(config.to_toml(made), "again", Path("/elsewhere")) == made
+
+
+def test_a_camera_table_replaces_what_it_names_and_nothing_else():
+    factory = Camera(176, 144, 220.0, 220.0, 87.5, 71.5, T_rs=pose.from_rotation_vector((0, 0, 0.1), (1, 2, 3)))
+    table = "[sensors.tof.camera]\nwidth = 320\nheight = 240\nfx = 300.0\nfy = 301.0\ncx = 160.0\ncy = 120.0\n"
+    camera = loads(SENSORS + table + "lens = [0.1]\n").sensors["tof"].camera.applied_to(factory)
+    assert (camera.width, camera.fy, camera.lens.coefficients[0]) == (320, 301.0, 0.1)
+    np.testing.assert_array_equal(camera.T_rs, factory.T_rs)
+    assert loads(SENSORS).sensors["tof"].camera.applied_to(factory).calib_id == factory.calib_id
+
+
+def test_a_pose_may_be_a_matrix():
+    T_rs = pose.from_rotation_vector((0.3, 0.2, -0.1), (0.05, 0.0, 0.01))
+    made = loads(SENSORS + f"[sensors.tof.camera]\nT_rs = {T_rs.tolist()}\n")
+    table = made.sensors["tof"].camera.T_rs
+    assert table is not None
+    np.testing.assert_allclose(table.matrix(), T_rs, atol=1e-12)
+
+
+CASES = {
+    "a misspelt section": ("[buss]\n", 'buss: unknown key, did you mean "bus"?'),
+    "a misspelt key": (
+        "[record]\nrotate_sec = 3\n",
+        'record.rotate_sec: unknown key, did you mean "rotate_s"? allowed: chunk',
+    ),
+    "a value out of range": ("[record]\nflush_s = 0\n", "record.flush_s = 0: must be greater than 0"),
+    "a number as text": ('[record]\nflush_s = "1"\n', 'record.flush_s = "1": must be a valid number'),
+    "a value that is none of those allowed": (
+        '[record]\ncompression = "gzip"\n',
+        "record.compression = \"gzip\": must be 'none', 'lz4' or 'zstd'",
+    ),
+    "an endpoint without a port": ('[bus]\nendpoint = "tcp/here"\n', "an endpoint is protocol/address:port"),
+    "an endpoint with too high a port": (
+        '[bus]\nendpoint = "tcp/here:70000"\n',
+        "an endpoint is protocol/address:port",
+    ),
+    "a device without a driver": ('[devices.x]\nuri = "sheet"\n', 'devices.x.uri = "sheet": a device URI begins with'),
+    "a sensor without its device": (
+        '[sensors.ir]\ndevice = "sam"\n',
+        'sensors.ir.device = "sam": no such device, did you mean "sim"? allowed: sim',
+    ),
+    "a head that two sensors claim": (
+        '[sensors.second]\ndevice = "sim"\nhead = "rgb"\n',
+        'sensors.second: sensor "color" is head "rgb" of device "sim" already',
+    ),
+    "a name that cannot be a key": ('[devices."a/b"]\nuri = "simulated:x"\n', "devices.a/b = "),
+    "a reserved name": ('[devices.health]\nuri = "simulated:x"\n', "reserved"),
+    "a pose that is none": (
+        "[sensors.tof.camera]\nT_rs = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n",
+        "sensors.tof.camera.T_rs = [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]: not a pose",
+    ),
+    "a pose of words": ('[sensors.tof.camera]\nT_rs = [["a"]]\n', "4 rows of 4 numbers"),
+    "half a camera matrix": ("[sensors.tof.camera]\nfx = 3.0\n", "missing: width, height, fy, cx, cy"),
+    "a lens without its camera matrix": ("[sensors.tof.camera]\nlens = [0.1]\n", "missing: width"),
+    "a noise model that is none": (
+        '[sensors.ir]\ndevice = "sim"\nnoise = { type = "colour" }\n',
+        'sensors.ir.noise.type = "colour": no such type, did you mean "color"? allowed: color,',
+    ),
+    "a noise model's key": (
+        '[sensors.ir]\ndevice = "sim"\nnoise = { type = "color", sigm = 3 }\n',
+        'sensors.ir.noise.sigm: unknown key, did you mean "sigma"? allowed: sigma',
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mistake_is_named_with_its_key_its_value_and_what_is_allowed(case):
+    text, message = CASES[case]
+    found = mistakes(SENSORS + text)
+    assert len(found) == 1
+    assert message in found[0]
+
+
+def test_every_mistake_is_told_at_once():
+    text = (
+        SENSORS.replace('device = "sim"', 'device = "sam"').replace("version = 1", "version = 2").replace("[bus]", "")
+    )
+    found = mistakes(text + "[bus]\nendpoint = 3\n")
+    assert [line.split()[0] for line in found] == [
+        "version",
+        "bus.endpoint",
+        "sensors.tof.device",
+        "sensors.color.device",
+    ]
+
+
+def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():
+    tracker = '[trackers.tof]\nsensors = ["tof", "rgb", "color", "tof"]\nreference = "tov/depth"\n'
+    found = "\n".join(mistakes(SENSORS.replace('reference = "tof/depth"', "") + tracker))
+    assert 'trackers.tof.reference = "tov/depth": no such sensor, did you mean "tof"? allowed: color, tof' in found
+    assert "trackers.tof: a sensor has this name" in found
+    assert 'trackers.tof.sensors[1] = "rgb": no such sensor, allowed: color, tof' in found
+    assert 'sensors.color.noise: missing, but tracker "tof" weighs its measurements with it' in found
+    assert 'trackers.tof.sensors[3] = "tof": named twice' in found
+    assert "trackers.tof.model: missing" in found
+
+
+def test_a_tracker_without_any_reference_is_told_where_to_put_one():
+    text = SENSORS.replace('reference = "tof/depth"', "") + '[trackers.sheet]\nsensors = ["tof"]\n'
+    assert any(line.startswith("trackers.sheet.reference: missing") for line in mistakes(text))
+
+
+def test_a_file_that_is_not_toml_is_told_with_the_line():
+    assert "line 2" in mistakes("version = 1\nname = \n")[0]
+
+
+def test_a_name_given_twice_is_told_with_the_line():
+    assert "line" in mistakes(SENSORS + '[devices.sim]\nuri = "simulated:x"\n')[0]
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(config.ConfigError, match=r"none\.toml: cannot be read: No such file"):
+        config.load(tmp_path / "none.toml")
+    (tmp_path / "latin.toml").write_bytes(b'name = "\xe4"')
+    with pytest.raises(config.ConfigError, match="byte 8"):
+        config.load(tmp_path / "latin.toml")

@@ -1,0 +1,95 @@
+import sys
+from pathlib import Path
+
+import pytest
+
+from abs_service import plugins
+from abs_service.problems import ProblemsError
+
+BENDY = """
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+from annotated_types import Interval
+
+@dataclass(frozen=True)
+class Bendy:
+    degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    control_points: tuple[int, int] = (4, 4)
+    mask: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.degree >= min(self.control_points):
+            raise ValueError("degree must be below the number of control points")
+
+Settings = Bendy
+"""
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package of parts on disk: one with settings, one without."""
+    folder = tmp_path / "parts_for_test"
+    folder.mkdir()
+    (folder / "__init__.py").write_text("")
+    (folder / "bendy.py").write_text(BENDY)
+    (folder / "base.py").write_text("")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    yield "parts_for_test"
+    for name in [name for name in sys.modules if name.startswith("parts_for_test")]:
+        del sys.modules[name]
+
+
+def problems(package, table):
+    with pytest.raises(ProblemsError) as caught:
+        plugins.load(package, table, Path())
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_the_type_names_the_module_and_the_other_keys_are_its_settings(package):
+    made = plugins.load(package, {"type": "bendy", "degree": 3, "control_points": [5, 6]}, Path())
+    assert (made.degree, made.control_points) == (3, (5, 6))
+
+
+def test_only_modules_with_settings_are_available(package):
+    assert plugins.available(package) == ["bendy"]
+
+
+def test_relative_paths_start_from_the_given_folder(package):
+    table = {"type": "bendy", "mask": "masks/a.png"}
+    assert plugins.load(package, table, Path("/rig")).mask == Path("/rig/masks/a.png")
+    assert plugins.load(package, table | {"mask": "/a.png"}, Path("/rig")).mask == Path("/a.png")
+
+
+def test_a_table_made_from_settings_loads_again(package):
+    made = plugins.load(package, {"type": "bendy", "mask": "a.png"}, Path("/rig"))
+    assert plugins.load(package, plugins.table(made), Path("/elsewhere")) == made
+
+
+def test_an_unknown_type_is_answered_with_what_there_is(package):
+    assert problems(package, {"type": "bendi"}) == [
+        'type = "bendi": no such type, did you mean "bendy"? allowed: bendy'
+    ]
+
+
+@pytest.mark.parametrize("name", ["base", "../bendy", "os.path", ""])
+def test_a_type_reaches_nothing_but_the_modules_of_its_package(package, name):
+    assert "no such type" in problems(package, {"type": name})[0]
+
+
+def test_all_mistakes_of_a_table_are_told_at_once(package):
+    found = problems(package, {"type": "bendy", "degreee": 2, "degree": 9, "control_points": [4, "4"]})
+    assert found == [
+        'degreee: unknown key, did you mean "degree"? allowed: control_points, degree, mask',
+        "degree = 9: must be less than or equal to 4",
+        'control_points[1] = "4": must be a valid integer',
+    ]
+
+
+def test_what_the_settings_themselves_refuse_is_told_in_their_words(package):
+    assert "degree must be below" in problems(package, {"type": "bendy", "degree": 4})[0]
+
+
+@pytest.mark.parametrize("table", ["bendy", 3, {}, {"type": 1}])
+def test_what_is_no_table_with_a_type_is_answered_with_an_example(package, table):
+    assert 'must be a table such as { type = "bendy"' in problems(package, table)[0]
