@@ -1,0 +1,163 @@
+"""Frames on the bus: a sink that publishes what a device delivers, and a subscriber that gives frames back."""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Self
+
+from abs_service import keys
+from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
+from abs_service.queues import LatestQueue
+from abs_service.stamps import Speaker
+from drivers import codec
+from drivers.device import DeviceState, Truth
+from drivers.frame import Frame
+
+#: Frames per stream that may wait to be published. More would only make them old.
+DEPTH = 4
+
+
+class FramePublisher:
+    """Takes what one device delivers and publishes it from a thread of its own; a `drivers.device.Sink`.
+
+    The device is never held up: if publishing falls behind, the oldest frame of the stream is dropped and counted.
+
+    Args:
+        bus: where to publish.
+        speaker: writes the headers.
+        device: name of the device in the configuration; its truth is published under it.
+        on_state: learns of the device's state, from the device's thread.
+        first_epoch: added to the epochs of the device, so that they go on growing when it is opened anew.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        speaker: Speaker,
+        device: str,
+        on_state: Callable[[DeviceState, str], None],
+        first_epoch: int = 0,
+    ) -> None:
+        self._bus = bus
+        self._speaker = speaker
+        self._device = device
+        self._on_state = on_state
+        self._first_epoch = first_epoch
+        self._publishers: dict[str, Publisher] = {}
+        self._published: Counter[str] = Counter()
+        self._queue: LatestQueue[Frame | Truth] = LatestQueue(DEPTH)
+        self._thread = threading.Thread(target=self._run, name=f"publish {device}", daemon=True)
+        self._thread.start()
+
+    @property
+    def published(self) -> Mapping[str, int]:
+        """Messages published, by topic."""
+        return dict(self._published)
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Messages dropped because publishing fell behind, by topic."""
+        return self._queue.dropped
+
+    def on_frame(self, frame: Frame) -> None:
+        """See `drivers.device.Sink.on_frame`."""
+        self._queue.put(keys.image(frame.sensor, frame.stream), frame)
+
+    def on_truth(self, truth: Truth) -> None:
+        """See `drivers.device.Sink.on_truth`."""
+        self._queue.put(keys.truth(self._device), truth)
+
+    def on_state(self, state: DeviceState, reason: str) -> None:
+        """See `drivers.device.Sink.on_state`."""
+        self._on_state(state, reason)
+
+    def close(self) -> None:
+        """Publishes what waits and ends the thread; may be called again."""
+        self._queue.close()
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        while (entry := self._queue.take()) is not None:
+            topic, item = entry
+            if isinstance(item, Frame):
+                self._publish_frame(topic, item)
+            else:
+                self._publish_truth(topic, item)
+            self._published[topic] += 1
+
+    def _publish_frame(self, topic: str, frame: Frame) -> None:
+        if self._first_epoch:
+            frame = replace(frame, epoch=self._first_epoch + frame.epoch)
+        header = self._speaker.header(frame.t_host_ns, frame.seq, frame.sensor)
+        image = codec.encode_image(frame, self._speaker.clock.wall(frame.t_host_ns))
+        self._publisher(topic, codec.IMAGE_SCHEMA).put(image, codec.encode_info(frame, header))
+
+    def _publish_truth(self, topic: str, truth: Truth) -> None:
+        header = self._speaker.header(truth.t_host_ns, truth.seq)
+        self._publisher(topic, codec.TRUTH_SCHEMA).put(codec.encode_truth(truth, header))
+
+    def _publisher(self, topic: str, message: str) -> Publisher:
+        if topic not in self._publishers:
+            qos = IMAGES if message == codec.IMAGE_SCHEMA else EVENTS
+            self._publishers[topic] = self._bus.publisher(topic, message, qos)
+        return self._publishers[topic]
+
+
+class FrameSubscriber:
+    """Receives the newest frames of some streams, in the order of arrival.
+
+    A reader that is too slow loses the oldest, counted, never the present. What cannot be decoded is counted too.
+
+    Args:
+        bus: where the frames are published.
+        streams: (sensor, stream) of each stream wanted.
+        depth: frames per stream that may wait.
+    """
+
+    def __init__(self, bus: Bus, streams: Iterable[tuple[str, str]], depth: int = DEPTH) -> None:
+        self._queue: LatestQueue[Sample] = LatestQueue(depth)
+        self._malformed: Counter[str] = Counter()
+        self.last_error = ""
+        self._subscriptions = [
+            bus.subscribe(keys.image(sensor, stream), lambda sample: self._queue.put(sample.topic, sample))
+            for sensor, stream in streams
+        ]
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames that newer ones pushed out unseen, by topic."""
+        return self._queue.dropped
+
+    @property
+    def malformed(self) -> Mapping[str, int]:
+        """Messages that hold no frame of their topic, by topic; `last_error` says why."""
+        return dict(self._malformed)
+
+    def take(self, timeout_s: float | None = None) -> Frame | None:
+        """The next frame; None once `timeout_s` is over, after `close`, or if what came was malformed."""
+        entry = self._queue.take(timeout_s)
+        if entry is None:
+            return None
+        topic, sample = entry
+        try:
+            frame = codec.decode(sample.payload, sample.attachment)
+            if keys.image(frame.sensor, frame.stream) != topic:
+                raise codec.CodecError(f"a frame of {frame.sensor}/{frame.stream} arrived on {topic}")
+        except codec.CodecError as error:
+            self._malformed[topic] += 1
+            self.last_error = str(error)
+            return None
+        return frame
+
+    def close(self) -> None:
+        """Ends the subscriptions and wakes whoever waits in `take`."""
+        for subscription in self._subscriptions:
+            subscription.close()
+        self._queue.close()

@@ -1,0 +1,96 @@
+"""Opens zenoh sessions: explicit endpoints, no discovery, errors that say what to change."""
+
+import json
+import re
+from enum import StrEnum
+
+import zenoh
+
+#: Without a keep-alive for this long the other side counts as gone [ms].
+LEASE_MS = 2000
+#: How long a client looks for its router [ms].
+CONNECT_TIMEOUT_MS = 3000
+SHARED_MEMORY_POOL_BYTES = 64 << 20
+
+_ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
+
+
+class BusError(Exception):
+    """The bus cannot be opened; the message names the key, its value and what to do."""
+
+
+class Role(StrEnum):
+    """What a process is to the others."""
+
+    ROUTER = "router"  # listens on the endpoint; exactly one process of a rig
+    CLIENT = "client"  # connects to it
+
+
+def open_session(endpoint: str, role: Role, shared_memory: bool = True) -> zenoh.Session:
+    """Opens a session. Close it before the interpreter exits: zenoh hangs there if it is still open.
+
+    Args:
+        endpoint: where the router listens, such as tcp/127.0.0.1:7447.
+        role: whether to be the router or to connect to it.
+        shared_memory: whether large messages pass through shared memory between processes of one host.
+
+    Raises:
+        BusError: the endpoint is malformed or in use, or nothing listens there.
+    """
+    check_endpoint(endpoint)
+    zenoh.init_log_from_env_or("error")
+    try:
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, role, shared_memory))))
+    except zenoh.ZError as error:
+        raise BusError(f'bus.endpoint = "{endpoint}": {_explain(str(error), role)}') from error
+
+
+def check_endpoint(endpoint: str) -> str:
+    """Returns `endpoint` if it can be one.
+
+    Raises:
+        BusError: it cannot.
+    """
+    match = _ENDPOINT.fullmatch(endpoint)
+    if match is None or not 1 <= int(match["port"]) <= 65535:
+        raise BusError(
+            f'bus.endpoint = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
+            "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
+        )
+    return endpoint
+
+
+def _explain(error: str, role: Role) -> str:
+    if "in use" in error:
+        return "the address is in use; is another abs-service running? Stop it or choose another port"
+    if role is Role.CLIENT:
+        return f"nothing answers there within {CONNECT_TIMEOUT_MS / 1000:g} s; start `abs-service run` or use --listen"
+    # zenoh appends its own source lines, which help nobody here.
+    return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
+
+
+def _settings(endpoint: str, role: Role, shared_memory: bool) -> dict[str, object]:
+    listens = role is Role.ROUTER
+    return {
+        "mode": role.value,
+        "listen": {"endpoints": [endpoint] if listens else []},
+        "connect": {
+            "endpoints": [] if listens else [endpoint],
+            "timeout_ms": CONNECT_TIMEOUT_MS,
+            "exit_on_failure": True,
+        },
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
+        "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
+        "transport": {
+            "link": {"tx": {"lease": LEASE_MS}},
+            "shared_memory": {
+                "enabled": shared_memory,
+                "transport_optimization": {
+                    "enabled": shared_memory,
+                    "pool_size": SHARED_MEMORY_POOL_BYTES,
+                    # Not queries: zenoh may lose those while the receiver stalls (eclipse-zenoh/zenoh #2628).
+                    "messages": ["put"],
+                },
+            },
+        },
+    }

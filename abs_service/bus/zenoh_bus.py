@@ -1,0 +1,163 @@
+"""The bus between processes: zenoh."""
+
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Self
+
+import zenoh
+from zenoh import ext
+
+from abs_service import keys
+from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
+from abs_service.bus.session import Role, open_session
+
+ENCODING = "application/protobuf"
+#: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
+HEARTBEAT_S = 0.5
+
+_PRIORITIES = {
+    Priority.REAL_TIME: zenoh.Priority.REAL_TIME,
+    Priority.DATA_HIGH: zenoh.Priority.DATA_HIGH,
+    Priority.DATA: zenoh.Priority.DATA,
+    Priority.DATA_LOW: zenoh.Priority.DATA_LOW,
+}
+
+
+class ZenohBus:
+    """One rig's topics on a zenoh session; keeps the promises of `contract.Bus`.
+
+    Args:
+        session: an open session; the bus closes it.
+        rig: name of the rig.
+    """
+
+    def __init__(self, session: zenoh.Session, rig: str) -> None:
+        self._session = session
+        self._rig = keys.check_name(rig)
+
+    @classmethod
+    def open(cls, rig: str, endpoint: str, role: Role, shared_memory: bool = True) -> Self:
+        """Opens a session and a bus on it; errors as in `open_session`."""
+        return cls(open_session(endpoint, role, shared_memory), rig)
+
+    def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
+        """See `contract.Bus.publisher`."""
+        settings: dict[str, Any] = {
+            "encoding": f"{ENCODING};{message}",
+            "priority": _PRIORITIES[qos.priority],
+            "congestion_control": zenoh.CongestionControl.DROP,
+            "express": qos.express,
+        }
+        if not qos.history:
+            return _Publisher(self._session.declare_publisher(self._key(topic), **settings))
+        return _Publisher(
+            ext.declare_advanced_publisher(
+                self._session,
+                self._key(topic),
+                cache=ext.CacheConfig(qos.history),
+                sample_miss_detection=ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
+                publisher_detection=True,
+                **settings,
+            )
+        )
+
+    def announce(self, topic: str, message: str) -> Publisher:
+        """See `contract.Bus.announce`."""
+        return _Announcement(self.publisher(topic, message, EVENTS), self._session, self._key(topic), message)
+
+    def answer(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
+        """See `contract.Bus.answer`."""
+        key = self._key(topic)
+
+        def on_query(query: zenoh.Query) -> None:
+            query.reply(key, payload(), encoding=f"{ENCODING};{message}")
+
+        return _Declared(self._session.declare_queryable(key, on_query))
+
+    def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
+        """See `contract.Bus.ask`."""
+        replies = self._session.get(self._key(pattern), target=zenoh.QueryTarget.ALL, timeout=timeout_s)
+        return [self._sample(reply.ok) for reply in replies if reply.ok is not None]
+
+    def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
+        """See `contract.Bus.subscribe`."""
+        # The bytes are copied here, in zenoh's thread, so that a slow reader never holds shared memory.
+        return _Declared(
+            self._session.declare_subscriber(self._key(pattern), lambda sample: on_sample(self._sample(sample)))
+        )
+
+    def show_alive(self, component: str) -> Subscription:
+        """See `contract.Bus.show_alive`."""
+        return _Declared(self._session.liveliness().declare_token(self._key(keys.live(component))))
+
+    def watch_alive(self, on_change: Callable[[str, bool], None]) -> Subscription:
+        """See `contract.Bus.watch_alive`."""
+        prefix = keys.live("")
+
+        def on_token(sample: zenoh.Sample) -> None:
+            component = keys.topic(self._rig, str(sample.key_expr)).removeprefix(prefix)
+            on_change(component, sample.kind == zenoh.SampleKind.PUT)
+
+        tokens = self._session.liveliness()
+        return _Declared(tokens.declare_subscriber(self._key(keys.live("**")), on_token, history=True))
+
+    def close(self) -> None:
+        """Ends the session; may be called again."""
+        if not self._session.is_closed():
+            self._session.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _key(self, topic: str) -> str:
+        return keys.key(self._rig, topic)
+
+    def _sample(self, sample: zenoh.Sample) -> Sample:
+        _, _, message = str(sample.encoding).partition(f"{ENCODING};")
+        attachment = sample.attachment
+        return Sample(
+            keys.topic(self._rig, str(sample.key_expr)),
+            message,
+            sample.payload.to_bytes(),
+            b"" if attachment is None else attachment.to_bytes(),
+        )
+
+
+class _Publisher:
+    def __init__(self, publisher: zenoh.Publisher | ext.AdvancedPublisher) -> None:
+        self._publisher = publisher
+
+    def put(self, payload: bytes, attachment: bytes = b"") -> None:
+        self._publisher.put(payload, attachment=attachment or None)
+
+
+class _Announcement:
+    """A publisher whose last message answers queries; it answers nothing before the first."""
+
+    def __init__(self, publisher: Publisher, session: zenoh.Session, key: str, message: str) -> None:
+        self._publisher = publisher
+        self._key = key
+        self._message = message
+        self._last: bytes | None = None
+        self._queryable = session.declare_queryable(key, self._on_query)
+
+    def put(self, payload: bytes, attachment: bytes = b"") -> None:
+        self._last = payload
+        self._publisher.put(payload, attachment)
+
+    def _on_query(self, query: zenoh.Query) -> None:
+        if self._last is not None:
+            query.reply(self._key, self._last, encoding=f"{ENCODING};{self._message}")
+
+
+class _Declared:
+    def __init__(self, declared: Any) -> None:
+        self._declared = declared
+
+    def close(self) -> None:
+        self._declared.undeclare()

@@ -1,0 +1,187 @@
+"""The bus on real sessions: what arrives, what does not block, and which errors are understood."""
+
+import queue
+import subprocess
+import sys
+import time
+
+import pytest
+
+from abs_service.bus.contract import EVENTS, IMAGES, STATE, Sample
+from abs_service.bus.session import BusError, Role, check_endpoint, open_session
+from abs_service.bus.zenoh_bus import ZenohBus
+
+
+def listen(bus, pattern):
+    arrived = queue.SimpleQueue()
+    bus.subscribe(pattern, arrived.put)
+    return arrived
+
+
+@pytest.fixture
+def buses(open_bus):
+    """A router and two of its clients."""
+    return open_bus(), open_bus(), open_bus()
+
+
+def publish_until_heard(publisher, arrived, *message):
+    """Subscriptions travel to publishers on their own time."""
+    for _ in range(200):
+        publisher.put(*message)
+        try:
+            return arrived.get(timeout=0.05)
+        except queue.Empty:
+            continue
+    raise AssertionError("nothing arrived within ten seconds")
+
+
+@pytest.mark.parametrize("qos", [STATE, EVENTS, IMAGES])
+def test_a_message_arrives_as_it_was_sent(buses, qos):
+    _, sender, receiver = buses
+    arrived = listen(receiver, "**")
+    payload = bytes(range(256)) * 1000
+    publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", qos)
+    sample = publish_until_heard(publisher, arrived, payload, b"info")
+    assert sample == Sample("tof/depth/image", "foxglove.RawImage", payload, b"info")
+    bare = sender.publisher("tf", "foxglove.FrameTransforms", qos)
+    assert publish_until_heard(bare, listen(receiver, "tf"), b"") == Sample("tf", "foxglove.FrameTransforms", b"", b"")
+
+
+def test_an_announcement_is_heard_and_answers_with_the_last(buses):
+    _, sender, receiver = buses
+    publisher = sender.announce("config", "abs.v1.Config")
+    assert receiver.ask("config", 1) == []
+    arrived = listen(receiver, "config")
+    publish_until_heard(publisher, arrived, b"old")
+    publisher.put(b"new")
+    assert receiver.ask("**", 1) == [Sample("config", "abs.v1.Config", b"new")]
+
+
+def test_an_answer_is_made_when_asked(buses):
+    _, sender, receiver = buses
+    sender.answer("schema", "google.protobuf.FileDescriptorSet", lambda: b"files")
+    answers = []
+    while not answers:
+        answers = receiver.ask("schema", 1)
+    assert answers == [Sample("schema", "google.protobuf.FileDescriptorSet", b"files")]
+
+
+def test_components_come_and_go(buses):
+    _, one, two = buses
+    changes = queue.SimpleQueue()
+    token = one.show_alive("track/sheet")
+    two.watch_alive(lambda *change: changes.put(change))
+    assert changes.get(timeout=5) == ("track/sheet", True)
+    token.close()
+    assert changes.get(timeout=5) == ("track/sheet", False)
+    one.show_alive("capture")
+    assert changes.get(timeout=5) == ("capture", True)
+    one.close()
+    assert changes.get(timeout=5) == ("capture", False)
+
+
+def test_a_slow_subscriber_neither_blocks_the_publisher_nor_others(buses):
+    router, sender, receiver = buses
+    release = queue.SimpleQueue()
+    router.subscribe("tof/depth/image", lambda _: release.get())
+    arrived = listen(receiver, "tof/depth/image")
+    publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", IMAGES)
+    publish_until_heard(publisher, arrived, b"first")
+    slowest = 0.0
+    for number in range(60):
+        before = time.perf_counter()
+        publisher.put(bytes(100_000), str(number).encode())
+        slowest = max(slowest, time.perf_counter() - before)
+        time.sleep(0.005)
+    heard = [arrived.get(timeout=5) for _ in range(50)]
+    assert len(heard) == 50
+    assert slowest < 0.5
+    for _ in range(300):
+        release.put(None)
+
+
+def test_a_stopped_subscriber_does_not_block_the_publisher(buses, endpoint):
+    _, sender, receiver = buses
+    program = f"""
+import time
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
+    bus.subscribe("**", lambda sample: None)
+    bus.show_alive("stopped")
+    print("ready", flush=True)
+    time.sleep(60)
+"""
+    alive = queue.SimpleQueue()
+    receiver.watch_alive(lambda *change: alive.put(change))
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout
+            assert process.stdout.readline() == "ready\n"
+            assert alive.get(timeout=5) == ("stopped", True)
+            arrived = listen(receiver, "tof/depth/image")
+            publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", IMAGES)
+            publish_until_heard(publisher, arrived, b"first")
+            process.send_signal(19)  # SIGSTOP
+            slowest = 0.0
+            for _ in range(100):
+                before = time.perf_counter()
+                publisher.put(bytes(1_000_000))
+                slowest = max(slowest, time.perf_counter() - before)
+                time.sleep(0.01)
+            assert slowest < 0.5
+            assert alive.get(timeout=10) == ("stopped", False), "the lease shall end what does not answer"
+        finally:
+            process.kill()
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["", "7447", "tcp/127.0.0.1", "tcp/127.0.0.1:99999", "tcp/127.0.0.1:0", "ftp/127.0.0.1:1", "tcp/a b:1"]
+)
+@pytest.mark.parametrize("role", Role)
+def test_a_malformed_endpoint_is_explained(endpoint, role):
+    with pytest.raises(BusError, match=r'bus\.endpoint = ".*": not an endpoint; write PROTOCOL/HOST:PORT'):
+        open_session(endpoint, role)
+
+
+@pytest.mark.parametrize("endpoint", ["tcp/127.0.0.1:7447", "tls/host.example:1", "tcp/[::1]:65535", "ws/a:1?x=1#y"])
+def test_endpoints_that_are_fine(endpoint):
+    assert check_endpoint(endpoint) == endpoint
+
+
+def test_a_port_in_use_is_explained(open_bus, endpoint):
+    open_bus()
+    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": the address is in use'):
+        open_session(endpoint, Role.ROUTER)
+
+
+def test_a_router_that_is_not_there_is_explained(endpoint, monkeypatch):
+    monkeypatch.setattr("abs_service.bus.session.CONNECT_TIMEOUT_MS", 200)
+    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": nothing answers there'):
+        open_session(endpoint, Role.CLIENT)
+
+
+def test_an_unknown_host_is_explained_without_the_source_of_zenoh():
+    with pytest.raises(BusError, match="cannot listen there") as error:
+        open_session("tcp/no-such-host.invalid:7447", Role.ROUTER)
+    assert ".rs" not in str(error.value)
+
+
+def test_a_process_with_everything_declared_ends_at_once(endpoint):
+    program = f"""
+from abs_service.bus.contract import STATE
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
+    bus.subscribe("**", print)
+    bus.watch_alive(print)
+    bus.announce("config", "abs.v1.Config").put(b"x")
+    bus.publisher("sheet/state", "abs.v1.DeformationState", STATE).put(b"y")
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=10, stdout=subprocess.DEVNULL)
+
+
+def test_closing_twice_is_fine(endpoint):
+    bus = ZenohBus.open("demo", endpoint, Role.ROUTER, shared_memory=False)
+    bus.close()
+    bus.close()
