@@ -1,0 +1,203 @@
+"""The synchroniser's promises, for any order, jitter and loss."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from abs_service.synchroniser import DEPTH, Synchroniser
+from drivers.frame import Frame, FrameSet, Geometry, Kind
+
+MS = 1_000_000
+TOF, COLOR, AMPLITUDE = ("tof", "depth"), ("color", "color"), ("tof", "amplitude")
+TOLERANCE = 12 * MS
+
+
+def frame(key, t_ms, seq=None, *, epoch=0, size=(2, 3), late_ms=0.0):
+    t_ns = int(t_ms * MS)
+    kind, encoding = (Kind.DEPTH, "16UC1") if key == TOF else (Kind.AMPLITUDE, "16UC1")
+    return Frame(
+        sensor=key[0],
+        stream=key[1],
+        kind=kind,
+        data=np.zeros(size, "<u2"),
+        encoding=encoding,
+        geometry=Geometry.RADIAL if kind == Kind.DEPTH else Geometry.NONE,
+        t_host_ns=t_ns,
+        t_arrival_ns=t_ns + int(late_ms * MS),
+        seq=int(t_ms) if seq is None else seq,
+        epoch=epoch,
+    )
+
+
+def synchroniser(*members, **settings):
+    return Synchroniser(TOF, [TOF, *(members or [COLOR])], TOLERANCE, **settings)
+
+
+def test_a_set_is_formed_by_the_last_member_within_tolerance():
+    sync = synchroniser(COLOR, AMPLITUDE)
+    depth, color, amplitude = frame(TOF, 100), frame(COLOR, 108), frame(AMPLITUDE, 100)
+    assert sync.add(depth) == []
+    assert sync.add(color) == []
+    (formed,) = sync.add(amplitude)
+    assert formed.frames == {TOF: depth, COLOR: color, AMPLITUDE: amplitude}
+    assert (formed.seq, formed.stamp_ns, formed.missing, formed.spread_ns) == (0, 100 * MS, (), 8 * MS)
+    assert sync.counters == {}
+
+
+def test_a_member_that_is_past_the_tolerance_is_named_missing_at_once():
+    sync = synchroniser()
+    sync.add(frame(TOF, 100))
+    (formed,) = sync.add(frame(COLOR, 113))
+    assert formed.missing == (COLOR,)
+    assert list(formed.frames) == [TOF]
+    (later,) = sync.add(frame(TOF, 120))
+    assert later.frames[COLOR].seq == 113
+
+
+def test_the_nearest_of_several_members_is_taken_and_the_others_are_counted():
+    sync = synchroniser()
+    for t_ms in (91, 97, 104, 110):
+        sync.add(frame(COLOR, t_ms))
+    (formed,) = sync.add(frame(TOF, 98))
+    assert formed.frames[COLOR].seq == 97
+    assert sync.counters == {"color/color.unmatched": 1}
+
+
+def test_the_deadline_counts_from_the_arrival_of_the_reference():
+    sync = synchroniser(deadline_ns=50 * MS)
+    sync.add(frame(TOF, 100, late_ms=30))
+    assert sync.poll(179 * MS) == []
+    (formed,) = sync.poll(180 * MS)
+    assert formed.missing == (COLOR,)
+
+
+def test_a_silent_stream_is_waited_for_once_and_again_after_it_delivers():
+    sync = synchroniser(deadline_ns=50 * MS)
+    sync.add(frame(TOF, 100))
+    assert len(sync.poll(150 * MS)) == 1
+    sync.add(frame(TOF, 133))
+    assert len(sync.poll(134 * MS)) == 1, "a silent stream must not delay every set by the deadline"
+    sync.add(frame(COLOR, 133))
+    assert sync.counters == {}, "it may still match a reference frame that comes late"
+    sync.add(frame(TOF, 166))
+    assert sync.poll(167 * MS) == []
+    assert sync.add(frame(COLOR, 166))[0].missing == ()
+
+
+@pytest.mark.parametrize(
+    ("second", "cause"),
+    [
+        (frame(TOF, 100), "duplicate"),
+        (frame(TOF, 100, seq=7), "duplicate"),
+        (frame(TOF, 133, seq=100), "duplicate"),
+        (frame(TOF, 133, size=(3, 2)), "changed"),
+        (replace(frame(TOF, 133), data=np.zeros((2, 3), "<f4"), encoding="32FC1"), "changed"),
+        (frame(TOF, 133, epoch=4), "old_epoch"),
+        (frame(TOF, 133, late_ms=-20), "future"),
+        (frame(("other", "depth"), 133), "unexpected"),
+    ],
+)
+def test_what_cannot_be_used_is_rejected_and_counted(second, cause):
+    sync = synchroniser()
+    sync.add(replace(frame(TOF, 100), epoch=5))
+    if cause != "old_epoch":
+        second = replace(second, epoch=5)
+    assert sync.add(second) == []
+    assert sync.counters == {f"{second.sensor}/{second.stream}.{cause}": 1}
+    assert len(sync.flush()) == 1
+
+
+def test_a_frame_older_than_what_left_is_stale():
+    sync = synchroniser()
+    sync.add(frame(COLOR, 100))
+    sync.add(frame(TOF, 100))
+    assert sync.add(frame(TOF, 99)) == []
+    assert sync.add(frame(COLOR, 99)) == []
+    assert sync.counters == {"tof/depth.stale": 1, "color/color.stale": 1}
+
+
+def test_a_new_epoch_may_count_anew_and_have_another_size():
+    sync = synchroniser()
+    sync.add(frame(TOF, 100, seq=1))
+    sync.add(frame(COLOR, 100))
+    sync.add(frame(TOF, 133, seq=1, epoch=1, size=(4, 4)))
+    (formed,) = sync.add(frame(COLOR, 133))
+    assert formed.frames[TOF].data.shape == (4, 4)
+    assert sync.counters == {}
+
+
+def test_memory_is_bounded_without_a_reference_and_without_members():
+    sync = synchroniser()
+    for t_ms in range(1000):
+        sync.add(frame(COLOR, t_ms))
+    assert sync.counters == {"color/color.overflow": 1000 - DEPTH}
+    sync = synchroniser()
+    sets = [formed for t_ms in range(0, 33_000, 33) for formed in sync.add(frame(TOF, t_ms))]
+    assert len(sets) == 1000 - DEPTH
+    assert len(sync.flush()) == DEPTH
+
+
+@st.composite
+def traffic(draw):
+    """Frames of three streams with jitter, loss, repetition and any delay, in order of arrival; and a poll or not."""
+    arrivals = []
+    for key in (TOF, COLOR, AMPLITUDE):
+        period = draw(st.sampled_from([15, 33, 40]))
+        for seq in range(draw(st.integers(0, 25))):
+            if draw(st.integers(0, 9)) == 0:
+                continue
+            t_ms = 1000 + seq * period + draw(st.integers(-5, 5))
+            delay = draw(st.integers(0, 3) | st.integers(0, 120))
+            copies = 2 if draw(st.integers(0, 19)) == 0 else 1
+            arrivals += [(t_ms + delay, frame(key, t_ms, seq, epoch=seq // 20, late_ms=delay))] * copies
+    return sorted(arrivals, key=lambda arrival: arrival[0]), draw(st.booleans())
+
+
+@settings(max_examples=150, deadline=None)
+@given(traffic())
+def test_promises_hold_for_any_traffic(case):
+    arrivals, polls = case
+    sync = synchroniser(COLOR, AMPLITUDE, deadline_ns=50 * MS)
+    sets: list[FrameSet] = []
+    for t_ms, item in arrivals:
+        sets += sync.add(item)
+        if polls:
+            sets += sync.poll(t_ms * MS)
+    sets += sync.flush()
+
+    used = [id(item) for formed in sets for item in formed.frames.values()]
+    assert len(used) == len(set(used)), "a frame is in two sets"
+    assert [formed.seq for formed in sets] == list(range(len(sets)))
+    for earlier, later in pairwise(sets):
+        assert earlier.stamp_ns < later.stamp_ns
+        for key in earlier.frames.keys() & later.frames.keys():
+            assert earlier.frames[key].t_host_ns < later.frames[key].t_host_ns
+    for formed in sets:
+        assert set(formed.frames) | set(formed.missing) == {TOF, COLOR, AMPLITUDE}
+        assert not set(formed.frames) & set(formed.missing)
+        differences = [abs(item.t_host_ns - formed.stamp_ns) for item in formed.frames.values()]
+        assert formed.spread_ns == max(differences) <= TOLERANCE
+
+    rejected = sum(number for cause, number in sync.counters.items() if cause.startswith("tof/depth."))
+    assert len(sets) + rejected == sum(item.key == TOF for _, item in arrivals)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.integers(-5, 5), min_size=2, max_size=30), st.randoms(use_true_random=False))
+def test_streams_of_one_rate_are_matched_completely(jitter, random):
+    """However the two streams interleave: if nothing is lost, nothing is missing."""
+    depth = [frame(TOF, 1000 + 33 * seq, seq) for seq in range(len(jitter))]
+    color = [frame(COLOR, 1000 + 33 * seq + shift, seq) for seq, shift in enumerate(jitter)]
+    sync = synchroniser()
+    sets = []
+    while depth or color:
+        source = depth if not color or (depth and random.random() < 0.5) else color
+        ahead = abs(len(depth) - len(color)) >= DEPTH
+        sets += sync.add((max(depth, color, key=len) if ahead else source).pop(0))
+    assert len(sets) == len(jitter)
+    assert all(not formed.missing for formed in sets)
+    assert sync.counters == {}
