@@ -1,0 +1,115 @@
+"""The command line. Each command is a module of `abs_service.commands`, imported only when it is chosen.
+
+Such a module has a docstring (its help; examples after the first paragraph), `add_arguments(parser)` and
+`run(arguments) -> int`, which returns the exit code.
+"""
+
+import argparse
+import difflib
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from types import ModuleType
+
+import abs_service
+from abs_service import lifeline
+from abs_service.exits import Exit
+
+#: One line of help for each command; kept here so that `--help` imports none of them.
+COMMANDS = {
+    "run": "track live: devices, trackers and recorder, supervised, with a table of how they are",
+    "replay": "track a recording again, frame by frame",
+    "check": "say what a configuration describes, or what is wrong with it",
+    "import": "turn a folder of images into a recording",
+    "recover": "repair recordings that were cut short",
+    "capture": "only the devices: publish their images",
+    "track": "only one tracker: subscribe to images, publish the deformation",
+    "record": "only the recorder: subscribe to everything, write MCAP files",
+}
+
+#: Modules whose name cannot be that of the command.
+MODULES = {"import": "import_images"}
+
+EPILOG = """\
+examples:
+  abs-service run                        a simulated sheet of paper, nothing to connect or configure
+  abs-service run rig.toml               your own sensors
+  abs-service check rig.toml             what that file describes, without touching a device
+  abs-service replay recordings/x.mcap   the same estimates again, from a file
+
+abs-service COMMAND --help says more about each command.
+"""
+
+#: Where the exceptions come from whose message is meant for the user. Everything else is our own mistake.
+OURS = frozenset({"abs_service", "drivers", "calib"})
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit code; see `Exit`."""
+    lifeline.hold()
+    given = list(sys.argv[1:] if argv is None else argv)
+    if not given:
+        _parser().print_help(sys.stderr)
+        return Exit.USER
+    chosen = _parser().parse_args(given[:1])
+    module = import_module(f"abs_service.commands.{MODULES.get(chosen.command, chosen.command)}")
+    arguments = _command_parser(chosen.command, module).parse_args(given[1:])
+    logging.basicConfig(
+        level=arguments.log_level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr
+    )
+    try:
+        return module.run(arguments)
+    except KeyboardInterrupt:
+        return Exit.INTERRUPTED
+    except BrokenPipeError:
+        # What is still buffered has nowhere to go; without this the interpreter would complain about it when it exits.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Exit.PIPE_CLOSED
+    except Exception as error:
+        if type(error).__module__.partition(".")[0] not in OURS:
+            raise
+        print(f"abs-service: error: {error}", file=sys.stderr)
+        return Exit.USER
+
+
+def _parser() -> argparse.ArgumentParser:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
+    parser = argparse.ArgumentParser(
+        prog="abs-service",
+        usage="abs-service [--help] [--version] COMMAND …",
+        description="Tells every other program, live, how the thing in front of depth cameras deforms.\n\n"
+        "commands:\n" + "\n".join(lines),
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"abs-service {abs_service.__version__}")
+    parser.add_argument("command", type=_command, help=argparse.SUPPRESS)
+    return parser
+
+
+def _command(name: str) -> str:
+    if name in COMMANDS:
+        return name
+    close = difflib.get_close_matches(name, COMMANDS, n=1)
+    guess = f' Did you mean "{close[0]}"?' if close else ""
+    raise argparse.ArgumentTypeError(f'there is no command "{name}".{guess} There are: {", ".join(COMMANDS)}')
+
+
+def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=f"abs-service {name}",
+        description=module.__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    module.add_arguments(parser)
+    parser.add_argument(
+        "--log-level",
+        choices=("debug", "info", "warning", "error"),
+        default="warning",
+        help="how much is logged to standard error (default: warning)",
+    )
+    return parser

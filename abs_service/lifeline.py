@@ -1,0 +1,31 @@
+"""Lets a child process notice that its supervisor is gone, however it went, so that none outlives it.
+
+The supervisor holds the writing end of the child's standard input and never writes. When the supervisor dies, even by
+`kill -9`, the kernel closes that end and the child reads the end of the file.
+"""
+
+import os
+import signal
+import sys
+import threading
+import time
+
+#: Set in the environment of children whose standard input is such a pipe.
+VARIABLE = "ABS_SERVICE_LIFELINE"
+
+#: Time that an orphan has to end in order [s].
+GRACE_S = 3.0
+
+
+def hold() -> None:
+    """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force."""
+    if os.environ.pop(VARIABLE, ""):
+        threading.Thread(target=_watch, args=(sys.stdin.fileno(), GRACE_S), name="lifeline", daemon=True).start()
+
+
+def _watch(descriptor: int, grace_s: float) -> None:
+    while os.read(descriptor, 64):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(grace_s)
+    os.kill(os.getpid(), signal.SIGKILL)

@@ -1,0 +1,117 @@
+import logging
+import os
+import subprocess
+import sys
+import types
+
+import pytest
+
+from abs_service import cli
+from abs_service.exits import Exit
+from drivers.device import DeviceError
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """A command `act` that does what the test says."""
+    module = types.SimpleNamespace(
+        __name__="abs_service.commands.act",
+        __doc__="Acts.\n\nexamples:\n  abs-service act --times 3",
+        add_arguments=lambda parser: parser.add_argument("--times", type=int, default=1),
+    )
+    monkeypatch.setitem(cli.COMMANDS, "act", "acts")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setattr(logging, "basicConfig", lambda **_: None)
+
+    def does(act):
+        module.run = act
+        return module
+
+    return does
+
+
+def raising(error):
+    def act(arguments):
+        raise error
+
+    return act
+
+
+def test_a_command_gets_its_arguments_and_gives_the_exit_code(command):
+    command(lambda arguments: arguments.times)
+    assert cli.main(["act", "--times", "7"]) == 7
+
+
+def test_what_the_user_can_mend_is_one_message_and_exit_code_2(command, capsys):
+    command(raising(DeviceError("no camera on this bus; plug one in")))
+    assert cli.main(["act"]) == Exit.USER
+    assert capsys.readouterr().err == "abs-service: error: no camera on this bus; plug one in\n"
+
+
+def test_our_own_mistakes_keep_their_traceback(command):
+    command(raising(ZeroDivisionError("division by zero")))
+    with pytest.raises(ZeroDivisionError):
+        cli.main(["act"])
+
+
+def test_ctrl_c_before_the_command_handles_it(command):
+    command(raising(KeyboardInterrupt()))
+    assert cli.main(["act"]) == Exit.INTERRUPTED
+
+
+def test_the_help_of_a_command_is_its_docstring(command, capsys):
+    command(lambda arguments: 0)
+    with pytest.raises(SystemExit):
+        cli.main(["act", "--help"])
+    out = capsys.readouterr().out
+    assert "usage: abs-service act" in out
+    assert "abs-service act --times 3" in out
+
+
+def test_an_unknown_command_is_answered_with_the_closest(capsys):
+    with pytest.raises(SystemExit) as caught:
+        cli.main(["rnu"])
+    assert caught.value.code == Exit.USER
+    assert 'Did you mean "run"?' in capsys.readouterr().err
+
+
+def test_without_a_command_the_help_is_shown(capsys):
+    assert cli.main([]) == Exit.USER
+    shown = capsys.readouterr().err
+    assert all(name in shown for name in cli.COMMANDS)
+
+
+def test_help_imports_no_command_and_nothing_heavy():
+    code = (
+        "import sys; from abs_service import cli\n"
+        "try: cli.main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'numba', 'zenoh', 'pydantic', 'rich', 'google'}\n"
+        "print(heavy & sys.modules.keys(), file=sys.stderr)"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
+    assert done.stderr.strip() == "set()"
+    assert "examples:" in done.stdout
+
+
+def test_a_reader_that_goes_away_ends_the_command_quietly(tmp_path):
+    (tmp_path / "talk.py").write_text(
+        "import sys, types\nfrom abs_service import cli\n"
+        "module = types.ModuleType('abs_service.commands.talk', 'Talks.')\n"
+        "module.add_arguments = lambda parser: None\n"
+        "module.run = lambda arguments: [print('x' * 1000, flush=True) for _ in range(100000)] and 0\n"
+        "sys.modules[module.__name__] = module\ncli.COMMANDS['talk'] = 'talks'\n"
+        "sys.exit(cli.main(['talk']))\n"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    talker = subprocess.Popen(
+        [sys.executable, tmp_path / "talk.py"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
+    )
+    assert talker.stdout is not None
+    talker.stdout.readline()
+    talker.stdout.close()
+    assert talker.stderr is not None
+    assert talker.stderr.read() == b""
+    talker.stderr.close()
+    assert talker.wait(10) == Exit.PIPE_CLOSED
