@@ -13,7 +13,7 @@ test: .venv/.dev ## the tests without the slow ones: make test ARGS="tests/calib
 	@$(BIN)/pytest -m "not slow and not hardware" $(ARGS)
 check: lint test ## everything a change has to pass
 lint: .venv/.dev ## format, style, types, import contracts
-	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright && $(BIN)/lint-imports
+	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 format: .venv/.dev ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 bench: .venv/.dev ## measure the hot parts; compare minima, machines differ

@@ -1,0 +1,109 @@
+"""Promises of the repository itself: it works elsewhere, installs what it pins, and its changelog knows the version."""
+
+import re
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+import abs_service
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+# Where a path means the same on every Linux machine.
+STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
+ABSOLUTE_PATH = re.compile(r"(?<![\w./:~$}-])(?:/[\w.+-]+){2,}")
+HOME = re.compile(r"/(home/\w+|root|Users/\w+)/")
+PACKAGE_INDEX = re.compile(r"index[-_]url|find[-_]links|trusted[-_]host|\b(pypi|pythonhosted|npmjs)[.](org|com)", re.I)
+
+
+def test_every_file_is_portable() -> None:
+    found = [
+        f"{path}:{number}: {complaint}"
+        for path, text in _tracked_texts()
+        for number, line in enumerate(text.splitlines(), start=1)
+        for complaint in _not_portable(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("line", [f"data = '{ROOT}/tests'", "cd /home/" + "ann/code", "pip install --index" + "-url x"])
+def test_a_line_that_works_on_one_machine_only_is_noticed(line: str) -> None:
+    assert list(_not_portable(line))
+
+
+@pytest.mark.parametrize("line", ["#!/usr/bin/env bash", "/tof/depth/image", "https://example.org/a/b", "a/b/c"])
+def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
+    assert not list(_not_portable(line))
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
+        ("constraints-dev.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
+    ],
+)
+def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> None:
+    pins = _pins(name)
+    assert [line for line in map(Requirement, wanted) if pins[line.name] not in line.specifier] == [], (
+        "make constraints"
+    )
+
+
+def test_running_and_testing_use_the_same_versions() -> None:
+    assert _pins("constraints.txt").items() <= _pins("constraints-dev.txt").items()
+
+
+@pytest.mark.parametrize("name", ["constraints.txt", "constraints-dev.txt"])
+def test_every_pin_has_a_hash_and_no_address(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert all("--hash=sha256:" in pin for pin in re.split(r"\n(?=\w)", text)[1:])
+    assert "://" not in text
+
+
+def test_the_newest_entry_of_the_changelog_is_this_version() -> None:
+    headings = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert headings[0] in {"Unreleased", abs_service.__version__}
+    assert abs_service.__version__ in headings
+
+
+def test_the_wheel_holds_what_the_programs_need_and_no_more(tmp_path: Path) -> None:
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
+    names = zipfile.ZipFile(next(tmp_path.glob("*.whl"))).namelist()
+    packages = {"abs_service", "drivers", "calib", "abs"}
+    assert {name.split("/")[0] for name in names if ".dist-info/" not in name} == packages
+    assert {f"{package}/py.typed" for package in packages} <= set(names)
+    for pattern, folder in [("abs/v1/*.proto", ROOT / "proto"), ("abs_service/rigs/*.toml", ROOT)]:
+        data = {str(path.relative_to(folder)) for path in folder.glob(pattern)}
+        assert data, pattern
+        assert data <= set(names)
+
+
+def _tracked_texts() -> list[tuple[str, str]]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip("not a git checkout")
+    paths = [name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
+    contents = [(name, (ROOT / name).read_bytes()) for name in paths]
+    return [(name, data.decode("utf-8", errors="replace")) for name, data in contents if b"\0" not in data[:4096]]
+
+
+def _not_portable(line: str) -> list[str]:
+    paths = [match[0] for match in ABSOLUTE_PATH.finditer(line) if not STANDARD.match(match[0])]
+    complaints = [f"{path} exists on this machine only" for path in paths if Path(path).exists()]
+    complaints += [f"{match[0]} is somebody's home" for match in [HOME.search(line)] if match]
+    complaints += [f"{match[0]} belongs into your own pip settings" for match in [PACKAGE_INDEX.search(line)] if match]
+    return complaints
+
+
+def _pins(name: str) -> dict[str, Version]:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return {pin: Version(version) for pin, version in re.findall(r"^([\w-]+)==([^\s;]+)", text, re.M)}
