@@ -1,0 +1,118 @@
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from abs_service.processes import ChildProcess
+
+PATH = os.pathsep.join(sys.path)
+
+
+@pytest.fixture
+def child(monkeypatch):
+    """Starts Python code as a child; whatever is left is killed."""
+    monkeypatch.setenv("PYTHONPATH", PATH)
+    started = []
+
+    def start(code, on_line=lambda component, line: None):
+        started.append(ChildProcess("act", ["-c", code], on_line, program=(sys.executable,)))
+        return started[-1]
+
+    yield start
+    for process in started:
+        process.kill()
+        process.last_words()
+
+
+def wait_for_end(process, seconds=10.0):
+    deadline = time.monotonic() + seconds
+    while process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return process.poll()
+
+
+def test_lines_of_both_outputs_arrive_with_the_name_of_the_component(child):
+    lines = []
+    process = child(
+        "import sys; print('out'); print('err', file=sys.stderr); sys.exit(3)", lambda *line: lines.append(line)
+    )
+    assert wait_for_end(process) == 3
+    assert process.last_words() == "out\nerr"
+    assert lines == [("act", "out"), ("act", "err")]
+
+
+def test_a_child_ends_in_order_when_asked_and_asking_twice_is_harmless(child):
+    ready = threading.Event()
+    code = "import signal, sys\nsignal.signal(signal.SIGTERM, lambda *_: sys.exit(7))\nprint('ready')\nsignal.pause()"
+    process = child(code, lambda *_: ready.set())
+    assert ready.wait(10)
+    process.terminate()
+    assert wait_for_end(process) == 7
+    process.terminate()
+    process.kill()
+
+
+def test_killing_a_child_kills_what_it_started(child):
+    lines = []
+    ready = threading.Event()
+    code = (
+        "import signal, subprocess, sys\nsignal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+        "print(subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(60)']).pid)\nsignal.pause()"
+    )
+    process = child(code, lambda _, line: (lines.append(line), ready.set()))
+    assert ready.wait(10)
+    process.kill()
+    assert process.poll() == -signal.SIGKILL
+    assert gone(int(lines[0]))
+
+
+SUPERVISOR = """
+import sys, time
+from abs_service.processes import ChildProcess
+code = '''
+import signal, time
+from abs_service import lifeline
+lifeline.GRACE_S = 0.2
+signal.signal(signal.SIGTERM, {handler})
+lifeline.hold()
+print("ready", flush=True)
+while True:
+    time.sleep(60)
+'''
+child = ChildProcess("act", ["-c", code], lambda *_: print(child.pid, flush=True), program=(sys.executable,))
+time.sleep(60)
+"""
+
+
+@pytest.mark.parametrize("handler", ["signal.SIG_DFL", "signal.SIG_IGN"])
+def test_no_child_outlives_a_supervisor_that_was_killed(handler):
+    supervisor = subprocess.Popen(
+        [sys.executable, "-c", SUPERVISOR.format(handler=handler)],
+        stdout=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": PATH},
+    )
+    assert supervisor.stdout is not None
+    with supervisor.stdout as output:
+        pid = int(output.readline())
+        supervisor.kill()
+        supervisor.wait()
+    assert gone(pid)
+
+
+def gone(pid, seconds=5.0):
+    """Whether a process that is not ours to wait for ends within the time."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        try:
+            with open(f"/proc/{pid}/stat") as stat:
+                if stat.read().rpartition(")")[2].split()[0] == "Z":
+                    return True
+        except OSError:
+            return True
+        time.sleep(0.02)
+    return False

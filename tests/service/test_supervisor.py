@@ -1,0 +1,212 @@
+import pytest
+
+from abs_service.exits import Exit
+from abs_service.supervisor import Child, Limits, State, Supervisor
+
+S = 1_000_000_000
+
+
+class FakeProcess:
+    """A process that ends when the test says so; obeys SIGTERM unless it is stubborn."""
+
+    def __init__(self, world, component, pid):
+        self.world, self.component, self.pid = world, component, pid
+        self.code = None
+
+    def poll(self):
+        return self.code
+
+    def terminate(self):
+        self.world.events.append(("terminate", self.component))
+        if self.component not in self.world.stubborn:
+            self.code = 0
+
+    def kill(self):
+        self.world.events.append(("kill", self.component))
+        self.code = -9
+
+    def last_words(self):
+        return self.world.words
+
+
+class World:
+    """Time, and every process that was ever started."""
+
+    def __init__(self):
+        self.now_ns = 0
+        self.events = []
+        self.started = []
+        self.stubborn = set()
+        self.words = ""
+
+    def spawn(self, component, arguments):
+        self.started.append(FakeProcess(self, component, len(self.started) + 1))
+        return self.started[-1]
+
+    def wait(self, seconds):
+        self.now_ns += int(seconds * 1e9)
+
+    def latest(self, component):
+        return [process for process in self.started if process.component == component][-1]
+
+    def supervisor(self, *components, **limits):
+        children = [Child(component, (component,), stage) for stage, component in enumerate(components)]
+        made = Supervisor(children, self.spawn, lambda: self.now_ns, Limits(**limits))
+        made.poll()
+        return made
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+def ends(world, supervisor, component, code):
+    """The process ends with this code, and its pause passes."""
+    world.latest(component).code = code
+    supervisor.poll()
+    world.now_ns += 4 * S
+    supervisor.poll()
+
+
+def test_all_children_are_started_at_once(world):
+    supervisor = world.supervisor("capture", "track/sheet", "record")
+    assert [process.component for process in world.started] == ["capture", "track/sheet", "record"]
+    assert all(child.state is State.RUNNING for child in supervisor.children.values())
+
+
+def test_a_crashed_child_is_started_again_after_a_pause_that_doubles(world):
+    supervisor = world.supervisor("capture")
+    for pause_ns in (S // 5, 2 * S // 5, 4 * S // 5):
+        world.latest("capture").code = -11
+        supervisor.poll()
+        started = len(world.started)
+        world.now_ns += pause_ns - 1
+        supervisor.poll()
+        assert len(world.started) == started
+        world.now_ns += 1
+        supervisor.poll()
+        assert len(world.started) == started + 1
+    assert supervisor.children["capture"].restarts == 3
+
+
+def test_a_child_that_crashes_too_often_is_given_up_and_the_others_go_on(world):
+    supervisor = world.supervisor("capture", "track/a", "track/b")
+    for _ in range(6):
+        ends(world, supervisor, "track/a", 1)
+    failed = supervisor.children["track/a"]
+    assert (failed.state, failed.restarts) == (State.FAILED, 5)
+    assert "more than 5 restarts in 60 s" in failed.reason
+    assert supervisor.verdict() is None
+    assert supervisor.children["track/b"].state is State.RUNNING
+
+
+def test_crashes_that_are_long_ago_are_forgiven(world):
+    supervisor = world.supervisor("capture")
+    for _ in range(20):
+        world.now_ns += 15 * S
+        ends(world, supervisor, "capture", 1)
+    assert supervisor.children["capture"].state is State.RUNNING
+
+
+@pytest.mark.parametrize("lost", [["capture"], ["track/a", "track/b"]])
+def test_without_images_or_any_tracker_there_is_nothing_left_to_do(world, lost):
+    supervisor = world.supervisor("capture", "track/a", "track/b", "record", restarts=0)
+    for component in lost:
+        assert supervisor.verdict() is None
+        ends(world, supervisor, component, 1)
+    assert supervisor.verdict() is Exit.FAILED
+
+
+def test_a_failed_recorder_stops_nothing(world):
+    supervisor = world.supervisor("capture", "track/a", "record", restarts=0)
+    ends(world, supervisor, "record", 1)
+    assert supervisor.children["record"].state is State.FAILED
+    assert supervisor.verdict() is None
+
+
+def test_exit_code_3_means_do_not_start_me_again(world):
+    supervisor = world.supervisor("capture", "track/a")
+    world.words = "the SDK is not installed"
+    ends(world, supervisor, "capture", Exit.GIVE_UP)
+    child = supervisor.children["capture"]
+    assert (child.state, child.restarts, child.reason) == (State.FAILED, 0, "the SDK is not installed")
+    assert supervisor.verdict() is Exit.FAILED
+
+
+def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
+    supervisor = world.supervisor("capture", "track/a", "record")
+    world.words = "abs-service: error: record.directory is read-only"
+    ends(world, supervisor, "record", Exit.USER)
+    refused = supervisor.refused()
+    assert refused is not None
+    assert refused.reason == world.words
+    assert supervisor.verdict() is Exit.USER
+
+
+def test_when_the_devices_have_no_more_images_the_run_is_over(world):
+    supervisor = world.supervisor("capture", "track/a")
+    ends(world, supervisor, "capture", 0)
+    assert supervisor.verdict() is Exit.OK
+    assert supervisor.children["capture"].restarts == 0
+
+
+def test_a_silent_child_is_killed_and_started_again(world):
+    supervisor = world.supervisor("capture")
+    supervisor.heard("capture")
+    world.now_ns += 9 * S
+    supervisor.heard("capture")
+    world.now_ns += 9 * S
+    supervisor.poll()
+    assert supervisor.children["capture"].state is State.RUNNING
+    world.now_ns += 1 * S
+    supervisor.poll()
+    assert ("kill", "capture") in world.events
+    assert supervisor.children["capture"].state is State.STALLED
+    world.now_ns += 1 * S
+    supervisor.poll()
+    assert supervisor.children["capture"].state is State.RUNNING
+    assert supervisor.children["capture"].restarts == 1
+
+
+def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
+    supervisor = world.supervisor("track/a")
+    world.now_ns += 170 * S
+    supervisor.poll()
+    supervisor.heard("track/a", busy=True)
+    world.now_ns += 170 * S
+    supervisor.poll()
+    assert world.events == []
+
+
+def test_health_of_strangers_is_ignored(world):
+    world.supervisor("capture").heard("track/elsewhere")
+
+
+def test_the_recorder_is_stopped_last(world):
+    supervisor = world.supervisor("capture", "track/a", "record")
+    supervisor.stop(world.wait)
+    assert world.events == [("terminate", "capture"), ("terminate", "track/a"), ("terminate", "record")]
+    assert {child.state for child in supervisor.children.values()} == {State.STOPPED}
+    assert world.now_ns == 0
+
+
+def test_whoever_does_not_end_in_time_is_killed_and_the_recorder_has_the_most_time(world):
+    supervisor = world.supervisor("capture", "track/a", "record", stop_ns=4 * S)
+    world.stubborn = {"capture", "track/a", "record"}
+    times = {}
+    supervisor.stop(lambda seconds: (world.wait(seconds), times.setdefault(len(world.events), world.now_ns)))
+    assert [event for event in world.events if event[0] == "kill"] == [
+        ("kill", "capture"),
+        ("kill", "track/a"),
+        ("kill", "record"),
+    ]
+    assert 4 * S <= world.now_ns < 4.1 * S
+    assert supervisor.children["record"].reason == "did not end in time and was killed"
+
+
+def test_stopping_twice_or_with_nobody_left_is_harmless(world):
+    supervisor = world.supervisor("capture")
+    supervisor.stop(world.wait)
+    supervisor.stop(world.wait)
+    assert world.events == [("terminate", "capture")]
