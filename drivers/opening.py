@@ -1,0 +1,38 @@
+"""Opens a device by its address; the address's scheme is the name of a module of this package."""
+
+import importlib
+import pkgutil
+from collections.abc import Callable
+from types import ModuleType
+from urllib.parse import urlsplit
+
+import drivers
+from drivers.device import Device, DeviceError
+
+
+def open_device(uri: str, clock: Callable[[], int]) -> Device:
+    """Opens `scheme://…` with `drivers.<scheme>.open_device`; only that driver is imported.
+
+    Args:
+        uri: address of the device.
+        clock: CLOCK_MONOTONIC [ns].
+
+    Raises:
+        DeviceError: no such driver, or the driver cannot open the address.
+    """
+    scheme = urlsplit(uri).scheme
+    modules = {module.name for module in pkgutil.iter_modules(drivers.__path__)}
+    driver = _driver(scheme) if scheme in modules else None
+    if driver is None:
+        raise DeviceError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
+    return driver.open_device(uri, clock)
+
+
+def available() -> list[str]:
+    """Schemes of all drivers; imports every module of this package, which by contract imports no device SDK."""
+    return [module.name for module in pkgutil.iter_modules(drivers.__path__) if _driver(module.name)]
+
+
+def _driver(scheme: str) -> ModuleType | None:
+    module = importlib.import_module(f"drivers.{scheme}")
+    return module if hasattr(module, "open_device") and module.__name__ != __name__ else None

@@ -1,0 +1,19 @@
+"""A simulated device: analytic surfaces that bend and move, seen by time-of-flight, structured-light and colour heads.
+
+Nothing here knows the tracker's models: what makes the images shares no code with what explains them.
+"""
+
+from collections.abc import Callable
+
+from drivers.device import Device
+from drivers.simulated.address import parse
+from drivers.simulated.device import SimulatedDevice
+
+
+def open_device(uri: str, clock: Callable[[], int]) -> Device:
+    """Opens an address such as `simulated://sheet?seed=1&sensors=tof,color`; its keys are the fields of `Address`.
+
+    Raises:
+        DeviceError: the address is not understood; names key, value and what is allowed.
+    """
+    return SimulatedDevice(uri, parse(uri).build(), clock)

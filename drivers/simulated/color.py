@@ -1,0 +1,93 @@
+"""Colour heads: one that delivers colour, one that delivers the mosaic its sensor measured."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from calib.jit import kernel
+from drivers.frame import Frame, Kind
+from drivers.simulated.exposure import Exposure, stream_of
+from drivers.simulated.motion import Placement
+from drivers.simulated.scene import Scene
+from drivers.simulated.view import Sight, View
+
+#: Standard deviation of a pixel's channel, in levels of 256.
+SIGMA = 2.5
+
+#: How much darker a surface is that is seen edge-on than one that faces the camera.
+SHADING = 0.2
+
+
+class Picture:
+    """The scene in colour, before noise and digits: levels of 256 as float32 (height, width, 3)."""
+
+    def __init__(self, camera: Camera, scene: Scene) -> None:
+        self._view = View(scene, camera)
+        self._wall = _levels(self._view.wall)
+
+    def take(self, placement: Placement) -> NDArray[np.float32]:
+        """Levels at one moment; a pixel at a rim holds the mean of what it sees."""
+        sight = self._view.look(placement)
+        share = sight.share[..., None]
+        levels = self._wall.copy()
+        levels[sight.region] += share * (_levels(sight) - levels[sight.region])
+        return levels
+
+
+class Color:
+    """Stream `color` (rgb8)."""
+
+    def __init__(self, name: str, camera: Camera, scene: Scene, rate_hz: float, sigma: float = SIGMA) -> None:
+        self.camera = camera
+        self.streams = (stream_of(name, "color", Kind.COLOR, "rgb8", camera, rate_hz),)
+        self._sigma = sigma
+        self._picture = Picture(camera, scene)
+
+    def expose(self, exposure: Exposure) -> list[Frame]:
+        """Takes the colour image of one exposure."""
+        levels = self._picture.take(exposure.placement)
+        return [exposure.frame(self.streams[0], self.camera, _digitize(levels, self._sigma, exposure.generator))]
+
+
+class Bayer:
+    """Stream `bayer` (bayer_grbg8): of each pixel the one channel that lies behind its colour filter."""
+
+    def __init__(self, name: str, camera: Camera, scene: Scene, rate_hz: float, sigma: float = SIGMA) -> None:
+        self.camera = camera
+        self.streams = (stream_of(name, "bayer", Kind.BAYER, "bayer_grbg8", camera, rate_hz),)
+        self._sigma = sigma
+        self._picture = Picture(camera, scene)
+
+    def expose(self, exposure: Exposure) -> list[Frame]:
+        """Takes the mosaic of one exposure."""
+        levels = _mosaic(self._picture.take(exposure.placement))
+        return [exposure.frame(self.streams[0], self.camera, _digitize(levels, self._sigma, exposure.generator))]
+
+
+def _levels(sight: Sight) -> NDArray[np.float32]:
+    """Colours (height, width, 3) in levels of 256; 0 where the sight is empty."""
+    brightness = 255 * (1 - SHADING * (1 - np.nan_to_num(sight.cosine)))
+    return (sight.albedo[..., :3] * brightness[..., None]).astype(np.float32, copy=False)
+
+
+def _mosaic(levels: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Rows G R G R … and B G B G …."""
+    mosaic = levels[..., 1].copy()
+    mosaic[0::2, 1::2] = levels[0::2, 1::2, 0]
+    mosaic[1::2, 0::2] = levels[1::2, 0::2, 2]
+    return mosaic
+
+
+def _digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:
+    noise = generator.standard_normal(levels.size, np.float32)
+    return _quantize(levels.reshape(-1), noise, np.float32(sigma)).reshape(levels.shape)
+
+
+@kernel
+def _quantize(levels: NDArray[np.float32], noise: NDArray[np.float32], sigma: np.float32) -> NDArray[np.uint8]:
+    """Adds noise and rounds to 8 bits."""
+    pixels = np.empty(levels.size, np.uint8)
+    for i in range(levels.size):
+        value = levels[i] + sigma * noise[i] + np.float32(0.5)
+        pixels[i] = np.uint8(min(max(value, np.float32(0)), np.float32(255)))
+    return pixels

@@ -1,0 +1,50 @@
+"""The simulated world without a clock: exposure k is a pure function of the seed and k."""
+
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.device import Truth
+from drivers.frame import Frame
+from drivers.simulated.exposure import Exposure, Head
+from drivers.simulated.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A scene and the heads that look at it, all exposed at the same instants.
+
+    Attributes:
+        scene: what moves.
+        heads: who looks, by sensor name.
+        seed: of all noise.
+        rate_hz: exposures per second.
+        jitter_ns: standard deviation of the error of the frames' stamps [ns].
+        truth_size: rows and columns of the material points in a `Truth`.
+    """
+
+    scene: Scene
+    heads: Mapping[str, Head]
+    seed: int
+    rate_hz: float
+    jitter_ns: int = 0
+    truth_size: tuple[int, int] = (21, 31)
+
+    def time_ns(self, k: int) -> int:
+        """When exposure `k` happens [ns after exposure 0]."""
+        return round(k * 1e9 / self.rate_hz)
+
+    def expose(self, k: int) -> tuple[list[Frame], Truth]:
+        """The frames of all heads and the truth at exposure `k`; times count from exposure 0."""
+        t_ns = self.time_ns(k)
+        placement = self.scene.motion.at(t_ns * 1e-9)
+        frames: list[Frame] = []
+        for name, head in self.heads.items():
+            seeds = np.random.SeedSequence([self.seed, k, zlib.crc32(name.encode())])
+            generator = np.random.Generator(np.random.SFC64(seeds))
+            jitter = round(self.jitter_ns * generator.standard_normal())
+            frames += head.expose(Exposure(k, placement, generator, t_ns, jitter, self.jitter_ns))
+        points_r = self.scene.grid(placement, *self.truth_size).astype(np.float32)
+        return frames, Truth(k, t_ns, points_r)

@@ -1,0 +1,181 @@
+"""The simulated device delivers on time, counts what it is late for, and understands its address or says why not."""
+
+import threading
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import pytest
+
+from drivers.device import DeviceError, DeviceState, Truth
+from drivers.frame import Frame
+from drivers.opening import available, open_device
+from drivers.simulated.address import Address, parse
+from drivers.simulated.device import SimulatedDevice
+
+
+@dataclass
+class Recorder:
+    """A sink that keeps everything and tells when it has enough."""
+
+    enough: int
+    frames: list[Frame] = field(default_factory=list)
+    truths: list[Truth] = field(default_factory=list)
+    states: list[DeviceState] = field(default_factory=list)
+    full: threading.Event = field(default_factory=threading.Event)
+
+    def on_frame(self, frame: Frame) -> None:
+        self.frames.append(frame)
+        if len(self.frames) >= self.enough:
+            self.full.set()
+
+    def on_truth(self, truth: Truth) -> None:
+        self.truths.append(truth)
+
+    def on_state(self, state: DeviceState, reason: str) -> None:
+        assert reason
+        self.states.append(state)
+
+
+@dataclass
+class Time:
+    """A clock that only moves when someone waits, and a wait that takes as long as it is told."""
+
+    now_ns: int = 5_000_000_000
+    delays: dict[int, int] = field(default_factory=dict)
+    waits: int = 0
+
+    def clock(self) -> int:
+        return self.now_ns
+
+    def wait(self, stop: threading.Event, seconds: float) -> bool:
+        self.now_ns += round(seconds * 1e9) + self.delays.get(self.waits, 0)
+        self.waits += 1
+        return stop.is_set()
+
+
+def run(query: str, time: Time, frames: int) -> tuple[SimulatedDevice, Recorder]:
+    uri = f"simulated://sheet?{query}"
+    device = SimulatedDevice(uri, parse(uri).build(), time.clock, time.wait)
+    sink = Recorder(frames)
+    device.start(sink)
+    assert sink.full.wait(60)
+    device.stop()
+    return device, sink
+
+
+SMALL = "sensors=tof,color&tof=32x24&color=32x24"
+
+
+def test_exposures_arrive_when_they_are_due() -> None:
+    time = Time()
+    device, sink = run(SMALL, time, 9)
+    assert [frame.seq for frame in sink.frames[:9]] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
+    for frame in sink.frames:
+        assert frame.t_host_ns == 5_000_000_000 + round(frame.seq * 1e9 / 30)
+        assert 0 <= frame.t_arrival_ns - frame.t_host_ns < 10
+    assert device.counters == {"frames": len(sink.frames), "late": 0}
+    assert [truth.t_host_ns for truth in sink.truths[:3]] == [frame.t_host_ns for frame in sink.frames[:9:3]]
+
+
+def test_exposures_that_are_overdue_are_skipped_and_counted() -> None:
+    device, sink = run(SMALL, Time(delays={1: 110_000_000}), 12)  # 3.3 periods at 30 Hz
+    sequence = [truth.seq for truth in sink.truths]
+    assert sequence[:4] == [0, 1, 4, 5]
+    assert device.counters["late"] == 2
+
+
+def test_nothing_arrives_after_stop_and_a_new_start_is_a_new_epoch() -> None:
+    time = Time()
+    device, sink = run(SMALL, time, 3)
+    count = len(sink.frames)
+    assert sink.states == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
+    again = Recorder(3)
+    device.start(again)
+    device.start(again)  # already running: nothing happens
+    assert again.full.wait(60)
+    device.close()
+    device.close()
+    assert len(sink.frames) == count
+    assert {frame.epoch for frame in sink.frames} == {0}
+    assert {frame.epoch for frame in again.frames} == {1}
+    sequence = [truth.seq for truth in again.truths]
+    assert all(later == earlier + 1 for earlier, later in pairwise(sequence))
+
+
+def test_a_sink_may_stop_the_device_itself() -> None:
+    class Impatient(Recorder):
+        def on_frame(self, frame: Frame) -> None:
+            super().on_frame(frame)
+            device.stop()
+
+    time = Time()
+    device = SimulatedDevice("", parse(f"simulated://sheet?{SMALL}").build(), time.clock, time.wait)
+    sink = Impatient(1)
+    device.start(sink)
+    device._thread.join(60)
+    assert sink.states[-1] == DeviceState.CLOSED
+    assert len(sink.truths) == 1
+
+
+def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
+    uri = "simulated://board?seed=2&sensors=tof,structured_light,color,bayer&rate=15&color=64x48&tof=32x24"
+    device = open_device(uri, Time().clock)
+    assert device.info.uri == uri
+    assert [f"{s.sensor}/{s.stream}" for s in device.streams] == [
+        "tof/depth",
+        "tof/amplitude",
+        "structured_light/depth",
+        "color/color",
+        "bayer/bayer",
+    ]
+    assert isinstance(device, SimulatedDevice)
+    frames, _ = device._simulation.expose(0)
+    for stream, frame in zip(device.streams, frames, strict=True):
+        camera = device.cameras[stream.sensor]
+        assert (frame.kind, frame.encoding, frame.calib_id) == (stream.kind, stream.encoding, camera.calib_id)
+        assert frame.data.shape[:2] == (stream.height, stream.width) == (camera.height, camera.width)
+        assert stream.rate_hz == 15
+
+
+def test_defaults_are_the_demonstration_rig() -> None:
+    address = parse("simulated://sheet")
+    assert address == Address("sheet", seed=1, sensors=("tof", "color"), rate=30.0)
+    cameras = {name: head.camera for name, head in address.build().heads.items()}
+    assert (cameras["tof"].width, cameras["tof"].height, cameras["tof"].fx) == (176, 144, 220)
+    assert (cameras["color"].width, cameras["color"].height) == (320, 240)
+    assert cameras["color"].center[0] == 0.05
+
+
+@pytest.mark.parametrize(
+    ("uri", "complaint"),
+    [
+        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'sheet'\]"),
+        ("simulated://", r"scene '' is none of"),
+        ("simulated://sheet?sead=1", r"unknown key 'sead'; allowed are \[.*'seed'"),
+        ("simulated://sheet?seed=one", r"seed = 'one' must be a number from 0 to"),
+        ("simulated://sheet?seed=1.5", r"seed = '1.5' must be"),
+        ("simulated://sheet?seed=-1", r"seed = '-1' must be"),
+        ("simulated://sheet?seed=1&seed=2", "seed is given twice"),
+        ("simulated://sheet?color=64x48&color=64x48", "color is given twice"),
+        ("simulated://sheet?rate=0", r"rate = '0' must be a number from 0.1 to 200"),
+        ("simulated://sheet?rate=nan", r"rate = 'nan' must be"),
+        ("simulated://sheet?rate=", r"rate = '' must be"),
+        ("simulated://sheet?sensors=tof,lidar", r"sensors = 'tof,lidar' must be one or more of \['bayer'"),
+        ("simulated://sheet?sensors=", r"sensors = '' must be"),
+        ("simulated://sheet?sensors=tof,tof", "each once"),
+        ("simulated://sheet?color=640", r"color = '640' must be WIDTHxHEIGHT"),
+        ("simulated://sheet?color=8x8", r"color = '8x8' must be WIDTHxHEIGHT, each from 16 to 2048"),
+        ("laser://x", r"scheme 'laser' is none of \[.*'simulated'"),
+        ("codec://x", r"scheme 'codec' is none of"),
+        ("opening://x", r"scheme 'opening' is none of"),
+        ("sheet", r"scheme '' is none of"),
+    ],
+)
+def test_errors_name_key_value_and_what_is_allowed(uri: str, complaint: str) -> None:
+    with pytest.raises(DeviceError, match=complaint):
+        open_device(uri, Time().clock)
+
+
+def test_every_available_driver_has_an_open_device() -> None:
+    assert "simulated" in available()
+    assert not {"codec", "frame", "device", "opening"} & set(available())
