@@ -84,6 +84,12 @@ class BoundedQueue(Generic[T]):
             return dict(self._dropped)
 
     @property
+    def is_drained(self) -> bool:
+        """Whether nothing waits and nothing will come any more."""
+        with self._changed:
+            return self._closed and not self._items
+
+    @property
     def size(self) -> int:
         """Sum of the sizes of the items that wait [bytes]."""
         with self._changed:

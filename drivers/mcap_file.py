@@ -1,6 +1,6 @@
 """One MCAP file being written: topics and protobuf schemas appear in it as soon as they are first used."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import BinaryIO
 
@@ -23,6 +23,9 @@ from mcap.writer import CompressionType, Writer
 
 #: Uncompressed bytes after which a chunk is closed; what a reader must decompress to reach one message.
 CHUNK_SIZE = 1 << 20
+
+#: Name of the metadata records that repeat what each channel is: its id, topic and schema.
+CHANNEL_METADATA = "abs.channel"
 
 
 class Compression(StrEnum):
@@ -89,6 +92,10 @@ class McapFile:
         """Adds an attachment; attached at the beginning, it survives a later crash. Raises as `write` does."""
         self._attempt(lambda: self._writer.add_attachment(time_ns, time_ns, name, media_type, data))
 
+    def describe(self, name: str, values: Mapping[str, str]) -> None:
+        """Adds a metadata record. Raises as `write` does."""
+        self._attempt(lambda: self._writer.add_metadata(name, dict(values)))
+
     def flush(self) -> None:
         """Closes the open chunk and hands everything to the operating system. Raises as `write` does.
 
@@ -118,6 +125,8 @@ class McapFile:
         if channel == 0:
             channel = self._writer.register_channel(topic, MessageEncoding.Protobuf, self._schema(schema_name))
             self._channels[topic] = (schema_name, channel)
+            # Until the file is finished, only one chunk says what the channel is. If that one is damaged, this helps.
+            self.describe(CHANNEL_METADATA, {"id": str(channel), "topic": topic, "schema": schema_name})
         return channel
 
     def _schema(self, name: str) -> int:

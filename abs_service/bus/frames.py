@@ -2,8 +2,7 @@
 
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
 from typing import Self
 
 from abs_service import keys
@@ -27,23 +26,12 @@ class FramePublisher:
         bus: where to publish.
         speaker: writes the headers.
         device: name of the device in the configuration; its truth is published under it.
-        on_state: learns of the device's state, from the device's thread.
-        first_epoch: added to the epochs of the device, so that they go on growing when it is opened anew.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        speaker: Speaker,
-        device: str,
-        on_state: Callable[[DeviceState, str], None],
-        first_epoch: int = 0,
-    ) -> None:
+    def __init__(self, bus: Bus, speaker: Speaker, device: str) -> None:
         self._bus = bus
         self._speaker = speaker
         self._device = device
-        self._on_state = on_state
-        self._first_epoch = first_epoch
         self._publishers: dict[str, Publisher] = {}
         self._published: Counter[str] = Counter()
         self._queue: LatestQueue[Frame | Truth] = LatestQueue(DEPTH)
@@ -69,8 +57,7 @@ class FramePublisher:
         self._queue.put(keys.truth(self._device), truth)
 
     def on_state(self, state: DeviceState, reason: str) -> None:
-        """See `drivers.device.Sink.on_state`."""
-        self._on_state(state, reason)
+        """See `drivers.device.Sink.on_state`; the state travels in the health of whoever looks after the device."""
 
     def close(self) -> None:
         """Publishes what waits and ends the thread; may be called again."""
@@ -93,8 +80,6 @@ class FramePublisher:
             self._published[topic] += 1
 
     def _publish_frame(self, topic: str, frame: Frame) -> None:
-        if self._first_epoch:
-            frame = replace(frame, epoch=self._first_epoch + frame.epoch)
         header = self._speaker.header(frame.t_host_ns, frame.seq, frame.sensor)
         image = codec.encode_image(frame, self._speaker.clock.wall(frame.t_host_ns))
         self._publisher(topic, codec.IMAGE_SCHEMA).put(image, codec.encode_info(frame, header))

@@ -157,7 +157,13 @@ class _Announcement:
 
 class _Declared:
     def __init__(self, declared: Any) -> None:
-        self._declared = declared
+        self._undeclare: Callable[[], None] = declared.undeclare
 
     def close(self) -> None:
-        self._declared.undeclare()
+        # zenoh refuses to take back twice what it may do once.
+        undeclare, self._undeclare = self._undeclare, _nothing
+        undeclare()
+
+
+def _nothing() -> None:
+    pass

@@ -13,7 +13,7 @@ from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import DEPTH, FramePublisher, FrameSubscriber
 from abs_service.stamps import Speaker, WallClock
 from drivers import codec
-from drivers.device import DeviceState, Truth
+from drivers.device import Truth
 from drivers.frame import Frame, Geometry, Kind
 from tests.service.loopback import LoopbackBus
 
@@ -48,8 +48,8 @@ def speaker():
     return Speaker("demo", WallClock())
 
 
-def publisher(bus, speaker, on_state=lambda *_: None, **settings):
-    return FramePublisher(bus, speaker, "sim", on_state, **settings)
+def publisher(bus, speaker):
+    return FramePublisher(bus, speaker, "sim")
 
 
 def test_frames_and_truths_arrive_as_they_were(speaker):
@@ -102,13 +102,6 @@ def test_a_publisher_that_falls_behind_drops_the_oldest_and_never_blocks(speaker
     assert [(item.stream, item.seq) for item in sent] == [("depth", n) for n in (0, 7, 8, 9, 10)] + [("other", 0)]
 
 
-def test_a_device_that_was_opened_again_continues_the_epochs(speaker):
-    bus = LoopbackBus()
-    with publisher(bus, speaker, first_epoch=7) as sink:
-        sink.on_frame(frame(0, epoch=2))
-    assert codec.decode(bus.sent[0].payload, bus.sent[0].attachment).epoch == 9
-
-
 def test_a_slow_reader_gets_the_newest_and_the_loss_is_counted(speaker):
     bus = LoopbackBus()
     subscriber = FrameSubscriber(bus, [("tof", "depth"), ("color", "depth")], depth=2)
@@ -143,10 +136,3 @@ def test_closing_wakes_the_reader(speaker):
     subscriber.close()
     reader.join(5)
     assert not reader.is_alive()
-
-
-def test_the_state_of_the_device_is_passed_on(speaker):
-    states = []
-    with publisher(LoopbackBus(), speaker, lambda *state: states.append(state)) as sink:
-        sink.on_state(DeviceState.STALLED, "no frame for 2 s")
-    assert states == [(DeviceState.STALLED, "no frame for 2 s")]

@@ -1,0 +1,163 @@
+"""Publishes what the devices of a rig deliver, until SIGTERM or Ctrl-C or until all of them are at their end.
+
+  abs-service capture rig.toml                                 for the rig that `abs-service run` hosts elsewhere
+  abs-service capture rig.toml --listen tcp/0.0.0.0:7447       alone; the others connect to this process
+
+A device that fails is opened again, first soon, then less and less often.
+"""
+
+import argparse
+import threading
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from abs_service import announcements, config, keys, plugins
+from abs_service.bus.contract import Bus, Publisher
+from abs_service.bus.frames import FramePublisher
+from abs_service.capture import DeviceKeeper
+from abs_service.commands import participant
+from abs_service.envelope import CALIBRATION, CONFIG, MODEL, TRANSFORMS
+from abs_service.exits import Exit
+from abs_service.health import Health, Level
+from abs_service.stamps import Speaker, WallClock
+from calib.camera import Camera
+from drivers.device import Device
+from drivers.opening import open_device
+
+#: Time that the devices have to close [s].
+CLOSE_S = 1.0
+
+
+class HeadError(Exception):
+    """A configuration that names a head which its device does not have."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service capture`."""
+    participant.add_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Captures until told to stop."""
+    rig = participant.load_config(arguments)
+    stop = participant.stop_on_signals()
+    clock = WallClock()
+    speaker = Speaker(rig.name, clock)
+    with participant.open_bus(rig, arguments) as bus:
+        health = Health(bus, "capture", speaker)
+        bus.show_alive("capture")
+        bus.answer(keys.SCHEMA, announcements.SCHEMA_MESSAGE, announcements.schema)
+        crier = Crier(bus, speaker, rig)
+        publishers = {name: FramePublisher(bus, speaker, name) for name in rig.devices}
+        keepers = [_keeper(name, rig, crier, publishers[name], health) for name in rig.devices]
+        for keeper in keepers:
+            keeper.start()
+        _watch(stop, keepers, lambda: _tick(crier, publishers, health, clock))
+        for keeper in keepers:
+            keeper.close(CLOSE_S)
+        for publisher in publishers.values():
+            publisher.close()
+        health.publish()
+    for keeper in keepers:
+        if keeper.refusal:
+            raise keeper.refusal
+    return Exit.OK
+
+
+def _keeper(
+    name: str, rig: config.ServiceConfig, crier: "Crier", publisher: FramePublisher, health: Health
+) -> DeviceKeeper:
+    return DeviceKeeper(
+        name,
+        partial(open_device, rig.devices[name].uri, time.monotonic_ns),
+        partial(crier.add_device, name),
+        publisher,
+        rig.heads(name),
+        health,
+        time.monotonic_ns,
+    )
+
+
+def _watch(stop: threading.Event, keepers: list[DeviceKeeper], tick: Callable[[], None]) -> None:
+    while not stop.wait(0.1):
+        tick()
+        if any(keeper.refusal for keeper in keepers) or all(keeper.finished for keeper in keepers):
+            return
+
+
+def _tick(crier: "Crier", publishers: Mapping[str, FramePublisher], health: Health, clock: WallClock) -> None:
+    if not health.due():
+        return
+    steps = clock.steps
+    change_ns = clock.measure()
+    if clock.steps > steps:
+        health.count("clock_steps")
+        health.report("clock", Level.WARNING, f"somebody set the clock by {change_ns / 1e9:+.3f} s; stamps follow it")
+    else:
+        health.report("clock", Level.OK)
+    for publisher in publishers.values():
+        health.count_up_to(publisher.dropped, "dropped.")
+        for topic, number in publisher.published.items():
+            health.count_up_to({topic: number}, "published.")
+            health.rate(f"rate_hz.{topic}", number)
+    crier.cry()
+    health.tick()
+
+
+class Crier:
+    """Announces the configuration, and calibration, noise and pose of every sensor as soon as its device is open.
+
+    Args:
+        bus: where.
+        speaker: writes the headers.
+        rig: the configuration.
+    """
+
+    def __init__(self, bus: Bus, speaker: Speaker, rig: config.ServiceConfig) -> None:
+        self._bus = bus
+        self._speaker = speaker
+        self._rig = rig
+        self._toml = config.to_toml(rig)
+        self._cameras: dict[str, Camera] = {}
+        self._publishers: dict[str, Publisher] = {}
+        self._seq = 0
+        self._lock = threading.Lock()
+
+    def add_device(self, name: str, device: Device) -> None:
+        """Learns the sensors of an opened device and announces them.
+
+        Raises:
+            HeadError: the configuration names a head that the device does not have.
+        """
+        for head, sensor in self._rig.heads(name).items():
+            if head not in device.cameras:
+                there_are = ", ".join(sorted(device.cameras))
+                raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
+        with self._lock:
+            for head, sensor in self._rig.heads(name).items():
+                self._cameras[sensor] = self._rig.sensors[sensor].camera.applied_to(device.cameras[head])
+        self.cry()
+
+    def cry(self) -> None:
+        """Announces everything that is known, stamped now."""
+        with self._lock:
+            header = self._speaker.now(self._seq)
+            self._seq += 1
+            wall_ns = header.stamp.ToNanoseconds()
+            self._put(keys.CONFIG, CONFIG, announcements.config(header, self._toml).SerializeToString())
+            for sensor, camera in self._cameras.items():
+                noise = self._rig.sensors[sensor].noise
+                table = {} if noise is None else plugins.table(noise)
+                model = announcements.sensor_model(header, sensor, camera, table)
+                calibration = announcements.calibration(sensor, camera, wall_ns)
+                self._put(keys.model(sensor), MODEL, model.SerializeToString())
+                self._put(keys.calibration(sensor), CALIBRATION, calibration.SerializeToString())
+            if self._cameras:
+                poses = announcements.transforms(self._cameras, wall_ns)
+                self._put(keys.TRANSFORMS, TRANSFORMS, poses.SerializeToString())
+
+    def _put(self, topic: str, message: str, payload: bytes) -> None:
+        if topic not in self._publishers:
+            self._publishers[topic] = self._bus.announce(topic, message)
+        self._publishers[topic].put(payload)

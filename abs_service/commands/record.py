@@ -1,0 +1,92 @@
+"""Records everything that a rig publishes to MCAP files, until SIGTERM or Ctrl-C.
+
+  abs-service record rig.toml                                  of the rig that `abs-service run rig.toml` drives
+  abs-service record rig.toml --connect tcp/192.168.1.7:7447   of the same rig on another host
+
+A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start.
+"""
+
+import argparse
+import sys
+import threading
+from pathlib import Path
+
+from abs_service import config
+from abs_service.commands import participant
+from abs_service.exits import Exit
+from abs_service.health import Health, Level
+from abs_service.record import Recorder, RecorderSettings
+from abs_service.recovery import RecoveryError, leftovers, recover
+from abs_service.stamps import Speaker, WallClock
+from drivers.mcap_file import Compression
+
+#: Time to write what still waits when told to stop [s].
+DRAIN_S = 2.5
+
+
+class DirectoryError(Exception):
+    """The folder for recordings cannot be used."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service record`."""
+    participant.add_arguments(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Records until told to stop."""
+    rig = participant.load_config(arguments)
+    settings = _settings(rig)
+    stop = participant.stop_on_signals()
+    clock = WallClock()
+    speaker = Speaker(rig.name, clock)
+    with participant.open_bus(rig, arguments) as bus:
+        health = Health(bus, "record", speaker)
+        bus.show_alive("record")
+        # Beside the recording, which must not wait for what may take minutes.
+        threading.Thread(target=_recover_leftovers, args=(settings.directory, health), daemon=True).start()
+        recorder = Recorder(bus, settings, health, clock)
+        recorder.start()
+        while not stop.wait(0.2):
+            if health.due():
+                clock.measure()
+                recorder.report()
+                health.tick()
+        recorder.stop(DRAIN_S)
+        recorder.report()
+        health.publish()
+    if recorder.failed:
+        print(f"abs-service: RECORD_FAILED {recorder.failed}", file=sys.stderr)
+    return Exit.FAILED if recorder.failed else Exit.OK
+
+
+def _settings(rig: config.ServiceConfig) -> RecorderSettings:
+    table = rig.record
+    try:
+        table.directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DirectoryError(f'record.directory = "{table.directory}": cannot be made: {error.strerror}') from None
+    return RecorderSettings(
+        directory=table.directory,
+        name=rig.name,
+        rig_toml=config.to_toml(rig),
+        compression=Compression(table.compression),
+        chunk_bytes=table.chunk_bytes,
+        flush_s=table.flush_s,
+        rotate_bytes=table.rotate_bytes,
+        rotate_s=table.rotate_s,
+        minimum_free_bytes=table.minimum_free_bytes,
+    )
+
+
+def _recover_leftovers(directory: Path, health: Health) -> None:
+    for path in leftovers(directory):
+        try:
+            report = recover(path)
+        except RecoveryError:
+            continue  # another recorder's file, or one that holds nothing
+        except OSError as error:
+            health.report("recovery", Level.WARNING, f"{path} cannot be recovered: {error.strerror}")
+            continue
+        health.count("recovered")
+        health.label("recovered", str(report))

@@ -1,0 +1,31 @@
+"""Saves what can be read of recordings that were cut short or damaged.
+
+  abs-service recover recordings/x.mcap.active   what a crash left; becomes recordings/x.mcap
+  abs-service recover recordings/x.mcap          a damaged file; the result is recordings/x.recovered.mcap
+
+Nothing is thrown away: unless all of a file was saved, it is kept.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from abs_service.exits import Exit
+from abs_service.recovery import RecoveryError, recover
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service recover`."""
+    parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="recordings to recover")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Recovers every file, whatever happens to the others, and says what was saved and what was not."""
+    exit_code = Exit.OK
+    for path in arguments.files:
+        try:
+            print(recover(path))
+        except (RecoveryError, OSError) as error:
+            print(f"abs-service: error: {error}", file=sys.stderr)
+            exit_code = Exit.USER
+    return exit_code
