@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Texels describe the density for |measured − synthesised| up to this [m]; beyond, the coefficients keep their edge value.
+#: Texels describe the density for |measured − synthesised| up to this [m]; beyond, they keep their edge value.
 WINDOW_M = 0.05
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
@@ -56,10 +56,10 @@ def render_texture(
 ) -> NDArray[np.float32]:
     """Renders eq. 18 for one frame into the coefficients that the likelihood kernel reads.
 
-    Every noise model becomes the same texture, so all of them run at the same speed. With t = measured − x, a texel holds
-    [measured, m0, m1, s0, s1, s2, n0, n1]: mean offset m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the
-    negative logarithm of the normaliser n0 + n1 t. A pixel without a return, and the border of one pixel that stands for
-    everything outside the image, hold the uniform density instead.
+    Every noise model becomes the same texture, so all of them run at the same speed. With t = measured − x, a texel
+    holds [measured, m0, m1, s0, s1, s2, n0, n1]: mean offset m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the
+    negative logarithm of the normaliser n0 + n1 t. A pixel without a return, and the border of one pixel that stands
+    for everything outside the image, hold the uniform density instead.
 
     Args:
         model: the noise model.
@@ -76,7 +76,8 @@ def render_texture(
     valid = distance > 0
     if model.uses_amplitude:
         valid &= np.isfinite(amplitude)
-    rows, columns = p = np.nonzero(valid)
+    rows, columns = np.nonzero(valid)
+    p = (rows, columns)
     measured, a = distance[p].astype(np.float64), amplitude[p].astype(np.float64)
     nodes = [np.maximum(measured - t, 1e-3) for t in (-WINDOW_M, 0.0, WINDOW_M)]
     deviation = [model.deviation(x, a, p) for x in nodes]

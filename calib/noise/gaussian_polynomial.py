@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
+from numpy.polynomial.polynomial import polyval, polyval2d
 from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError, Pixels
@@ -14,7 +15,7 @@ Table = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class GaussianPolynomial:
-    """μ(x, a) = Σ mu[i][j] xⁱ aʲ and σ(x, a) = Σ sigma[i][j] xⁱ aʲ with x in metres and a in the sensor's amplitude unit.
+    """μ(x, a) = Σ mu[i][j] xⁱ aʲ and σ(x, a) = Σ sigma[i][j] xⁱ aʲ, x in metres, a in the sensor's amplitude unit.
 
     Outside the calibrated domain the polynomials keep their value at its edge, and σ never falls below `least_sigma`,
     so that an extrapolation can neither turn negative nor explode.
@@ -61,10 +62,9 @@ class GaussianPolynomial:
     def _polynomial(self, table: Table, x: NDArray[np.float64], a: NDArray[np.float64]) -> NDArray[np.float64]:
         coefficients = np.asarray(table)
         if coefficients.shape[1] == 1:  # an amplitude that nothing depends on may be missing (NaN)
-            return np.polynomial.polynomial.polyval(np.clip(x, *self.distances), coefficients[:, 0])
-        return np.polynomial.polynomial.polyval2d(
-            np.clip(x, *self.distances), np.clip(a, *self.amplitudes), coefficients
-        )
+            return np.asarray(polyval(np.clip(x, *self.distances), coefficients[:, 0]), np.float64)
+        x, a = np.clip(x, *self.distances), np.clip(a, *self.amplitudes)
+        return np.asarray(polyval2d(x, a, coefficients), np.float64)
 
 
 Settings = GaussianPolynomial

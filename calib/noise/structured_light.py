@@ -22,7 +22,7 @@ class StructuredLight:
     Attributes:
         noise: deviation of the random part per squared distance [1/m].
         step: quantisation step per squared distance [1/m].
-        floor: deviation that does not depend on the distance [m]: texture of the surface, what the mesh cannot represent.
+        floor: deviation at any distance [m]: fine relief of the surface that the mesh cannot represent.
     """
 
     noise: Annotated[float, Gt(0)] = 1.425e-3

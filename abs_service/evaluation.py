@@ -1,0 +1,90 @@
+"""How far a tracked mesh is from the surface that really was there."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+Grid = NDArray[np.float64]
+
+#: Truths kept while their estimate is still being searched for.
+KEPT = 256
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Mean 3-D errors over the vertices.
+
+    Attributes:
+        vertex_mm: distance of every vertex from its own material point [mm].
+        surface_mm: distance of every vertex from the nearest point of the true surface [mm].
+    """
+
+    vertex_mm: float
+    surface_mm: float
+
+
+class TruthComparison:
+    """Compares meshes with truth grids of the same moment.
+
+    A vertex belongs to the material point that was nearest to it when the mesh was made. From then on it is compared
+    with where that point went (vertex error), and with the surface wherever it is (surface error, never larger).
+    Point-set methods look good on the second and poor on the first.
+    """
+
+    def __init__(self) -> None:
+        self._truths: OrderedDict[int, Grid] = OrderedDict()
+        self._rest: tuple[int, NDArray[np.float64]] | None = None
+        self._material: NDArray[np.float64] | None = None
+
+    def add_topology(self, rest_vertices: NDArray[np.floating], t_host_ns: int) -> None:
+        """Takes the undeformed vertices (n, 3) [m] of a mesh that was made from the frames of `t_host_ns`."""
+        self._rest, self._material = (t_host_ns, np.asarray(rest_vertices, np.float64)), None
+
+    def add_truth(self, t_host_ns: int, points_r: NDArray[np.floating]) -> None:
+        """Takes the true positions (rows, columns, 3) [m] of material points at `t_host_ns`."""
+        self._truths[t_host_ns] = np.asarray(points_r, np.float64)
+        while len(self._truths) > KEPT:
+            self._truths.popitem(last=False)
+
+    def compare(self, t_host_ns: int, vertices: NDArray[np.floating]) -> Errors | None:
+        """Errors of vertices (n, 3) [m]; None where the truth of the moment, or of the mesh's making, is unknown."""
+        truth = self._truths.get(t_host_ns)
+        if self._material is None and self._rest is not None and self._rest[0] in self._truths:
+            self._material = _closest_parameters(self._rest[1], self._truths[self._rest[0]])
+        if truth is None or self._material is None or len(vertices) != len(self._material):
+            return None
+        error = np.linalg.norm(vertices - _bilinear(truth, self._material)[0], axis=1)
+        surface = np.linalg.norm(vertices - closest_points(vertices, truth), axis=1)
+        return Errors(float(error.mean() * 1e3), float(surface.mean() * 1e3))
+
+
+def closest_points(vertices: NDArray[np.floating], grid: Grid) -> NDArray[np.float64]:
+    """Nearest points (n, 3) of the bilinear surface through a grid (rows, columns, 3)."""
+    return _bilinear(grid, _closest_parameters(np.asarray(vertices, np.float64), grid))[0]
+
+
+def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
+    """Grid coordinates (n, 2) = (row, column) of the nearest surface points, by Gauss–Newton from the nearest node."""
+    rows, columns = grid.shape[:2]
+    nearest = KDTree(grid.reshape(-1, 3)).query(vertices)[1]
+    place = np.stack(np.unravel_index(nearest, (rows, columns)), axis=1).astype(np.float64)
+    for _ in range(8):
+        points, tangents = _bilinear(grid, place)
+        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangents), vertices - points)
+        place = np.clip(place + np.clip(step, -1, 1), 0, (rows - 1, columns - 1))
+    return place
+
+
+def _bilinear(grid: Grid, place: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points (n, 3) and tangents (n, 3, 2) by row and column."""
+    rows, columns = grid.shape[:2]
+    cell = np.minimum(place.astype(int), (rows - 2, columns - 2))
+    (i, j), (f, g) = cell.T, (place - cell).T[:, :, None]
+    a, b, c, d = grid[i, j], grid[i, j + 1], grid[i + 1, j], grid[i + 1, j + 1]
+    points = (1 - f) * ((1 - g) * a + g * b) + f * ((1 - g) * c + g * d)
+    along_row = (1 - g) * (c - a) + g * (d - b)
+    along_column = (1 - f) * (b - a) + f * (d - c)
+    return points, np.stack([along_row, along_column], axis=-1)

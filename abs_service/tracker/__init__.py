@@ -1,0 +1,1 @@
+"""Analysis by synthesis: deform, synthesise, compare, search. Pure mathematics; no I/O, no clock, no thread."""

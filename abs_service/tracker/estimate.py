@@ -1,0 +1,52 @@
+"""The answer of the tracker to one observation."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.terms.base import SensorFit
+
+
+class Status(StrEnum):
+    """How far an estimate can be trusted."""
+
+    INITIALIZING = "INITIALIZING"
+    TRACKING = "TRACKING"
+    DEGRADED = "DEGRADED"
+    LOST = "LOST"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """Deformation at one moment.
+
+    Attributes:
+        seq: number of the frame set.
+        t_host_ns: the moment it shows, CLOCK_MONOTONIC [ns].
+        status: how far to trust it.
+        reasons: why it is not TRACKING, in plain words.
+        theta: parameters (dim,) of the model; empty while INITIALIZING.
+        vertices: deformed mesh (n, 3) [m] in the rig's frame.
+        cost: negative logarithm of likelihood times priors at theta, up to constants.
+        deviation: step size of the search when it ended.
+        generations, evaluations: effort of the search.
+        inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
+        fits: how every sensor agrees.
+        missing: sensors that did not contribute.
+    """
+
+    seq: int
+    t_host_ns: int
+    status: Status
+    reasons: tuple[str, ...]
+    theta: NDArray[np.float64]
+    vertices: NDArray[np.float32]
+    cost: float
+    deviation: float
+    generations: int
+    evaluations: int
+    inlier_share: float
+    fits: tuple[SensorFit, ...]
+    missing: tuple[str, ...]

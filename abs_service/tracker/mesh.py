@@ -1,0 +1,43 @@
+"""The triangle mesh that is deformed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """An undeformed triangle mesh V in rig coordinates.
+
+    Attributes:
+        vertices: positions (n, 3) [m].
+        faces: vertex indices (m, 3), counter-clockwise seen from outside.
+        colors: red, green, blue (n, 3) in 0…255 from a colour sensor; NaN where none saw the vertex.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    colors: NDArray[np.float32]
+
+    @property
+    def edges(self) -> NDArray[np.int32]:
+        """Vertex indices (k, 2) of every edge once."""
+        sides = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
+        return np.unique(np.sort(sides, axis=1), axis=0)
+
+    @property
+    def normals(self) -> NDArray[np.float64]:
+        """Unit vertex normals (n, 3), the area-weighted mean of the adjacent faces' normals."""
+        corners = self.vertices[self.faces]
+        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(normals, self.faces[:, corner], face_normals)
+        return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+
+    def reordered(self, order: NDArray[np.integer]) -> "Mesh":
+        """The same mesh with its vertices listed in another order: vertex i becomes the former vertex order[i]."""
+        place = np.empty(len(order), np.int32)
+        place[order] = np.arange(len(order), dtype=np.int32)
+        return Mesh(self.vertices[order], place[self.faces], self.colors[order])

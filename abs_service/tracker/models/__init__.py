@@ -1,0 +1,1 @@
+"""Deformation models, one per file; a rig file names them with `type`."""

@@ -1,0 +1,216 @@
+"""NURBS deformation: every vertex follows a spline surface whose control points are the parameters (eqs. 2–8)."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Interval
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models import spline
+from abs_service.tracker.models.base import ModelError, Surface
+from calib.jit import kernel
+
+ControlPoints = Annotated[int, Interval(ge=3, le=12)]
+
+#: Largest distance [m] between a vertex and its place on the surface's normal that still counts as eq. 7.
+BINDING_TOLERANCE_M = 5e-4
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the model.
+
+    Attributes:
+        control_points: control points along the object's long and short side; Θ has three numbers for each.
+        degree: polynomial degree of the splines.
+        margin: share of the object's size by which the rest surface extends beyond it on every side.
+        smoothing: weight of the bending of the rest surface against the squared distance to the vertices when
+            it is fitted; it decides only where the object has no vertices.
+    """
+
+    control_points: tuple[ControlPoints, ControlPoints] = (4, 4)
+    degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
+    smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
+
+    def build(self, mesh: Mesh) -> "Nurbs":
+        """Fits the rest surface to the mesh by least squares and binds every vertex to it.
+
+        Raises:
+            ModelError: too few control points for the degree, or a mesh that no such surface can carry.
+        """
+        if min(self.control_points) <= self.degree:
+            raise ModelError(
+                f"control_points = {list(self.control_points)} is too few for degree = {self.degree}: "
+                f"each direction needs at least {self.degree + 1}"
+            )
+        u, w = _flat_parameters(mesh, self.margin)
+        control = _fit_control_points(mesh.vertices, u, w, self)
+        u, w, offset = bind(mesh.vertices, control, self.degree, u, w)
+        return Nurbs(mesh, control, self.degree, u, w, offset)
+
+
+class Nurbs:
+    """A mesh bound to a NURBS surface; Θ lists x, y, z of the control points row by row [m].
+
+    Attributes:
+        mesh: the mesh, its vertices sorted by knot span.
+        rest: control points Θ⁰ (dim,) of the rest surface [m].
+        scales: ones (dim,), since every parameter is a length.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        control: NDArray[np.float64],
+        degree: int,
+        u: NDArray[np.float64],
+        w: NDArray[np.float64],
+        offset: NDArray[np.float64],
+    ):
+        shape = control.shape[:2]
+        span, self._span_control = spline.support(u, w, shape, degree)
+        order = np.argsort(span, kind="stable")
+        self.mesh = mesh.reordered(order)
+        self.rest = control.reshape(-1)
+        self.scales = np.ones_like(self.rest)
+        self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
+        self._offset = offset[order].astype(np.float32)
+        tables = spline.rational_basis(u[order], w[order], degree, np.ones(shape))
+        local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
+        self._basis = np.ascontiguousarray(local.transpose(0, 2, 1), np.float32)
+
+    def deform(self, thetas: NDArray[np.float64]) -> Surface:
+        """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
+        control = np.ascontiguousarray(thetas, np.float32).reshape(len(thetas), -1, 3)
+        vertices = np.empty((len(thetas), 3, len(self._offset)), np.float32)
+        normals = np.empty_like(vertices)
+        _deform(control, self._span_start, self._span_control, self._basis, self._offset, vertices, normals)
+        return Surface(vertices, normals)
+
+
+def bind(
+    vertices: NDArray[np.float64],
+    control: NDArray[np.float64],
+    degree: int,
+    u: NDArray[np.float64],
+    w: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Closest surface point (eq. 6) and offset along the normal there (eq. 7) of every vertex.
+
+    Args:
+        vertices: positions (n, 3) [m].
+        control: control points (rows, columns, 3) [m].
+        degree: degree of the surface.
+        u, w: start values (n,) in [0, 1].
+
+    Returns:
+        u, w and offset o [m], each (n,).
+
+    Raises:
+        ModelError: a vertex does not lie on the normal of its closest point, which is then at the surface's edge.
+    """
+    points = control.reshape(-1, 3)
+    weights = np.ones(control.shape[:2])
+    for _ in range(25):
+        basis, along_u, along_w = spline.rational_basis(u, w, degree, weights)
+        gap = vertices - basis @ points
+        tangents = np.stack([along_u @ points, along_w @ points], axis=-1)
+        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangents), gap)
+        u, w = np.clip(u + step[:, 0], 0, 1), np.clip(w + step[:, 1], 0, 1)
+        if np.all(np.abs(step) < 1e-10):
+            break
+    basis, along_u, along_w = spline.rational_basis(u, w, degree, weights)
+    gap = vertices - basis @ points
+    normals = np.cross(along_u @ points, along_w @ points)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    offset = np.einsum("ni,ni->n", gap, normals)
+    astray = np.linalg.norm(gap - offset[:, None] * normals, axis=1).max()
+    if astray > BINDING_TOLERANCE_M:
+        raise ModelError(
+            f"a vertex is {astray * 1e3:.1f} mm away from the normal of its closest surface point: the object "
+            "folds over or the surface does not cover it; fewer control points or a larger margin help"
+        )
+    return u, w, offset
+
+
+def _flat_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Parameters (n,) of the vertices on the object's principal plane, u along its long side, normal to the sensors."""
+    centered = mesh.vertices - mesh.vertices.mean(axis=0)
+    axes = np.linalg.svd(centered, full_matrices=False)[2]
+    if np.dot(np.cross(axes[0], axes[1]), mesh.normals.sum(axis=0)) < 0:
+        axes[1] = -axes[1]
+    plane = centered @ axes[:2].T
+    low, size = plane.min(axis=0), np.ptp(plane, axis=0)
+    if np.any(size < 1e-3):
+        raise ModelError("the object is thinner than a millimetre in the depth image: check the region")
+    u, w = ((plane - low) / size * (1 - 2 * margin) + margin).T
+    return u, w
+
+
+def _fit_control_points(
+    vertices: NDArray[np.float64], u: NDArray[np.float64], w: NDArray[np.float64], settings: Settings
+) -> NDArray[np.float64]:
+    """Control points (rows, columns, 3) that minimise the squared distances plus a little bending."""
+    rows, columns = settings.control_points
+    basis = spline.rational_basis(u, w, settings.degree, np.ones((rows, columns)))[0]
+    bend_u = np.kron(np.diff(np.eye(rows), 2, axis=0), np.eye(columns))
+    bend_w = np.kron(np.eye(rows), np.diff(np.eye(columns), 2, axis=0))
+    bending = np.concatenate([bend_u, bend_w]) * np.sqrt(settings.smoothing * len(vertices) / (rows * columns))
+    system = np.concatenate([basis, bending])
+    target = np.concatenate([vertices, np.zeros((len(bending), 3))])
+    solution = np.linalg.lstsq(system, target, rcond=None)[0]
+    return np.asarray(solution, np.float64).reshape(rows, columns, 3)
+
+
+@kernel
+def _deform(
+    control: NDArray[np.float32],
+    span_start: NDArray[np.int32],
+    span_control: NDArray[np.int32],
+    basis: NDArray[np.float32],
+    offset: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+) -> None:
+    """Eq. 8 for a population. Vertices are sorted by knot span, so that the loops over them share control points.
+
+    Args:
+        control: (population, control points, 3).
+        span_start: first vertex of every span, and the number of vertices, (spans + 1,).
+        span_control: control points of every span (spans, q).
+        basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
+        offset: o of eq. 7 (n,).
+        vertices, normals: results (population, 3, n).
+    """
+    n = offset.size
+    along = np.empty((6, n), np.float32)
+    for k in range(control.shape[0]):
+        position, normal = vertices[k], normals[k]
+        position[:] = 0
+        along[:] = 0
+        for s in range(span_control.shape[0]):
+            for q in range(span_control.shape[1]):
+                x, y, z = control[k, span_control[s, q]]
+                for v in range(span_start[s], span_start[s + 1]):
+                    r, r_u, r_w = basis[0, q, v], basis[1, q, v], basis[2, q, v]
+                    position[0, v] += r * x
+                    position[1, v] += r * y
+                    position[2, v] += r * z
+                    along[0, v] += r_u * x
+                    along[1, v] += r_u * y
+                    along[2, v] += r_u * z
+                    along[3, v] += r_w * x
+                    along[4, v] += r_w * y
+                    along[5, v] += r_w * z
+        for v in range(n):
+            nx = along[1, v] * along[5, v] - along[2, v] * along[4, v]
+            ny = along[2, v] * along[3, v] - along[0, v] * along[5, v]
+            nz = along[0, v] * along[4, v] - along[1, v] * along[3, v]
+            inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-20))
+            normal[0, v], normal[1, v], normal[2, v] = nx * inverse, ny * inverse, nz * inverse
+            position[0, v] += normal[0, v] * offset[v]
+            position[1, v] += normal[1, v] * offset[v]
+            position[2, v] += normal[2, v] * offset[v]

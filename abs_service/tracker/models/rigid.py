@@ -1,0 +1,46 @@
+"""Rigid motion: the simplest deformation, six parameters."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A rigid model has no keys."""
+
+    def build(self, mesh: Mesh) -> "Rigid":
+        """The rigid model of a mesh."""
+        return Rigid(mesh)
+
+
+class Rigid:
+    """Θ = rotation vector [rad] about the mesh's centroid, translation [m].
+
+    Attributes:
+        mesh: the mesh.
+        rest: zeros (6,).
+        scales: (6,): the rotation [rad] that moves the farthest vertex by one metre, and one metre.
+    """
+
+    def __init__(self, mesh: Mesh):
+        self.mesh = mesh
+        self.rest = np.zeros(6)
+        self._centroid = mesh.vertices.mean(axis=0)
+        self._arms = mesh.vertices - self._centroid
+        self._normals = mesh.normals
+        radius = np.linalg.norm(self._arms, axis=1).max()
+        self.scales = np.repeat([1 / max(radius, 1e-3), 1.0], 3)
+
+    def deform(self, thetas: NDArray[np.float64]) -> Surface:
+        """Moves the mesh with every row of `thetas` (population, 6)."""
+        rotations = Rotation.from_rotvec(thetas[:, :3]).as_matrix()
+        centers = (self._centroid + thetas[:, 3:])[:, :, None]
+        vertices = rotations @ self._arms.T + centers
+        normals = rotations @ self._normals.T
+        return Surface(np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32))

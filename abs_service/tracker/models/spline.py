@@ -1,0 +1,61 @@
+"""Base splines of NURBS surfaces and their derivatives (eqs. 3–5)."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+Basis = NDArray[np.float64]
+
+
+def clamped_knots(control_points: int, degree: int) -> NDArray[np.float64]:
+    """Equidistant knots in [0, 1], clamped at both ends, shape (control_points + degree + 1,)."""
+    inner = np.linspace(0.0, 1.0, control_points - degree + 1)
+    return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
+
+
+def base_splines(u: NDArray[np.floating], control_points: int, degree: int, derivative: int = 0) -> Basis:
+    """Values n_{i,d}(u) of eqs. 4 and 5, or of their derivative, shape (len(u), control_points); u = 1 is included."""
+    knots = clamped_knots(control_points, degree)
+    return BSpline(knots, np.eye(control_points), degree)(np.clip(u, 0.0, 1.0), nu=derivative)
+
+
+def rational_basis(
+    u: NDArray[np.floating], w: NDArray[np.floating], degree: int, weights: NDArray[np.float64]
+) -> tuple[Basis, Basis, Basis]:
+    """Weighting functions R_p of eq. 3 and their derivatives by u and by w.
+
+    Args:
+        u, w: surface parameters (n,) in [0, 1].
+        degree: polynomial degree d in both directions.
+        weights: weight of every control point (rows, columns); rows follow u, columns follow w.
+
+    Returns:
+        R, ∂R/∂u, ∂R/∂w, each (n, rows × columns).
+    """
+    rows, columns = weights.shape
+    n_u, n_w = base_splines(u, rows, degree), base_splines(w, columns, degree)
+    d_u, d_w = base_splines(u, rows, degree, 1), base_splines(w, columns, degree, 1)
+    value, along_u, along_w = (
+        (np.einsum("ni,nj->nij", a, b) * weights).reshape(len(u), -1) for a, b in ((n_u, n_w), (d_u, n_w), (n_u, d_w))
+    )
+    total, total_u, total_w = (b.sum(axis=1, keepdims=True) for b in (value, along_u, along_w))
+    basis = value / total
+    return basis, (along_u - basis * total_u) / total, (along_w - basis * total_w) / total
+
+
+def support(
+    u: NDArray[np.floating], w: NDArray[np.floating], shape: tuple[int, int], degree: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Knot span of every vertex and the control points that reach into each span.
+
+    Returns:
+        span (n,), numbered row by row; control points (spans, (degree + 1)²).
+    """
+    rows, columns = shape
+    spans_u, spans_w = rows - degree, columns - degree
+    i = np.minimum((np.asarray(u) * spans_u).astype(np.int32), spans_u - 1)
+    j = np.minimum((np.asarray(w) * spans_w).astype(np.int32), spans_w - 1)
+    corner = np.arange(degree + 1)
+    local = (corner[:, None] * columns + corner).ravel()
+    first = (np.arange(spans_u)[:, None] * columns + np.arange(spans_w)).ravel()
+    return (i * spans_w + j).astype(np.int32), (first[:, None] + local).astype(np.int32)

@@ -1,0 +1,1 @@
+"""What the search minimises, one per file; a rig file names them with `type`."""

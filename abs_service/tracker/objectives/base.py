@@ -1,0 +1,66 @@
+"""What an objective is: how badly a deformed mesh explains the measurements."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.observation import Observation
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import SensorFit, Term
+
+
+class Objective(Protocol):
+    """A cost over deformed meshes, given one observation."""
+
+    def observe(self, observation: Observation) -> None:
+        """Takes the measurements that the following costs refer to."""
+        ...
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Cost (population,) of every deformed mesh; lower explains the measurements better."""
+        ...
+
+    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (m, dim) of the normalised residuals of a population of one.
+
+        Args:
+            surface: the deformed mesh.
+            jacobian: derivatives (n, 3, dim) of its vertices by the parameters.
+        """
+        ...
+
+    def fits(self, surface: Surface) -> list[SensorFit]:
+        """How every contributing sensor agrees with a population of one."""
+        ...
+
+
+class TermSum:
+    """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes nothing."""
+
+    def __init__(self, terms: Sequence[Term]):
+        self._terms = terms
+        self._active: list[Term] = []
+
+    def observe(self, observation: Observation) -> None:
+        """Hands every sensor's image to its term."""
+        self._active = [term for term in self._terms if term.sensor in observation.images]
+        for term in self._active:
+            term.observe(observation.images[term.sensor])
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Cost (population,) of every deformed mesh."""
+        total = np.zeros(len(surface.vertices))
+        for term in self._active:
+            total += term.cost(surface)
+        return total
+
+    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (m, dim) of all sensors' normalised residuals."""
+        rows = [term.residual_jacobian(surface, jacobian) for term in self._active]
+        return np.concatenate([np.zeros((0, jacobian.shape[2])), *rows])
+
+    def fits(self, surface: Surface) -> list[SensorFit]:
+        """How every contributing sensor agrees with a population of one."""
+        return [term.fit(surface) for term in self._active]

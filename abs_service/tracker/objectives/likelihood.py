@@ -1,0 +1,43 @@
+"""The negative log-likelihood of all measurements under the sensors' own noise models (eqs. 16–22); no weights."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Gt, Interval
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.terms.base import Bounds, Term
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from calib.noise.color import LEVELS, GaussianColor
+from calib.rig import Rig, Sensor
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the likelihood.
+
+    Attributes:
+        outlier_share: share ε of measurements that come from anywhere (mixed pixels, occluders, what the model cannot
+            represent); it bounds what a single measurement can say against a deformation. The density is the larger of
+            (1 − ε) times the noise model's and ε times the uniform one, at most log 2 from their sum.
+        range_m: distances that a depth sensor can report at all; a measurement that says nothing about the surface is
+            uniform over it.
+    """
+
+    outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
+    range_m: Annotated[float, Gt(0)] = 5.0
+
+    def build(self, rig: Rig, mesh: Mesh) -> TermSum:
+        """The likelihood of a mesh in a rig."""
+        return TermSum([self._term(sensor, mesh) for sensor in rig.sensors.values()])
+
+    def _term(self, sensor: Sensor, mesh: Mesh) -> Term:
+        if isinstance(sensor.noise, GaussianColor):
+            return ColorTerm(sensor.name, sensor.camera, sensor.noise, mesh.colors, self._bounds(3 * np.log(LEVELS)))
+        return DepthTerm(sensor.name, sensor.camera, sensor.noise, self._bounds(np.log(self.range_m)))
+
+    def _bounds(self, uniform: float) -> Bounds:
+        return Bounds(-np.log1p(-self.outlier_share), uniform, uniform - np.log(self.outlier_share))

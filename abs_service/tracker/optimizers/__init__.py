@@ -1,0 +1,1 @@
+"""Searches behind ask and tell, one per file; a rig file names them with `type`."""

@@ -1,0 +1,118 @@
+"""What is known about deformations before measuring; terms of the same likelihood, never weights by hand."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
+from calib.jit import kernel
+
+#: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
+FIRST_INTERVAL_S = 1 / 30
+LONGEST_INTERVAL_S = 0.5
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the priors.
+
+    Attributes:
+        stretch: standard deviation of an edge's relative change of length. Paper: 0.01; rubber: 0.2.
+        speed: standard deviation of a parameter's rate of change around the predicted one, expressed as the speed of
+            the surface that it moves [m/s].
+        memory_s: time constant with which the last motion fades from the prediction [s].
+    """
+
+    stretch: Annotated[float, Gt(0)] = 0.02
+    speed: Annotated[float, Gt(0)] = 0.3
+    memory_s: Annotated[float, Gt(0)] = 0.1
+
+
+class StretchPrior:
+    """Relative edge-length changes are normal with zero mean; it penalises stretching and shearing, never bending."""
+
+    def __init__(self, mesh: Mesh, deviation: float):
+        self._edges = mesh.edges
+        lengths = np.linalg.norm(mesh.vertices[self._edges[:, 0]] - mesh.vertices[self._edges[:, 1]], axis=1)
+        self._inverse_lengths = (1 / lengths).astype(np.float32)
+        self._inverse_deviation = 1 / deviation
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Negative log-density (population,) of the edge lengths, up to a constant."""
+        out = np.empty(len(surface.vertices))
+        _stretch_cost(surface.vertices, self._edges, self._inverse_lengths, out)
+        return out * (0.5 * self._inverse_deviation**2)
+
+    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (edges, dim) of the normalised residuals of a population of one; jacobian (n, 3, dim)."""
+        first, second = self._edges.T
+        difference = (surface.vertices[0][:, first] - surface.vertices[0][:, second]).T.astype(np.float64)
+        direction = difference / np.linalg.norm(difference, axis=1, keepdims=True)
+        rows = np.einsum("ei,eid->ed", direction, jacobian[first] - jacobian[second])
+        return rows * (self._inverse_lengths[:, None] * self._inverse_deviation)
+
+
+class MotionPrior:
+    """Θ_t given the past is normal around the parameters that the last motion predicts.
+
+    Attributes:
+        predicted: predicted parameters (dim,) of the frame in hand.
+    """
+
+    def __init__(self, rest: NDArray[np.float64], scales: NDArray[np.float64], settings: Settings):
+        self.predicted = rest
+        self._settings = settings
+        self._scales = scales
+        self._theta = rest
+        self._velocity = np.zeros_like(rest)
+        self._t_ns: int | None = None
+        self._elapsed_s = FIRST_INTERVAL_S
+
+    def predict(self, t_ns: int) -> None:
+        """Turns to the frame of time `t_ns` [ns]; the velocity fades with the age of the last estimate."""
+        elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
+        self._elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
+        self._t_ns = t_ns
+        travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
+        self.predicted = self._theta + travel * self._velocity
+
+    def update(self, theta: NDArray[np.float64]) -> None:
+        """Takes the parameters found for the frame in hand."""
+        self._velocity = (theta - self._theta) / self._elapsed_s
+        self._theta = theta
+
+    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Negative log-density (population,) of parameters (population, dim), up to a constant."""
+        return 0.5 * np.sum(((thetas - self.predicted) * self._inverse_deviation) ** 2, axis=1)
+
+    def residual_jacobian(self) -> NDArray[np.float64]:
+        """Derivatives (dim, dim) of the normalised residuals."""
+        return np.diag(self._inverse_deviation)
+
+    @property
+    def _inverse_deviation(self) -> NDArray[np.float64]:
+        return 1 / (self._scales * self._settings.speed * self._elapsed_s)
+
+
+@kernel
+def _stretch_cost(
+    vertices: NDArray[np.float32],
+    edges: NDArray[np.int32],
+    inverse_lengths: NDArray[np.float32],
+    out: NDArray[np.float64],
+) -> None:
+    """Sum over edges of the squared relative change of length, for every member of the population."""
+    for k in range(vertices.shape[0]):
+        total = np.float32(0)
+        for e in range(edges.shape[0]):
+            i, j = edges[e, 0], edges[e, 1]
+            x = vertices[k, 0, i] - vertices[k, 0, j]
+            y = vertices[k, 1, i] - vertices[k, 1, j]
+            z = vertices[k, 2, i] - vertices[k, 2, j]
+            change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[e] - np.float32(1)
+            total += change * change
+        out[k] = total

@@ -1,0 +1,26 @@
+"""What a region is."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class RegionError(ValueError):
+    """A region that selects nothing, or that does not fit the sensor's image."""
+
+
+class Region(Protocol):
+    """Says which pixels of the first depth image show the object."""
+
+    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the object.
+
+        Args:
+            points_r: rig coordinates of every pixel (height, width, 3) [m], NaN without return.
+            distance: radial distances (height, width) [m], NaN without return.
+
+        Raises:
+            RegionError: there is no object.
+        """
+        ...

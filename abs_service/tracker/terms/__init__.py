@@ -1,0 +1,1 @@
+"""One sensor's part of an objective, one kind of sensor per file."""

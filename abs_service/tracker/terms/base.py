@@ -1,0 +1,89 @@
+"""What a term is, and how its agreement with a deformed mesh is summed up."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.observation import ColorImage, DepthImage
+from abs_service.tracker.models.base import Surface
+
+#: Residuals up to this many deviations count as explained by the sensor's noise.
+INLIER_DEVIATIONS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What one measurement costs where its noise model has nothing to say.
+
+    Attributes:
+        inlier: added to the cost of a measurement that the noise model explains.
+        uniform: cost where there is no measurement, or none that this vertex could explain.
+        outlier: the most that a measurement can cost.
+    """
+
+    inlier: float
+    uniform: float
+    outlier: float
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFit:
+    """How well one sensor agrees with one deformed mesh.
+
+    Attributes:
+        sensor: its name.
+        visible: vertices that face the sensor and lie inside its image.
+        samples: of these, how many met a measurement.
+        inliers: of these, how many the measurement's own noise explains.
+        mean_log_likelihood: mean over all vertices, −inf for an objective that is no likelihood.
+        normalized_residual: root mean square of the inliers' residuals over their deviations; near 1 if the noise
+            model is right.
+    """
+
+    sensor: str
+    visible: int
+    samples: int
+    inliers: int
+    mean_log_likelihood: float
+    normalized_residual: float
+
+
+def summarize(
+    sensor: str,
+    visible: NDArray[np.bool_],
+    measured: NDArray[np.bool_],
+    residual: NDArray[np.float64],
+    mean_log_likelihood: float,
+) -> SensorFit:
+    """Counts what the per-vertex arrays (n,) say; `residual` is the size of each residual in its deviations."""
+    inlier = measured & (residual < INLIER_DEVIATIONS)
+    spread = float(np.sqrt(np.mean(residual[inlier] ** 2))) if inlier.any() else float("nan")
+    return SensorFit(sensor, int(visible.sum()), int(measured.sum()), int(inlier.sum()), mean_log_likelihood, spread)
+
+
+class Term(Protocol):
+    """One sensor's part of an objective.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    sensor: str
+
+    def observe(self, image: DepthImage | ColorImage) -> None:
+        """Takes the image that the following costs refer to."""
+        ...
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Cost (population,) of every deformed mesh."""
+        ...
+
+    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (m, dim) of the inliers' normalised residuals; arguments as in `Objective`."""
+        ...
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        ...

@@ -1,0 +1,97 @@
+"""A colour sensor's pixels against the colours of the vertices."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.observation import ColorImage, DepthImage
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis import SparseSynthesis
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import color_rows
+from calib.camera import Camera
+from calib.jit import kernel
+from calib.noise.base import LOG_SQRT_2PI
+from calib.noise.color import GaussianColor
+
+
+class ColorTerm:
+    """−log of the density of the measured colour given the vertex's own, summed over the vertices.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(self, sensor: str, camera: Camera, noise: GaussianColor, colors: NDArray[np.float32], bounds: Bounds):
+        self.sensor = sensor
+        self._camera = camera
+        self._synthesis = SparseSynthesis(camera)
+        self._colors = colors
+        self._bounds = bounds
+        self._inverse_deviation = 1 / noise.sigma
+        self._normalizer = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
+        self._texture = np.zeros((0, 3), np.float32)
+        self._image = np.zeros((1, 1, 3), np.float32)
+
+    def observe(self, image: DepthImage | ColorImage) -> None:
+        """Takes a colour image; the border is NaN, which stands for no measurement."""
+        if not isinstance(image, ColorImage):
+            raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered a depth image")
+        self._image = image.rgb.astype(np.float32)
+        self._texture = np.pad(self._image, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan).reshape(-1, 3)
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log of the density of the measured colours (population,)."""
+        pixel = self._synthesis.synthesize(surface).pixel
+        out = np.empty(len(pixel))
+        constants = (
+            self._inverse_deviation,
+            self._normalizer,
+            self._bounds.outlier,
+            self._bounds.inlier + self._bounds.uniform,
+        )
+        _color_cost(pixel, self._texture, self._colors, *constants, out)
+        return out
+
+    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (m, dim) of the inliers' normalised residuals, three channels each."""
+        residual, measured = self._residuals(surface)
+        use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
+        rows = color_rows(self._image, self._camera, surface.vertices[0].T[use])
+        return np.einsum("nci,nid->ncd", rows * self._inverse_deviation, jacobian[use]).reshape(-1, jacobian.shape[2])
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        residual, measured = self._residuals(surface)
+        visible = self._synthesis.synthesize(surface).pixel[0] > 0
+        mean = -float(self.cost(surface)[0]) / len(residual)
+        return summarize(self.sensor, visible, measured, np.sqrt(np.mean(residual**2, axis=1)), mean)
+
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Normalised residuals (n, 3) and whether there is a measurement (n,)."""
+        pixel = self._synthesis.synthesize(surface).pixel[0]
+        residual = (self._texture[pixel].astype(np.float64) - self._colors) * self._inverse_deviation
+        measured = np.all(np.isfinite(residual), axis=1)
+        return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
+
+
+@kernel
+def _color_cost(
+    pixel: NDArray[np.int32],
+    texture: NDArray[np.float32],
+    colors: NDArray[np.float32],
+    inverse_deviation: float,
+    normalizer: float,
+    outlier: float,
+    uniform: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Sum over vertices of min(normaliser + ½e², outlier), and of `uniform` where either colour is unknown (NaN)."""
+    scale = np.float32(0.5 * inverse_deviation * inverse_deviation)
+    for k in range(pixel.shape[0]):
+        total = 0.0
+        for v in range(pixel.shape[1]):
+            measured = texture[pixel[k, v]]
+            red, green, blue = measured[0] - colors[v, 0], measured[1] - colors[v, 1], measured[2] - colors[v, 2]
+            square = red * red + green * green + blue * blue
+            total += uniform if np.isnan(square) else min(normalizer + scale * square, outlier)
+        out[k] = total
