@@ -31,7 +31,7 @@ def main(output: Path, recordings: Path) -> None:
             if channel.topic.endswith("/state"):
                 recorded[DeformationState.FromString(message.data).status] += 1
     images = {topic for topic in topics if topic.endswith("/image")}
-    expect("config.toml" in attachments, f"the recording does not say how it was made: {attachments}")
+    expect("rig.toml" in attachments, f"the recording does not say how it was made: {attachments}")
     expect(len(images) >= 2, f"depth and colour images are not recorded: {dict(topics)}")
     expect(recorded[DeformationState.STATUS_TRACKING] > 0, f"no TRACKING estimate is recorded: {dict(topics)}")
     apart = [topic for topic in images if topics[topic] != topics[topic.removesuffix("image") + "info"]]
