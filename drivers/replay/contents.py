@@ -1,0 +1,162 @@
+"""What an MCAP file holds and where, from its index or, if it was never finished, by reading it through."""
+
+import struct
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.summary import Summary
+from zstandard import ZstdError
+
+from drivers.device import DeviceError
+
+#: What the MCAP reader and its decompressors raise about bytes that are cut off or damaged.
+DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)
+
+#: Bytes of opcode and length before the content of a record.
+_RECORD_HEADER = 9
+
+
+class RecordingError(DeviceError):
+    """A file that cannot be replayed; names the file and what is wrong with it."""
+
+
+@dataclass(frozen=True)
+class ChunkPlace:
+    """Where a chunk begins in the file, and the earliest time in it [ns]."""
+
+    offset: int
+    start_ns: int
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic: its name, the full name of its protobuf message, and how many messages it has."""
+
+    name: str
+    schema: str
+    count: int
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Survey of one file.
+
+    Attributes:
+        chunks: in the file's order.
+        topics: by channel id.
+        attachments: content by name.
+        start_ns, end_ns: first and last log time [ns]; 0 for a file without messages.
+        truncated: the file was never finished: its writer was killed, or is still writing.
+    """
+
+    chunks: tuple[ChunkPlace, ...]
+    topics: Mapping[int, Topic]
+    attachments: Mapping[str, bytes]
+    start_ns: int
+    end_ns: int
+    truncated: bool
+
+
+def survey(path: Path) -> Contents:
+    """Surveys a file, quickly if it has an index.
+
+    Raises:
+        RecordingError: the file cannot be read, or is no MCAP file.
+    """
+    try:
+        with path.open("rb") as stream:
+            summary = _summary(path, stream)
+            return _read_through(stream) if summary is None else _from_index(summary, stream)
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from error
+
+
+def read_chunk(stream: BinaryIO, place: ChunkPlace) -> list[McapRecord]:
+    """The records of a chunk; raises one of `DAMAGE` if it is damaged."""
+    stream.seek(place.offset + _RECORD_HEADER)
+    return breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+
+
+def _summary(path: Path, stream: BinaryIO) -> Summary | None:
+    """The index at the end of the file, None if there is none."""
+    try:
+        reader = SeekingReader(stream)
+    except DAMAGE as error:
+        raise RecordingError(f"{path}: this is no MCAP file ({stream.seek(0, 2)} bytes)") from error
+    try:
+        return reader.get_summary()
+    except DAMAGE:
+        return None
+
+
+def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
+    counts = summary.statistics.channel_message_counts if summary.statistics else {}
+    stream.seek(0)
+    return Contents(
+        chunks=tuple(ChunkPlace(index.chunk_start_offset, index.message_start_time) for index in summary.chunk_indexes),
+        topics=_topics(summary.schemas, summary.channels, counts),
+        attachments={attachment.name: attachment.data for attachment in SeekingReader(stream).iter_attachments()},
+        start_ns=min((index.message_start_time for index in summary.chunk_indexes), default=0),
+        end_ns=max((index.message_end_time for index in summary.chunk_indexes), default=0),
+        truncated=False,
+    )
+
+
+def _read_through(stream: BinaryIO) -> Contents:
+    """Reads every record up to the first that is cut off; a damaged chunk is left out."""
+    chunks: list[ChunkPlace] = []
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    counts: Counter[int] = Counter()
+    attachments: dict[str, bytes] = {}
+    times: list[int] = []
+    for offset, record in _records(stream):
+        if isinstance(record, Attachment):
+            attachments[record.name] = record.data
+        if not isinstance(record, Chunk):
+            continue
+        try:
+            contents = breakup_chunk(record, validate_crc=True)
+        except DAMAGE:
+            continue
+        chunks.append(ChunkPlace(offset, record.message_start_time))
+        times += [record.message_start_time, record.message_end_time]
+        schemas |= {schema.id: schema for schema in contents if isinstance(schema, Schema)}
+        channels |= {channel.id: channel for channel in contents if isinstance(channel, Channel)}
+        counts.update(message.channel_id for message in contents if isinstance(message, Message))
+    topics = _topics(schemas, channels, counts)
+    return Contents(tuple(chunks), topics, attachments, min(times, default=0), max(times, default=0), truncated=True)
+
+
+def _records(stream: BinaryIO) -> Iterator[tuple[int, McapRecord]]:
+    """Offset and content of every record before the file breaks off."""
+    stream.seek(0)
+    records = StreamReader(stream, emit_chunks=True).records
+    offset = len(b"\x89MCAP0\r\n")
+    try:
+        for record in records:
+            yield offset, record
+            offset = stream.tell()
+    except DAMAGE:
+        return
+
+
+def _topics(
+    schemas: Mapping[int, Schema], channels: Mapping[int, Channel], counts: Mapping[int, int]
+) -> dict[int, Topic]:
+    return {
+        channel.id: Topic(
+            channel.topic,
+            schemas[channel.schema_id].name if channel.schema_id in schemas else "",
+            counts.get(channel.id, 0),
+        )
+        for channel in channels.values()
+    }

@@ -1,0 +1,143 @@
+"""A recording as a device: its frames again, in real time, as if they were taken now."""
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+
+from calib.camera import Camera
+from drivers.device import DeviceInfo, DeviceState, Sink, StreamInfo, Truth
+from drivers.frame import Frame
+from drivers.replay.contents import RecordingError
+from drivers.replay.recording import Recording
+
+#: Waits until the event is set or so many seconds have passed; tells whether it is set.
+Wait = Callable[[threading.Event, float], bool]
+
+
+class ReplayDevice:
+    """Delivers what a recording holds, at its own pace times `speed`, with new host times and a new epoch.
+
+    Host times keep their distances (divided by `speed`) and begin with now; sequence numbers and the device's own ticks
+    stay. Nothing is dropped: a replay that cannot keep up delivers late.
+
+    Args:
+        uri: the address that opened it.
+        recording: what to play.
+        speed: factor on the pace.
+        loop: whether to begin anew at the end, in a new epoch.
+        clock: CLOCK_MONOTONIC [ns].
+        wait: how to pass time; tests pass their own.
+
+    Raises:
+        RecordingError: a stream without frames, or a sensor without a camera model.
+    """
+
+    def __init__(
+        self,
+        uri: str,
+        recording: Recording,
+        speed: float,
+        loop: bool,
+        clock: Callable[[], int],
+        wait: Wait = threading.Event.wait,
+    ) -> None:
+        self.info = DeviceInfo(uri=uri, model="replay", serial=recording.path.name)
+        self.streams: tuple[StreamInfo, ...] = _streams(recording, speed)
+        self.cameras: Mapping[str, Camera] = recording.cameras
+        self._recording = recording
+        self._speed = speed
+        self._loop = loop
+        self._clock = clock
+        self._wait = wait
+        self._counters = {"frames": 0, "unpaired": 0}
+        self._next_epoch = 0
+        self._stop = threading.Event()
+        self._thread = threading.Thread()
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames` delivered, and images or descriptions in the file that were `unpaired`."""
+        return dict(self._counters)
+
+    def start(self, sink: Sink) -> None:
+        """Begins at the beginning; a device that is running goes on as it is."""
+        if self._thread.is_alive():
+            return
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(sink, self._stop), name="replay", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Ends delivery; after it returns the sink is not called again, unless the sink itself called it."""
+        self._stop.set()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join()
+
+    def close(self) -> None:
+        """Stops; the file is not kept open."""
+        self.stop()
+
+    def _run(self, sink: Sink, stop: threading.Event) -> None:
+        sink.on_state(DeviceState.STREAMING, f"replaying {self._recording.path}")
+        try:
+            while self._play(sink, stop) and self._loop:
+                pass
+        except (RecordingError, OSError) as error:
+            sink.on_state(DeviceState.FAILED, str(error))
+            return
+        sink.on_state(DeviceState.CLOSED, "stopped" if stop.is_set() else "the recording ended")
+
+    def _play(self, sink: Sink, stop: threading.Event) -> bool:
+        """Plays the file once; tells whether to go on. Each epoch of the file becomes one of the device."""
+        start_ns = self._clock()
+        epochs: dict[int, int] = {}
+        first_ns: int | None = None
+        for item in self._recording.frames():
+            first_ns = item.t_host_ns if first_ns is None else first_ns
+            t_host_ns = start_ns + round((item.t_host_ns - first_ns) / self._speed)
+            if self._wait(stop, max(t_host_ns - self._clock(), 0) * 1e-9):
+                break
+            if isinstance(item, Truth):
+                sink.on_truth(replace(item, t_host_ns=t_host_ns))
+                continue
+            epoch = epochs.setdefault(item.epoch, self._next_epoch + len(epochs))
+            sink.on_frame(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
+            self._counters["frames"] += 1
+        else:
+            self._counters["unpaired"] += self._recording.unpaired
+        self._next_epoch += len(epochs)
+        return not stop.is_set()
+
+
+def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
+    """The streams as their first frames show them."""
+    first = dict(_first_frames(recording))
+    for sensor, stream in recording.counts:
+        if (sensor, stream) not in first:
+            raise RecordingError(f"{recording.path}: {sensor}/{stream} has no frame that can be read")
+        if sensor not in recording.cameras:
+            raise RecordingError(
+                f"{recording.path}: topic /{sensor}/model with the camera model of {sensor} is missing"
+            )
+    return tuple(
+        StreamInfo(
+            frame.sensor,
+            frame.stream,
+            frame.kind,
+            frame.encoding,
+            frame.data.shape[1],
+            frame.data.shape[0],
+            speed * max(recording.counts[frame.key] - 1, 1) / max(recording.duration_s, 1e-3),
+        )
+        for frame in (first[key] for key in recording.counts)
+    )
+
+
+def _first_frames(recording: Recording) -> Iterator[tuple[tuple[str, str], Frame]]:
+    missing = set(recording.counts)
+    for item in recording.frames():
+        if isinstance(item, Frame) and item.key in missing:
+            missing.discard(item.key)
+            yield item.key, item
+        if not missing:
+            return

@@ -1,0 +1,152 @@
+"""A recording as a sequence of frames and truths, without a clock: nothing dropped, the same result each time."""
+
+import heapq
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+from abs.v1.sensor_model_pb2 import SensorModel
+from google.protobuf.message import DecodeError
+from mcap.records import Message
+
+from calib.camera import Camera, CameraError
+from calib.lens import Lens, LensError
+from drivers import codec
+from drivers.codec import CodecError
+from drivers.device import Truth
+from drivers.frame import Frame
+from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, survey
+
+MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
+
+_IMAGE = re.compile(r"/(?P<sensor>[^/]+)/(?P<stream>[^/]+)/image")
+
+
+class Recording:
+    """An MCAP file that abs-service recorded.
+
+    A file whose writer was killed can be read up to where it breaks off; `truncated` tells.
+
+    Attributes:
+        path: of the file.
+        truncated: whether the file was never finished.
+        duration_s: from the first to the last message [s].
+        counts: number of images by (sensor, stream).
+        models: what the recording says about each sensor, by sensor name.
+        cameras: the camera model of each sensor, by sensor name.
+        config: the configuration that was in effect, as TOML; "" if none was attached.
+        unpaired: images and descriptions without their counterpart in what `frames` has read last.
+
+    Raises:
+        RecordingError: no such file, not MCAP, or not a recording of abs-service.
+    """
+
+    def __init__(self, path: Path) -> None:
+        contents = survey(path)
+        self.path = path
+        self.truncated = contents.truncated
+        self.duration_s = (contents.end_ns - contents.start_ns) * 1e-9
+        self.config = contents.attachments.get("rig.toml", b"").decode("utf-8", "replace")
+        self.unpaired = 0
+        self._contents = contents
+        self.counts = _image_counts(path, contents)
+        self.models = self._read_models()
+        self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
+
+    def frames(self) -> Iterator[Frame | Truth]:
+        """Everything that was measured or simulated, in the order of its time.
+
+        Raises:
+            RecordingError: a damaged part, or a message that is no frame or truth.
+        """
+        waiting: dict[tuple[str, int, int], bytes] = {}
+        for topic, message in self._messages({codec.IMAGE_SCHEMA, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}):
+            try:
+                if topic.schema == codec.TRUTH_SCHEMA:
+                    yield codec.decode_truth(message.data)
+                    continue
+                key = (topic.name.rpartition("/")[0], message.log_time, message.sequence)
+                partner = waiting.pop(key, None)
+                if partner is None:
+                    waiting[key] = message.data
+                elif topic.schema == codec.IMAGE_SCHEMA:
+                    yield codec.decode(message.data, partner)
+                else:
+                    yield codec.decode(partner, message.data)
+            except CodecError as error:
+                raise RecordingError(f"{self.path}: {topic.name} at {message.log_time} ns: {error}") from error
+        self.unpaired = len(waiting)
+
+    def _messages(self, schemas: set[str]) -> Iterator[tuple[Topic, Message]]:
+        """Messages of the given schemas by log time; those of one time in the order they were written."""
+        wanted = {channel for channel, topic in self._contents.topics.items() if topic.schema in schemas}
+        chunks = self._contents.chunks
+        # A message may go out as soon as no chunk that is still to be read begins earlier.
+        starts = np.array([*(chunk.start_ns for chunk in chunks), np.iinfo(np.int64).max], np.int64)
+        earliest = np.minimum.accumulate(starts[::-1])[::-1]
+        held: list[tuple[int, int, int, Message]] = []
+        with self.path.open("rb") as stream:
+            for number, chunk in enumerate(chunks):
+                try:
+                    records = read_chunk(stream, chunk)
+                except DAMAGE as error:
+                    where = f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error})"
+                    raise RecordingError(f"{where}; `abs-service recover` saves the rest") from error
+                for position, record in enumerate(records):
+                    if isinstance(record, Message) and record.channel_id in wanted:
+                        heapq.heappush(held, (record.log_time, number, position, record))
+                while held and held[0][0] <= earliest[number + 1]:
+                    message = heapq.heappop(held)[-1]
+                    yield self._contents.topics[message.channel_id], message
+
+    def _read_models(self) -> dict[str, SensorModel]:
+        """The first model of every sensor."""
+        missing = {
+            topic.name for topic in self._contents.topics.values() if topic.schema == MODEL_SCHEMA and topic.count
+        }
+        models: dict[str, SensorModel] = {}
+        for topic, message in self._messages({MODEL_SCHEMA}) if missing else ():
+            if topic.name in missing:
+                missing.discard(topic.name)
+                try:
+                    models[topic.name.split("/")[1]] = SensorModel.FromString(message.data)
+                except DecodeError as error:
+                    raise RecordingError(f"{self.path}: {topic.name} holds no {MODEL_SCHEMA}: {error}") from error
+            if not missing:
+                break
+        return models
+
+    def _camera(self, model: SensorModel) -> Camera:
+        try:
+            return Camera(
+                model.width,
+                model.height,
+                model.fx,
+                model.fy,
+                model.cx,
+                model.cy,
+                Lens(np.array(model.lens)),
+                np.array(model.T_rs, float).reshape(4, 4),
+            )
+        except (CameraError, LensError, ValueError) as error:
+            raise RecordingError(f"{self.path}: the model of sensor {model.sensor!r} is no camera: {error}") from error
+
+
+def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], int]:
+    """Number of images per stream; refuses files whose images nobody described."""
+    names = {topic.name for topic in contents.topics.values()}
+    counts: dict[tuple[str, str], int] = {}
+    for topic in contents.topics.values():
+        if topic.schema != codec.IMAGE_SCHEMA:
+            continue
+        match = _IMAGE.fullmatch(topic.name)
+        if not match or f"{topic.name.removesuffix('image')}info" not in names:
+            raise RecordingError(
+                f"{path}: topic {topic.name} holds images that no abs.v1.FrameInfo describes, so this is no recording "
+                "of abs-service; `abs-service import` makes one from image files"
+            )
+        counts[match["sensor"], match["stream"]] = topic.count
+    if not counts:
+        raise RecordingError(f"{path}: there are no images in this file, its topics are {sorted(names)}")
+    return counts
