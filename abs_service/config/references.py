@@ -22,7 +22,7 @@ def _tables(file: dict[str, Any], section: str) -> dict[str, dict[str, Any]]:
 def _sensors(file: dict[str, Any]) -> Iterator[Problem]:
     devices, owners = _tables(file, "devices"), {}
     for name, sensor in _tables(file, "sensors").items():
-        device, head = sensor.get("device"), sensor.get("head", name)
+        device, head = sensor.get("device"), sensor.get("head") or name
         if not isinstance(device, str):
             continue
         if device not in devices:

@@ -102,6 +102,7 @@ class RecordTable(Table):
         flush_s: longest time until a message is on disk, and so the most that a crash can lose.
         rotate_bytes, rotate_s: size and age at which a new file begins.
         minimum_free_bytes: free space at which recording ends.
+        queue_bytes: messages that may wait for a slow disk; more are dropped and counted.
     """
 
     enabled: bool = True
@@ -112,21 +113,24 @@ class RecordTable(Table):
     rotate_bytes: Annotated[int, Field(ge=1 << 16)] = 4_000_000_000
     rotate_s: Positive = 3600.0
     minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
+    queue_bytes: Annotated[int, Field(ge=1 << 20)] = 256 << 20
 
 
 class RunTable(Table):
     """`[run]`: how `run` looks after its processes.
 
     Attributes:
-        restarts, window_s: a process that ends this often within this time is given up.
-        stall_s: a process that says nothing for this long is restarted.
-        grace_s: time that a process has to end in order before it is killed.
+        restarts, window_s: a process that needs more restarts than this within this time is given up.
+        startup_s: longest silence of a process that starts or compiles its kernels.
+        stall_s: afterwards, a process that says nothing for this long is restarted.
+        stop_s: time that all processes together have to end in order before they are killed.
     """
 
     restarts: Annotated[int, Field(ge=0)] = 5
     window_s: Positive = 60.0
+    startup_s: Positive = 180.0
     stall_s: Positive = 10.0
-    grace_s: Positive = 1.5
+    stop_s: Positive = 4.0
 
 
 class ServiceConfig(Table):
