@@ -1,5 +1,6 @@
 """Keeps a device delivering: opens it, starts it, and does both again when it fails."""
 
+import logging
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -7,6 +8,8 @@ from dataclasses import replace
 from abs_service.health import Health, Level
 from drivers.device import Device, DeviceError, DeviceState, Sink, Truth
 from drivers.frame import Frame
+
+_log = logging.getLogger(__name__)
 
 #: Pause before a failed device is opened again: doubles with each failure in a row, up to the longest [s].
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0
@@ -29,11 +32,15 @@ class DeviceKeeper:
     Args:
         name: name of the device in the configuration.
         open_device: opens it.
-        on_open: told of each opened device before it starts; what it raises ends the keeper, see `refusal`.
+        on_open: told of each opened device before it starts; what it raises becomes `refusal` and ends the keeper.
         sink: where the frames go, under the names of the rig.
         heads: names in the rig of the device's heads; frames of others are not wanted.
         health: of the component.
         clock: CLOCK_MONOTONIC [ns].
+
+    Attributes:
+        finished: the device has come to its end by itself, as a recording does.
+        refusal: why the device cannot be used at all; None if it can.
     """
 
     def __init__(
@@ -75,9 +82,10 @@ class DeviceKeeper:
             except DeviceError as error:
                 delivered, reason = False, str(error)
             except Exception as error:
-                self.refusal = error
-                return
-            if self._stop.is_set() or self.finished:
+                # A driver's mistake must not take the other devices down.
+                _log.exception("device %s", self._name)
+                delivered, reason = False, repr(error)
+            if self._stop.is_set() or self.finished or self.refusal:
                 self._say(DeviceState.CLOSED, reason)
                 return
             pause_s = FIRST_PAUSE_S if delivered else min(2 * pause_s, LONGEST_PAUSE_S)
@@ -92,7 +100,11 @@ class DeviceKeeper:
         # Grows with every opening, also across restarts of this process, and leaves the device ten epochs a second.
         watch = _Watch(self._sink, self._heads, self._clock, first_epoch=self._clock() // 100_000_000)
         try:
-            self._on_open(device)
+            try:
+                self._on_open(device)
+            except Exception as error:
+                self.refusal = error
+                return False, str(error)
             device.start(watch)
             reason = self._watch(device, watch)
         finally:

@@ -105,7 +105,8 @@ class Health:
     def tick(self) -> None:
         """Publishes if a second is over."""
         if self.due():
-            self._next_ns = self._speaker.clock.monotonic() + PERIOD_NS
+            # From second to second, not from call to call, unless whole seconds were missed.
+            self._next_ns = max(self._next_ns + PERIOD_NS, self._speaker.clock.monotonic())
             self.publish()
 
     def publish(self) -> None:

@@ -58,6 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             keeper.close(CLOSE_S)
         for publisher in publishers.values():
             publisher.close()
+        _count(publishers, health)
         health.publish()
     for keeper in keepers:
         if keeper.refusal:
@@ -96,13 +97,17 @@ def _tick(crier: "Crier", publishers: Mapping[str, FramePublisher], health: Heal
         health.report("clock", Level.WARNING, f"somebody set the clock by {change_ns / 1e9:+.3f} s; stamps follow it")
     else:
         health.report("clock", Level.OK)
-    for publisher in publishers.values():
-        health.count_up_to(publisher.dropped, "dropped.")
-        for topic, number in publisher.published.items():
-            health.count_up_to({topic: number}, "published.")
-            health.rate(f"rate_hz.{topic}", number)
+    _count(publishers, health)
     crier.cry()
     health.tick()
+
+
+def _count(publishers: Mapping[str, FramePublisher], health: Health) -> None:
+    for publisher in publishers.values():
+        health.count_up_to(publisher.dropped, "dropped.")
+        health.count_up_to(publisher.published, "published.")
+        for topic, number in publisher.published.items():
+            health.rate(f"rate_hz.{topic}", number)
 
 
 class Crier:

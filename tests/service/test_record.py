@@ -93,7 +93,7 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
         assert image.message.log_time == image.message.publish_time == info.message.log_time == stamp_ns
         assert image.message.sequence == info.message.sequence
     assert [m.message.sequence for m in images] == [(10**9 + seq) & 0xFFFFFFFF for seq in range(5)]
-    assert {m.schema.name for m in messages} == {"foxglove.RawImage", "abs.v1.FrameInfo", "abs.v1.Health"}
+    assert {m.schema and m.schema.name for m in messages} == {"foxglove.RawImage", "abs.v1.FrameInfo", "abs.v1.Health"}
     assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
 
 

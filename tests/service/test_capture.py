@@ -1,0 +1,231 @@
+"""Devices are kept delivering, under the names of the rig, and what they are is announced."""
+
+import queue
+import threading
+
+import numpy as np
+import pytest
+from abs.v1.sensor_model_pb2 import Config, SensorModel
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+
+from abs_service import announcements, capture, config, keys
+from abs_service.capture import DeviceKeeper
+from abs_service.commands.capture import Crier, HeadError
+from abs_service.envelope import MESSAGES
+from abs_service.health import Health, Level
+from abs_service.stamps import Speaker, WallClock
+from calib import pose
+from calib.camera import Camera
+from drivers.device import DeviceError, DeviceInfo, DeviceState
+from drivers.frame import Frame, Kind
+from tests.service.loopback import LoopbackBus
+
+CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
+
+
+class FakeDevice:
+    """Does what it is told."""
+
+    info = DeviceInfo("fake://", "fake", "1")
+    streams = ()
+
+    def __init__(self, heads=("head", "other"), start=lambda sink: None):
+        self.cameras = dict.fromkeys(heads, CAMERA)
+        self.counters = {"frames": 1}
+        self.start = start
+        self.closed = threading.Event()
+
+    def stop(self):
+        pass
+
+    def close(self):
+        self.closed.set()
+
+
+class Collector:
+    """A sink that keeps everything."""
+
+    def __init__(self):
+        self.frames = queue.SimpleQueue()
+
+    def on_frame(self, frame):
+        self.frames.put(frame)
+
+    def on_truth(self, truth):
+        pass
+
+    def on_state(self, state, reason):
+        pass
+
+
+def frame(sensor="head", seq=0):
+    return Frame(sensor, "image", Kind.COLOR, np.zeros((3, 4), np.uint8), "mono8", 1, 1, seq)
+
+
+@pytest.fixture
+def keep(monkeypatch):
+    """Starts a keeper on devices that are made one after the other; closed after the test."""
+    monkeypatch.setattr(capture, "FIRST_PAUSE_S", 0.1)
+    keepers = []
+
+    def keep(*make, on_open=lambda device: None):
+        makers = iter(make)
+        collector, bus = Collector(), LoopbackBus()
+        health = Health(bus, "capture", Speaker("demo", WallClock()))
+
+        def open_device():
+            return next(makers)()
+
+        keeper = DeviceKeeper("sim", open_device, on_open, collector, {"head": "tof"}, health, WallClock().monotonic)
+        keepers.append(keeper)
+        keeper.start()
+        return keeper, collector, health
+
+    yield keep
+    for keeper in keepers:
+        keeper.close(5)
+
+
+def no_device():
+    raise DeviceError("no such device; plug it in")
+
+
+def failing(reason):
+    def start(sink):
+        sink.on_state(DeviceState.STREAMING, "")
+        sink.on_frame(frame())
+        sink.on_state(DeviceState.FAILED, reason)
+
+    return lambda: FakeDevice(start=start)
+
+
+def working():
+    return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sink.on_frame(frame())))
+
+
+def eventually(condition):
+    for _ in range(500):
+        if condition():
+            return True
+        threading.Event().wait(0.01)
+    return False
+
+
+def test_a_failed_device_is_opened_again_in_a_later_epoch(keep):
+    _, collector, health = keep(failing("unplugged"), working)
+    first, second = collector.frames.get(timeout=5), collector.frames.get(timeout=5)
+    assert (first.sensor, second.sensor) == ("tof", "tof")
+    assert second.epoch > first.epoch
+    assert eventually(lambda: health.level == Level.OK)
+    assert health._counters["device.sim.reconnects"] == 1
+    assert eventually(lambda: health._labels["device.sim"] == "streaming")
+
+
+def test_what_is_wrong_with_a_device_is_said_until_it_can_be_opened(keep):
+    _, collector, health = keep(no_device, working)
+    assert eventually(lambda: health.level == Level.ERROR)
+    assert health._conditions["device sim"][1] == "sim: no such device; plug it in; trying again in 0.2 s"
+    assert collector.frames.get(timeout=5)
+    assert eventually(lambda: health.level == Level.OK)
+
+
+def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
+    def broken():
+        raise ZeroDivisionError("a mistake")
+
+    _, collector, _ = keep(broken, working)
+    assert collector.frames.get(timeout=5)
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_a_device_that_falls_silent_is_opened_again(keep, monkeypatch):
+    monkeypatch.setattr(capture, "SILENCE_NS", 1_000_000)
+    _, collector, _ = keep(working, working)
+    assert collector.frames.get(timeout=5).epoch < collector.frames.get(timeout=5).epoch
+
+
+def test_frames_of_heads_that_nobody_configured_are_counted_and_left_out(keep):
+    device = FakeDevice(start=lambda sink: [sink.on_frame(frame(sensor)) for sensor in ("other", "other", "head")])
+    _, collector, health = keep(lambda: device)
+    assert collector.frames.get(timeout=5).sensor == "tof"
+    assert eventually(lambda: health._counters["device.sim.unwanted"] == 2)
+    assert collector.frames.empty()
+
+
+def test_a_device_at_its_end_is_not_opened_again(keep):
+    device = FakeDevice(start=lambda sink: sink.on_state(DeviceState.CLOSED, "end of the recording"))
+    keeper, _, health = keep(lambda: device)
+    assert eventually(lambda: keeper.finished)
+    assert device.closed.wait(5)
+    assert health.level == Level.OK
+
+
+def test_a_device_that_does_not_fit_is_refused_and_closed(keep):
+    device = FakeDevice()
+
+    def refuse(_):
+        raise HeadError("no such head")
+
+    keeper, _, _ = keep(lambda: device, on_open=refuse)
+    assert eventually(lambda: keeper.refusal)
+    assert device.closed.wait(5)
+
+
+RIG = """
+version = 1
+name = "demo"
+devices.cam.uri = "fake:x"
+[sensors.tof]
+device = "cam"
+head = "head"
+noise = { type = "gaussian_polynomial", sigma = [[1e-2, 2e-3]] }
+[sensors.tof.camera]
+T_rs = { translation = [0.1, 0.2, 0.3] }
+[sensors.color]
+device = "cam"
+head = "other"
+"""
+
+
+@pytest.fixture
+def crier(tmp_path):
+    bus = LoopbackBus()
+    return bus, Crier(bus, Speaker("demo", WallClock()), config.loads(RIG, "rig.toml", tmp_path))
+
+
+def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(crier):
+    bus, crier = crier
+    crier.add_device("cam", FakeDevice())
+    told = {sample.topic: sample.payload for sample in bus.ask("**", 1)}
+    assert set(told) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
+    model = SensorModel.FromString(told["tof/model"])
+    assert (model.noise, model.fx, model.width) == ("gaussian_polynomial", 5.0, 4)
+    assert list(model.noise_parameters["sigma"].values) == [1e-2, 2e-3]
+    assert np.reshape(model.T_rs, (4, 4))[:3, 3].tolist() == [0.1, 0.2, 0.3]
+    assert SensorModel.FromString(told["color/model"]).calib_id == CAMERA.calib_id
+    calibration = CameraCalibration.FromString(told["tof/calibration"])
+    assert list(calibration.K) == [5, 0, 1.5, 0, 5, 1.0, 0, 0, 1]
+    assert (calibration.frame_id, len(calibration.D), len(calibration.P)) == ("tof", 8, 12)
+    assert "[sensors.tof]" in Config.FromString(told["config"]).toml
+    tof, color = FrameTransforms.FromString(told["tf"]).transforms
+    assert (tof.parent_frame_id, tof.child_frame_id, tof.rotation.w) == ("rig", "tof", 1.0)
+    x, y, z, w = pose.to_quaternion(CAMERA.T_rs)
+    assert (color.rotation.x, color.rotation.y, color.rotation.z, color.rotation.w) == (x, y, z, w)
+
+
+def test_a_head_that_the_device_does_not_have_is_explained(crier):
+    _, crier = crier
+    with pytest.raises(HeadError, match=r'sensors\.color: device "cam" has no head "other"; it has: head'):
+        crier.add_device("cam", FakeDevice(heads=["head"]))
+
+
+def test_the_schema_describes_every_message_on_the_wire():
+    pool = DescriptorPool()
+    for file in FileDescriptorSet.FromString(announcements.schema()).file:
+        pool.Add(file)
+    for message in MESSAGES:
+        assert pool.FindMessageTypeByName(message).full_name == message
+    assert keys.SCHEMA == "schema"

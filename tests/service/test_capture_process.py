@@ -1,0 +1,72 @@
+"""The real capture process: what a client of it sees, and how it ends."""
+
+import queue
+import signal
+
+import pytest
+from abs.v1.health_pb2 import Health
+
+from abs_service.bus.frames import FrameSubscriber
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.health import Level
+
+pytestmark = pytest.mark.slow  # each test starts an interpreter that imports and compiles everything
+
+
+@pytest.fixture
+def rig(tmp_path, endpoint):
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        f"""
+version = 1
+name = "demo"
+bus.endpoint = "{endpoint}"
+devices.sim.uri = "simulated://sheet?seed=1"
+sensors.tof.device = "sim"
+sensors.color.device = "sim"
+"""
+    )
+    return path
+
+
+def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint, launch):
+    with ZenohBus.open("demo", endpoint, Role.ROUTER) as bus:
+        changes, health = queue.SimpleQueue(), queue.SimpleQueue()
+        bus.watch_alive(lambda *change: changes.put(change))
+        bus.subscribe("health/capture", lambda sample: health.put(Health.FromString(sample.payload)))
+        subscriber = FrameSubscriber(bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")])
+        process = launch("capture", rig, "--connect", endpoint)
+        assert changes.get(timeout=60) == ("capture", True)
+        seen = {}
+        while len(seen) < 3:
+            frame = subscriber.take(60)
+            assert frame is not None
+            seen[frame.key] = frame
+        assert {sample.topic for sample in bus.ask("**", 2)} == {
+            *("config", "schema", "tf"),
+            *("tof/model", "tof/calibration", "color/model", "color/calibration"),
+        }
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(5) == 0
+        assert changes.get(timeout=5) == ("capture", False)
+        last = Health()
+        while not health.empty():
+            last = health.get()
+        assert last.level == Level.OK
+        assert last.labels["device.sim"] == "closed"
+        assert last.counters["published.tof/depth/image"] > 0
+
+
+def test_what_the_user_has_to_change_is_said_with_exit_code_2(rig, endpoint, launch):
+    with ZenohBus.open("other", endpoint, Role.ROUTER):
+        process = launch("capture", rig, "--listen", endpoint)
+        assert process.wait(30) == 2
+        assert process.stderr.read() == (
+            f'abs-service: error: bus.endpoint = "{endpoint}": the address is in use; '
+            "is another abs-service running? Stop it or choose another port\n"
+        )
+        rig.write_text(rig.read_text() + 'sensors.third.device = "sim"\n')
+        process = launch("capture", rig)
+        assert process.wait(30) == 2
+        assert 'sensors.third: device "sim" has no head "third"; it has: color, tof' in process.stderr.read()

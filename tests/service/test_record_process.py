@@ -1,0 +1,167 @@
+"""The real recorder process under what kills recordings: SIGKILL, a full disk, SIGTERM at any moment."""
+
+import queue
+import random
+import resource
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from abs.v1.health_pb2 import Health
+from mcap.reader import make_reader
+
+from abs_service import keys
+from abs_service.bus.contract import IMAGES
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.recovery import recover
+from abs_service.stamps import Speaker, WallClock
+from drivers import codec
+from drivers.frame import Frame, Geometry, Kind
+
+pytestmark = pytest.mark.slow  # each test starts at least one interpreter that imports everything
+
+FLUSH_S = 0.2
+TOPIC = keys.image("tof", "depth")
+
+
+@pytest.fixture
+def rig(tmp_path, endpoint):
+    """A configuration whose recordings go to `tmp_path / "kept"`."""
+    path = tmp_path / "rig.toml"
+    path.write_text(
+        f"""
+version = 1
+name = "demo"
+bus.endpoint = "{endpoint}"
+devices.sim.uri = "simulated://sheet?seed=1"
+sensors.tof.device = "sim"
+[record]
+directory = "kept"
+flush_s = {FLUSH_S}
+minimum_free_bytes = 0
+"""
+    )
+    return path
+
+
+class Stream:
+    """Publishes noisy frames at 200 Hz from a thread and listens to the recorder's health."""
+
+    def __init__(self, endpoint, shape=(48, 64)):
+        self._clock = WallClock()
+        self._speaker = Speaker("demo", self._clock)
+        self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
+        self._stop = threading.Event()
+        self._bus = ZenohBus.open("demo", endpoint, Role.ROUTER)
+        self.health = queue.SimpleQueue()
+        self._bus.subscribe("health/record", lambda sample: self.health.put(Health.FromString(sample.payload)))
+        self._thread = threading.Thread(target=self._run)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self._stop.set()
+        self._thread.join()
+        self._bus.close()
+
+    def wait_for(self, condition):
+        while not condition(health := self.health.get(timeout=20)):
+            pass
+        return health
+
+    def _run(self):
+        publisher = self._bus.publisher(TOPIC, codec.IMAGE_SCHEMA, IMAGES)
+        seq = 0
+        while not self._stop.wait(0.005):
+            t_ns = self._clock.monotonic()
+            frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
+            header = self._speaker.header(t_ns, seq)
+            publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
+            seq += 1
+
+
+def frames(path):
+    """(sequence, log time [s]) of every frame in a recording, which must be readable by its index."""
+    with path.open("rb") as stream:
+        return [
+            (message.sequence, message.log_time / 1e9)
+            for _, _, message in make_reader(stream).iter_messages(topics=f"/{TOPIC}")
+        ]
+
+
+def is_recording(health):
+    return health.counters["recorded"] > 20
+
+
+def test_a_killed_recorder_loses_a_second_at_most_and_the_next_one_recovers_the_rest(rig, endpoint, launch):
+    chance = random.Random(7)
+    killed_s = []
+    with Stream(endpoint) as stream:
+        for _ in range(3):
+            recorder = launch("record", rig)
+            stream.wait_for(is_recording)
+            time.sleep(chance.uniform(0.0, 0.7))
+            recorder.send_signal(signal.SIGKILL)
+            recorder.wait()
+            killed_s.append(time.time())
+        recorder = launch("record", rig)
+        stream.wait_for(lambda health: health.counters["recovered"] == 1)
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 0
+    recordings = sorted(rig.parent.glob("kept/*.mcap"))
+    assert len(recordings) == 4
+    assert not list(rig.parent.glob("kept/*.active"))
+    for path, end_s in zip(recordings, killed_s):
+        saved = frames(path)
+        assert end_s - saved[-1][1] < FLUSH_S + 0.8
+        assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1)), "a hole"
+
+
+def test_a_full_disk_is_said_and_nothing_more_is_written_and_the_file_is_recovered(rig, endpoint, launch):
+    limit = 300_000
+    recorder = launch("record", rig, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+    with Stream(endpoint) as stream:
+        health = stream.wait_for(lambda health: health.level == Health.LEVEL_ERROR)
+        assert health.message == "RECORD_FAILED [Errno 27] File too large"
+        later = stream.health.get(timeout=5)
+        assert (later.level, later.counters["files"]) == (Health.LEVEL_ERROR, 1)
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 1
+    assert recorder.stderr.read() == "abs-service: RECORD_FAILED [Errno 27] File too large\n"
+    (left,) = rig.parent.glob("kept/*")
+    assert left.stat().st_size <= limit
+    saved = frames(recover(left).target)
+    assert len(saved) > 20
+    assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1))
+
+
+def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, launch):
+    recorder = launch("record", rig)
+    with Stream(endpoint) as stream:
+        stream.wait_for(is_recording)
+        before_s = time.monotonic()
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 0
+        assert time.monotonic() - before_s < 3
+    (path,) = rig.parent.glob("kept/*")
+    assert path.suffix == ".mcap"
+    saved = frames(path)
+    assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1))
+
+
+def test_a_folder_that_cannot_be_made_is_explained(rig, launch):
+    (rig.parent / "kept").write_text("a file")
+    recorder = launch("record", rig)
+    assert recorder.wait(20) == 2
+    assert 'record.directory = "' in recorder.stderr.read()
+
+
+def test_a_rig_that_does_not_run_is_explained(rig, launch):
+    recorder = launch("record", rig)
+    assert recorder.wait(20) == 2
+    assert "nothing answers there" in recorder.stderr.read()
