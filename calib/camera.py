@@ -80,10 +80,16 @@ class Camera:
         Raises:
             LensError: if the lens has no inverse somewhere on the image.
         """
-        columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
-        distorted = np.stack([(columns - self.cx) / self.fx, (rows - self.cy) / self.fy], axis=-1)
-        ideal = self.lens.undistort(distorted)
-        directions = np.concatenate([ideal, np.ones((*ideal.shape[:2], 1))], axis=-1)
+        return self.directions(np.stack(np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1))
+
+    def directions(self, pixels: NDArray[np.floating | np.integer]) -> NDArray[np.float64]:
+        """Unit directions (…, 3) in sensor coordinates of the lines of sight through pixel coordinates (…, 2).
+
+        Raises:
+            LensError: if the lens has no inverse at one of them.
+        """
+        ideal = self.lens.undistort((pixels - np.array([self.cx, self.cy])) / (self.fx, self.fy))
+        directions = np.concatenate([ideal, np.ones((*ideal.shape[:-1], 1))], axis=-1)
         return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
     def unproject(self, distance: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -14,11 +14,14 @@ class Mesh:
         vertices: positions (n, 3) [m].
         faces: vertex indices (m, 3), counter-clockwise seen from outside.
         colors: red, green, blue (n, 3) in 0…255 from a colour sensor; NaN where none saw the vertex.
+        chart: flat coordinates (n, 2) of the vertices, in any unit, in which the mesh does not fold; first axis along
+            the object's long side.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     colors: NDArray[np.float32]
+    chart: NDArray[np.float64]
 
     @property
     def edges(self) -> NDArray[np.int32]:
@@ -40,4 +43,4 @@ class Mesh:
         """The same mesh with its vertices listed in another order: vertex i becomes the former vertex order[i]."""
         place = np.empty(len(order), np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
-        return Mesh(self.vertices[order], place[self.faces], self.colors[order])
+        return Mesh(self.vertices[order], place[self.faces], self.colors[order], self.chart[order])

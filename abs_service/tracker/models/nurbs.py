@@ -1,6 +1,6 @@
 """NURBS deformation: every vertex follows a spline surface whose control points are the parameters (eqs. 2–8)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -14,8 +14,8 @@ from calib.jit import kernel
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
 
-#: Largest distance [m] between a vertex and its place on the surface's normal that still counts as eq. 7.
-BINDING_TOLERANCE_M = 5e-4
+#: Largest distance [m] between a vertex and the normal of its closest surface point; the vertex moves onto the normal.
+BINDING_TOLERANCE_M = 1e-2
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Settings:
                 f"control_points = {list(self.control_points)} is too few for degree = {self.degree}: "
                 f"each direction needs at least {self.degree + 1}"
             )
-        u, w = _flat_parameters(mesh, self.margin)
+        u, w = _chart_parameters(mesh, self.margin)
         control = _fit_control_points(mesh.vertices, u, w, self)
         u, w, offset = bind(mesh.vertices, control, self.degree, u, w)
         return Nurbs(mesh, control, self.degree, u, w, offset)
@@ -56,7 +56,7 @@ class Nurbs:
     """A mesh bound to a NURBS surface; Θ lists x, y, z of the control points row by row [m].
 
     Attributes:
-        mesh: the mesh, its vertices sorted by knot span.
+        mesh: the mesh, its vertices sorted by knot span; a vertex at the surface's edge is moved onto its normal there.
         rest: control points Θ⁰ (dim,) of the rest surface [m].
         scales: ones (dim,), since every parameter is a length.
     """
@@ -73,7 +73,7 @@ class Nurbs:
         shape = control.shape[:2]
         span, self._span_control = spline.support(u, w, shape, degree)
         order = np.argsort(span, kind="stable")
-        self.mesh = mesh.reordered(order)
+        ordered = mesh.reordered(order)
         self.rest = control.reshape(-1)
         self.scales = np.ones_like(self.rest)
         self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
@@ -81,6 +81,7 @@ class Nurbs:
         tables = spline.rational_basis(u[order], w[order], degree, np.ones(shape))
         local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
         self._basis = np.ascontiguousarray(local.transpose(0, 2, 1), np.float32)
+        self.mesh = replace(ordered, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
@@ -110,7 +111,7 @@ def bind(
         u, w and offset o [m], each (n,).
 
     Raises:
-        ModelError: a vertex does not lie on the normal of its closest point, which is then at the surface's edge.
+        ModelError: a vertex is far from the normal of its closest point: at the surface's edge, or where it folds.
     """
     points = control.reshape(-1, 3)
     weights = np.ones(control.shape[:2])
@@ -136,18 +137,14 @@ def bind(
     return u, w, offset
 
 
-def _flat_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Parameters (n,) of the vertices on the object's principal plane, u along its long side, normal to the sensors."""
-    centered = mesh.vertices - mesh.vertices.mean(axis=0)
-    axes = np.linalg.svd(centered, full_matrices=False)[2]
-    if np.dot(np.cross(axes[0], axes[1]), mesh.normals.sum(axis=0)) < 0:
-        axes[1] = -axes[1]
-    plane = centered @ axes[:2].T
-    low, size = plane.min(axis=0), np.ptp(plane, axis=0)
-    if np.any(size < 1e-3):
-        raise ModelError("the object is thinner than a millimetre in the depth image: check the region")
-    u, w = ((plane - low) / size * (1 - 2 * margin) + margin).T
-    return u, w
+def _chart_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Surface parameters (n,) of the vertices: u along the chart's first axis; N̂ points as the mesh's normals do."""
+    low, size = mesh.chart.min(axis=0), np.ptp(mesh.chart, axis=0)
+    u, w = ((mesh.chart - low) / size * (1 - 2 * margin) + margin).T
+    chart = mesh.chart[mesh.faces]
+    (a, b), (c, d) = (chart[:, 1] - chart[:, 0]).T, (chart[:, 2] - chart[:, 0]).T
+    turn = np.sum(a * d - b * c)
+    return (u, w) if turn > 0 else (u, 1 - w)
 
 
 def _fit_control_points(
