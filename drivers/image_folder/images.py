@@ -1,0 +1,147 @@
+"""Image files as frames: what is read is checked, and never converted silently."""
+
+import heapq
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from drivers.frame import Frame, Geometry, Kind
+from drivers.image_folder.listing import ImageFile, ImageFolderError
+
+
+class Images(Protocol):
+    """The images of one stream."""
+
+    @property
+    def files(self) -> Sequence[ImageFile]:
+        """The images, in the order of their times."""
+        ...
+
+    @property
+    def camera(self) -> Camera:
+        """What took them."""
+        ...
+
+    def frame(self, file: ImageFile) -> Frame:
+        """Reads one of `files`.
+
+        Raises:
+            ImageFolderError: it is not such an image.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class DepthImages:
+    """Stream `depth` of sensor `depth`: 16-bit images of lengths.
+
+    Attributes:
+        files: the images.
+        camera: what took them.
+        scale: length of one unit [m].
+        geometry: which length, z or radial.
+        invalid: the value that means "no return".
+        masks: images that are black or transparent where the depth is to count as "no return", by sequence number.
+    """
+
+    files: Sequence[ImageFile]
+    camera: Camera
+    scale: float
+    geometry: Geometry = Geometry.Z
+    invalid: int = 0
+    masks: Mapping[int, Path] = field(default_factory=dict)
+
+    def frame(self, file: ImageFile) -> Frame:
+        """Reads a depth image and applies its mask, if it has one."""
+        depth = _read(file.path, self.camera)
+        if depth.dtype != np.uint16 or depth.ndim != 2:
+            raise ImageFolderError(f"{file.path}: depth must have one channel of 16 bits, this is {_format(depth)}")
+        filters: tuple[str, ...] = ()
+        if file.seq in self.masks:
+            depth = np.where(_mask(self.masks[file.seq], self.camera), depth, np.uint16(self.invalid))
+            filters = ("mask",)
+        return Frame(
+            sensor="depth",
+            stream="depth",
+            kind=Kind.DEPTH,
+            data=np.ascontiguousarray(depth, "<u2"),
+            encoding="16UC1",
+            t_host_ns=file.t_ns,
+            t_arrival_ns=file.t_ns,
+            seq=file.seq,
+            scale=self.scale,
+            geometry=self.geometry,
+            invalid=self.invalid,
+            clock_domain="file",
+            calib_id=self.camera.calib_id,
+            filters=filters,
+        )
+
+
+@dataclass(frozen=True)
+class ColorImages:
+    """Stream `color` of sensor `color`: 8-bit images, grey ones with three equal channels, transparency left out.
+
+    Attributes:
+        files: the images.
+        camera: what took them.
+    """
+
+    files: Sequence[ImageFile]
+    camera: Camera
+
+    def frame(self, file: ImageFile) -> Frame:
+        """Reads a colour image."""
+        image = _read(file.path, self.camera)
+        if image.dtype != np.uint8:
+            raise ImageFolderError(f"{file.path}: colour must have 8 bits per channel, this is {_format(image)}")
+        channels = np.repeat(image[..., None], 3, axis=-1) if image.ndim == 2 else image[..., 2::-1]
+        return Frame(
+            sensor="color",
+            stream="color",
+            kind=Kind.COLOR,
+            data=np.ascontiguousarray(channels),
+            encoding="rgb8",
+            t_host_ns=file.t_ns,
+            t_arrival_ns=file.t_ns,
+            seq=file.seq,
+            clock_domain="file",
+            calib_id=self.camera.calib_id,
+        )
+
+
+def in_order(streams: Sequence[Images]) -> Iterator[Frame]:
+    """The frames of all streams in the order of their times, each read when it is asked for."""
+    numbered = [[(file.t_ns, number, file) for file in images.files] for number, images in enumerate(streams)]
+    for _, number, file in heapq.merge(*numbered, key=lambda entry: entry[:2]):
+        yield streams[number].frame(file)
+
+
+def _read(path: Path, camera: Camera) -> NDArray[np.generic]:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise ImageFolderError(f"{path}: cannot be read as an image")
+    height, width = image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        expected = f"{camera.width} × {camera.height}"
+        raise ImageFolderError(f"{path}: the image has {width} × {height} pixels, its camera {expected}")
+    return image
+
+
+def _mask(path: Path, camera: Camera) -> NDArray[np.bool_]:
+    """Where a mask keeps what it covers: its alpha channel if it has one, else wherever it is not black."""
+    image = _read(path, camera)
+    if image.ndim == 2:
+        return image != 0
+    return image[..., 3] != 0 if image.shape[2] == 4 else np.any(image != 0, axis=-1)
+
+
+def _format(image: NDArray[np.generic]) -> str:
+    channels = 1 if image.ndim == 2 else image.shape[2]
+    return f"{channels} × {8 * image.dtype.itemsize} bit"

@@ -1,0 +1,88 @@
+"""Which image files belong to which moment."""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class ImageFolderError(Exception):
+    """A folder or file that cannot be imported; names it and what is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class ImageFile:
+    """One image and when it was taken.
+
+    Attributes:
+        path: of the file.
+        seq: number of the exposure.
+        t_ns: time of the exposure [ns], from the same origin for all images of a folder.
+    """
+
+    path: Path
+    seq: int
+    t_ns: int
+
+
+def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
+    """Files that match a pattern, in the order of the last number in their name, which counts exposures.
+
+    Args:
+        folder: where they are.
+        pattern: glob pattern, `depth_*.png`, say.
+        rate_hz: exposures per second; number n was taken n / rate_hz seconds after number 0.
+
+    Raises:
+        ImageFolderError: no such folder, no match, a name without a number, or two names with the same.
+    """
+    if not folder.is_dir():
+        raise ImageFolderError(f"{folder}: no such folder")
+    numbered: dict[int, Path] = {}
+    for path in sorted(folder.glob(pattern)):
+        numbers = re.findall(r"\d+", path.stem)
+        if not numbers:
+            raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
+        number = int(numbers[-1])
+        if number in numbered:
+            raise ImageFolderError(f"{path}: has the same number as {numbered[number].name}")
+        numbered[number] = path
+    if not numbered:
+        raise ImageFolderError(f"{folder}: no file matches {pattern!r}")
+    return [ImageFile(numbered[number], number, round(number * 1e9 / rate_hz)) for number in sorted(numbered)]
+
+
+def by_list(folder: Path, name: str) -> list[ImageFile]:
+    """Files named in a list of the TUM RGB-D benchmark: lines of a time [s] and a path; `#` begins a comment.
+
+    Raises:
+        ImageFolderError: no such list, a line that is not understood, or a file that is not there; names the line.
+    """
+    try:
+        lines = (folder / name).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ImageFolderError(f"{folder / name}: cannot be read: {getattr(error, 'strerror', 'not text')}") from error
+    times: dict[Path, int] = {}
+    for number, line in enumerate(lines, start=1):
+        fields = line.partition("#")[0].split()
+        if not fields:
+            continue
+        time = _nanoseconds(fields[0])
+        if len(fields) != 2 or time is None:
+            raise ImageFolderError(f"{folder / name}: line {number} must be a time and a path, not {line!r}")
+        path = folder / fields[1]
+        if not path.is_file():
+            raise ImageFolderError(f"{folder / name}: line {number}: there is no file {path}")
+        times[path] = time
+    if not times:
+        raise ImageFolderError(f"{folder / name}: names no image")
+    ordered = sorted(times.items(), key=lambda item: item[1])
+    return [ImageFile(path, seq, time) for seq, (path, time) in enumerate(ordered)]
+
+
+def _nanoseconds(text: str) -> int | None:
+    """A decimal number of seconds, 0 or more, as nanoseconds; exact, as a float of today's Unix time would not be."""
+    match = re.fullmatch(r"(\d{1,10})(?:\.(\d*))?", text)
+    if match is None:
+        return None
+    return int(match[1]) * 1_000_000_000 + math.floor(int((match[2] or "0")[:9].ljust(9, "0")))

@@ -1,0 +1,163 @@
+"""Image files become frames as they are, in the order they were taken; whatever does not fit is named."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from calib.camera import Camera
+from drivers.frame import Geometry, Kind
+from drivers.image_folder.images import ColorImages, DepthImages, in_order
+from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
+
+CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
+
+
+def save(path: Path, image: np.ndarray) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    assert cv2.imwrite(str(path), image)
+    return path
+
+
+def depth_image(value: int = 1000) -> np.ndarray:
+    return np.full((3, 4), value, np.uint16) + np.arange(4, dtype=np.uint16)
+
+
+def test_numbers_in_names_order_the_images_and_gaps_stay_gaps(tmp_path: Path) -> None:
+    for name in ("d2_10.png", "d2_9.png", "d2_12.png", "other_3.png"):
+        save(tmp_path / name, depth_image())
+    files = by_number(tmp_path, "d2_*.png", rate_hz=10.0)
+    assert [(file.path.name, file.seq, file.t_ns) for file in files] == [
+        ("d2_9.png", 9, 900_000_000),
+        ("d2_10.png", 10, 1_000_000_000),
+        ("d2_12.png", 12, 1_200_000_000),
+    ]
+
+
+def test_lists_name_images_and_their_times_exactly(tmp_path: Path) -> None:
+    for name in ("b.png", "a.png"):
+        save(tmp_path / "depth" / name, depth_image())
+    (tmp_path / "depth.txt").write_text(
+        "# depth maps\n1305031102.194330 depth/b.png\n\n1305031102.160407123 depth/a.png  # first\n"
+    )
+    files = by_list(tmp_path, "depth.txt")
+    assert [(file.path.name, file.seq, file.t_ns) for file in files] == [
+        ("a.png", 0, 1305031102_160407123),
+        ("b.png", 1, 1305031102_194330000),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        (None, "depth.txt: cannot be read: No such file"),
+        ("# nothing\n", "depth.txt: names no image"),
+        ("1.0 depth/a.png\nsoon depth/a.png\n", "depth.txt: line 2 must be a time and a path, not 'soon depth/a.png'"),
+        ("1.0\n", "depth.txt: line 1 must be a time and a path"),
+        ("1.0 depth/z.png\n", "depth.txt: line 1: there is no file .*z.png"),
+    ],
+)
+def test_errors_in_lists_name_the_line(tmp_path: Path, text: str | None, complaint: str) -> None:
+    save(tmp_path / "depth" / "a.png", depth_image())
+    if text is not None:
+        (tmp_path / "depth.txt").write_text(text)
+    with pytest.raises(ImageFolderError, match=complaint):
+        by_list(tmp_path, "depth.txt")
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"),
+    [
+        ([], "no file matches 'depth_\\*.png'"),
+        (["depth_left.png"], "depth_left.png: there is no number in its name"),
+        (["depth_1.png", "depth_01.png"], "depth_1.png: has the same number as depth_01.png"),
+    ],
+)
+def test_errors_in_names_name_the_file(tmp_path: Path, names: list[str], complaint: str) -> None:
+    for name in names:
+        save(tmp_path / name, depth_image())
+    with pytest.raises(ImageFolderError, match=complaint):
+        by_number(tmp_path, "depth_*.png", 30.0)
+
+
+def test_a_missing_folder_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ImageFolderError, match="nowhere: no such folder"):
+        by_number(tmp_path / "nowhere", "*.png", 30.0)
+
+
+def test_depth_is_what_the_file_holds(tmp_path: Path) -> None:
+    file = ImageFile(save(tmp_path / "d_7.png", depth_image()), 7, 70)
+    frame = DepthImages([file], CAMERA, 0.001, Geometry.RADIAL, invalid=1003).frame(file)
+    assert (frame.kind, frame.encoding, frame.geometry, frame.seq, frame.t_host_ns) == (
+        Kind.DEPTH,
+        "16UC1",
+        Geometry.RADIAL,
+        7,
+        70,
+    )
+    np.testing.assert_allclose(frame.si()[0], [1.0, 1.001, 1.002, np.nan])
+    assert frame.calib_id == CAMERA.calib_id
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_masks_leave_depth_out(tmp_path: Path, channels: int) -> None:
+    mask = np.zeros((3, 4) if channels == 1 else (3, 4, channels), np.uint8)
+    if channels == 4:
+        mask[..., :3] = 200  # what is transparent counts as black, whatever its colour
+    mask[1, 2] = 255
+    path = save(tmp_path / "m_7.png", mask)
+    file = ImageFile(save(tmp_path / "d_7.png", depth_image()), 7, 0)
+    frame = DepthImages([file], CAMERA, 0.001, masks={7: path}).frame(file)
+    assert np.count_nonzero(np.isfinite(frame.si())) == 1
+    assert frame.data[1, 2] == 1002
+    assert frame.filters == ("mask",)
+
+
+def test_colour_is_red_green_blue(tmp_path: Path) -> None:
+    bgr = np.zeros((3, 4, 3), np.uint8)
+    bgr[..., 0], bgr[..., 2] = 10, 200
+    bgra = np.dstack([bgr, np.full((3, 4), 9, np.uint8)])
+    gray = np.full((3, 4), 77, np.uint8)
+    for image, expected in ((bgr, (200, 0, 10)), (bgra, (200, 0, 10)), (gray, (77, 77, 77))):
+        file = ImageFile(save(tmp_path / "c_0.png", image), 0, 0)
+        frame = ColorImages([file], CAMERA).frame(file)
+        assert tuple(frame.data[2, 3]) == expected
+        assert frame.encoding == "rgb8"
+
+
+def test_frames_come_in_the_order_of_their_times(tmp_path: Path) -> None:
+    depth = [ImageFile(save(tmp_path / f"d_{k}.png", depth_image()), k, 100 * k) for k in range(3)]
+    color = [ImageFile(save(tmp_path / f"c_{k}.png", depth_image().astype(np.uint8)), k, 80 * k) for k in range(3)]
+    frames = in_order([DepthImages(depth, CAMERA, 0.001), ColorImages(color, CAMERA)])
+    assert [(frame.sensor, frame.t_host_ns) for frame in frames] == [
+        ("depth", 0),
+        ("color", 0),
+        ("color", 80),
+        ("depth", 100),
+        ("color", 160),
+        ("depth", 200),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("image", "complaint"),
+    [
+        (depth_image().astype(np.uint8), r"d_0.png: depth must have one channel of 16 bits, this is 1 × 8 bit"),
+        (np.dstack([depth_image()] * 3), r"d_0.png: depth must have one channel of 16 bits, this is 3 × 16 bit"),
+        (np.zeros((4, 4), np.uint16), r"d_0.png: the image has 4 × 4 pixels, its camera 4 × 3"),
+    ],
+)
+def test_depth_that_is_none_is_refused(tmp_path: Path, image: np.ndarray, complaint: str) -> None:
+    file = ImageFile(save(tmp_path / "d_0.png", image), 0, 0)
+    with pytest.raises(ImageFolderError, match=complaint):
+        DepthImages([file], CAMERA, 0.001).frame(file)
+
+
+def test_colour_of_16_bits_and_files_that_are_no_images_are_refused(tmp_path: Path) -> None:
+    file = ImageFile(save(tmp_path / "c_0.png", np.dstack([depth_image()] * 3)), 0, 0)
+    with pytest.raises(ImageFolderError, match=r"c_0.png: colour must have 8 bits per channel, this is 3 × 16 bit"):
+        ColorImages([file], CAMERA).frame(file)
+    file.path.write_bytes(b"no image")
+    with pytest.raises(ImageFolderError, match=r"c_0.png: cannot be read as an image"):
+        ColorImages([file], CAMERA).frame(file)
