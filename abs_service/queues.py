@@ -1,4 +1,7 @@
-"""Bounded queues between threads. None ever blocks the side that puts; each counts what it drops, by key."""
+"""Bounded queues between threads. None ever blocks the side that puts; each counts what it drops, by key.
+
+zenoh has channels of its own, but they do not say what they dropped, and one cannot wait on them for a limited time.
+"""
 
 import threading
 from collections import Counter, deque

@@ -10,7 +10,8 @@ import zenoh
 LEASE_MS = 2000
 #: How long a client looks for its router [ms].
 CONNECT_TIMEOUT_MS = 3000
-SHARED_MEMORY_POOL_BYTES = 64 << 20
+#: Two publishing processes fit into the 64 MB that a container has by default; without room, TCP takes over.
+SHARED_MEMORY_POOL_BYTES = 30 << 20
 
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
 

@@ -7,9 +7,11 @@ A file is called *.mcap.active until it is complete. What a crash leaves is reco
 """
 
 import argparse
+import errno
+import os
+import shutil
 import sys
 import threading
-from pathlib import Path
 
 from abs_service import config
 from abs_service.commands import participant
@@ -44,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, "record", speaker)
         bus.show_alive("record")
         # Beside the recording, which must not wait for what may take minutes.
-        threading.Thread(target=_recover_leftovers, args=(settings.directory, health), daemon=True).start()
+        threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock)
         recorder.start()
         while not stop.wait(0.2):
@@ -79,9 +81,12 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
     )
 
 
-def _recover_leftovers(directory: Path, health: Health) -> None:
-    for path in leftovers(directory):
+def _recover_leftovers(settings: RecorderSettings, health: Health) -> None:
+    for path in leftovers(settings.directory):
         try:
+            if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:
+                # Recording goes first: the copy must not take the room that it needs.
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             report = recover(path)
         except RecoveryError:
             continue  # another recorder's file, or one that holds nothing

@@ -135,6 +135,22 @@ with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
             process.kill()
 
 
+def test_everything_resumes_when_the_router_comes_back(buses, endpoint):
+    router, sender, receiver = buses
+    arrived = listen(receiver, "sheet/state")
+    publisher = sender.publisher("sheet/state", "abs.v1.DeformationState", STATE)
+    sender.announce("config", "abs.v1.Config").put(b"answer")
+    publish_until_heard(publisher, arrived, b"before")
+    router.close()
+    publisher.put(b"nobody hears this, and nothing blocks")
+    with ZenohBus.open("demo", endpoint, Role.ROUTER):
+        while publish_until_heard(publisher, arrived, b"after").payload != b"after":
+            pass
+        while not (answers := receiver.ask("config", 1)):
+            pass
+        assert answers[0].payload == b"answer"
+
+
 @pytest.mark.parametrize(
     "endpoint", ["", "7447", "tcp/127.0.0.1", "tcp/127.0.0.1:99999", "tcp/127.0.0.1:0", "ftp/127.0.0.1:1", "tcp/a b:1"]
 )

@@ -5,6 +5,7 @@ import threading
 
 import numpy as np
 import pytest
+from abs.v1.health_pb2 import Health as Message
 from abs.v1.sensor_model_pb2 import Config, SensorModel
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
@@ -13,6 +14,7 @@ from google.protobuf.descriptor_pool import DescriptorPool
 
 from abs_service import announcements, capture, config, keys
 from abs_service.capture import DeviceKeeper
+from abs_service.commands import capture as command
 from abs_service.commands.capture import Crier, HeadError
 from abs_service.envelope import MESSAGES
 from abs_service.health import Health, Level
@@ -220,6 +222,22 @@ def test_a_head_that_the_device_does_not_have_is_explained(crier):
     _, crier = crier
     with pytest.raises(HeadError, match=r'sensors\.color: device "cam" has no head "other"; it has: head'):
         crier.add_device("cam", FakeDevice(heads=["head"]))
+
+
+def test_a_step_of_the_wall_clock_is_said_once(crier):
+    bus, crier = crier
+    now = {"monotonic": 10**9, "wall": 10**18}
+    clock = WallClock(lambda: now["monotonic"], lambda: now["wall"])
+    health = Health(bus, "capture", Speaker("demo", clock))
+    levels = []
+    for step_ns in (0, 3600 * 10**9, 0):
+        now["monotonic"] += 10**9
+        now["wall"] += 10**9 + step_ns
+        command._tick(crier, {}, health, clock)
+        levels.append((health.level, health._counters["clock_steps"]))
+    assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
+    said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]
+    assert "somebody set the clock by +3600.000 s; stamps follow it" in said
 
 
 def test_the_schema_describes_every_message_on_the_wire():
