@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from calib.camera import Camera
 from calib.jit import kernel
@@ -16,6 +17,9 @@ SIGMA = 2.5
 
 #: How much darker a surface is that is seen edge-on than one that faces the camera.
 SHADING = 0.2
+
+#: Quantiles of the normal distribution at 65536 equal steps: looking one up takes a fifth of the time of drawing it.
+_NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)
 
 
 class Picture:
@@ -79,15 +83,16 @@ def _mosaic(levels: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:
-    noise = generator.standard_normal(levels.size, np.float32)
-    return _quantize(levels.reshape(-1), noise, np.float32(sigma)).reshape(levels.shape)
+    """Adds noise and rounds to 8 bits."""
+    draws = np.frombuffer(generator.bytes(2 * levels.size), np.uint16)
+    return _quantize(levels.reshape(-1), draws, np.float32(sigma) * _NORMAL).reshape(levels.shape)
 
 
 @kernel
-def _quantize(levels: NDArray[np.float32], noise: NDArray[np.float32], sigma: np.float32) -> NDArray[np.uint8]:
-    """Adds noise and rounds to 8 bits."""
+def _quantize(levels: NDArray[np.float32], draws: NDArray[np.uint16], noise: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Rounds levels (n,) plus the noise (65536,) that draws (n,) choose."""
     pixels = np.empty(levels.size, np.uint8)
     for i in range(levels.size):
-        value = levels[i] + sigma * noise[i] + np.float32(0.5)
+        value = levels[i] + noise[draws[i]] + np.float32(0.5)
         pixels[i] = np.uint8(min(max(value, np.float32(0)), np.float32(255)))
     return pixels
