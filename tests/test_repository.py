@@ -15,6 +15,7 @@ from packaging.version import Version
 import abs_service
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("abs_service", "drivers", "calib")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 # Where a path means the same on every Linux machine.
@@ -75,14 +76,25 @@ def test_the_newest_entry_of_the_changelog_is_this_version() -> None:
     assert abs_service.__version__ in headings
 
 
+def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    long = [f"{path} has {n} lines, the limit is 250" for path in texts if (n := len(texts[path].splitlines())) > 250]
+    for path, text in texts.items():
+        for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):
+            limit = 60 if "kernel" in map(ast.unparse, function.decorator_list) else 40
+            if (lines := _lines_of_code(function)) > limit:
+                long.append(f"{path}: {function.name} has {lines} lines, the limit is {limit}")
+    assert long == []
+
+
 def test_what_the_packages_import_is_required_by_name() -> None:
     declared = {_normal(Requirement(line).name) for line in PROJECT["project"]["dependencies"]}
     distributions = dict(packages_distributions()) | {"pydantic_core": ["pydantic"]}  # pydantic's own, documented by it
     undeclared = {
         f"{path.relative_to(ROOT)}: {module}"
-        for package in ("abs_service", "drivers", "calib")
+        for package in PACKAGES
         for path in (ROOT / package).rglob("*.py")
-        for module in _imported(path) - sys.stdlib_module_names - {"abs_service", "drivers", "calib", "abs"}
+        for module in _imported(path) - sys.stdlib_module_names - {*PACKAGES, "abs"}
         if module in distributions and not declared & set(map(_normal, distributions[module]))
     }
     assert undeclared == set()
@@ -118,3 +130,8 @@ def _imported(path: Path) -> set[str]:
     nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
     plain = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     return {name.split(".")[0] for name in [*plain, *(n.module or "" for n in nodes if isinstance(n, ast.ImportFrom))]}
+
+
+def _lines_of_code(function: ast.FunctionDef) -> int:
+    first = function.body[1] if ast.get_docstring(function) and len(function.body) > 1 else function.body[0]
+    return (function.body[0].lineno - function.lineno) + ((function.end_lineno or 0) - first.lineno + 1)
