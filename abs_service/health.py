@@ -85,12 +85,12 @@ class Health:
             self._labels[name] = value
 
     def report(self, condition: str, level: Level, message: str = "") -> None:
-        """Says how one condition is, in plain words; publishes at once if it changed."""
+        """Says how one condition is, in plain words; publishes at once if its level changed, else with the next tick."""
         with self._lock:
-            if self._conditions.get(condition, (Level.OK, "")) == (level, message):
-                return
+            before, _ = self._conditions.get(condition, (Level.OK, ""))
             self._conditions[condition] = (level, message)
-            self.publish()
+            if level != before:
+                self.publish()
 
     @property
     def level(self) -> Level:

@@ -31,6 +31,8 @@ def test_a_change_is_said_at_once_and_only_once():
     rig = Rig()
     for _ in range(3):
         rig.health.report("device sim", Level.ERROR, "sim is unplugged; plug it in")
+    for percent in range(3):
+        rig.health.report("tracking", Level.OK, f"{percent} % agree")
     rig.health.report("disk", Level.WARNING, "nearly full")
     rig.health.report("device sim", Level.OK)
     assert [(m.level, m.message) for m in rig.said] == [
