@@ -1,7 +1,9 @@
 """What a running rig said lately, gathered from its messages for people and scripts to read."""
 
+import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +36,7 @@ class Report:
         error_mm: mean distance of the vertices from where they truly are [mm].
         surface_mm: mean distance of the vertices from the true surface [mm].
         solve_ms: from the frame set to theta [ms].
-        age_ms: from the exposure to the publication [ms].
+        age_ms: from the exposure to the publication [ms]; None offline.
         generations, evaluations: what the search needed.
         skipped: frame sets passed over before this one.
     """
@@ -48,7 +50,7 @@ class Report:
     error_mm: float | None
     surface_mm: float | None
     solve_ms: float
-    age_ms: float
+    age_ms: float | None
     generations: int
     evaluations: int
     skipped: int
@@ -78,13 +80,23 @@ class Total:
 
 
 class TrackerLog:
-    """What one tracker said: its last estimate and totals over all of them."""
+    """What one tracker said.
+
+    Attributes:
+        last: its last estimate.
+        estimates, skipped: how many estimates it made, and how many frame sets it passed over.
+        error_mm, surface_mm, solve_ms: totals over all estimates.
+        seen_ns: exposure of every sensor that it used last, CLOCK_MONOTONIC [ns].
+        truth: what the errors are measured against.
+    """
 
     def __init__(self) -> None:
         self.last: Report | None = None
         self.estimates = 0
+        self.statuses: Counter[str] = Counter()
         self.skipped = 0
         self.error_mm, self.surface_mm, self.solve_ms = Total(), Total(), Total()
+        self.seen_ns: dict[str, int] = {}
         self.truth = TruthComparison()
         self._pending: DeformationState | None = None
 
@@ -93,6 +105,7 @@ class TrackerLog:
         if self._pending is not None:
             yield self._report(self._pending, None)
         self._pending = state
+        self.seen_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
 
     def take_mesh(self, mesh: DeformedMesh) -> Iterator[Report]:
         """Takes the deformed vertices of an estimate."""
@@ -100,6 +113,21 @@ class TrackerLog:
         if state is not None and state.header.t_host_ns == mesh.header.t_host_ns:
             self._pending = None
             yield self._report(state, _points(mesh.vertices_f32))
+
+    def summary(self) -> list[str]:
+        """What it did so far, in a line or two."""
+        line = f"{self.estimates} estimates, {self.skipped} frame sets skipped"
+        if self.estimates:
+            line += f", {self.solve_ms.mean:.1f} ms each"
+            line += ", " + ", ".join(f"{number} {status}" for status, number in self.statuses.most_common())
+        error, surface = self.error_mm, self.surface_mm
+        if not error.count:
+            return [line]
+        return [
+            line,
+            f"vertex error mean {error.mean:.2f} mm, max {error.max:.2f} mm; "
+            f"surface error mean {surface.mean:.2f} mm, max {surface.max:.2f} mm",
+        ]
 
     def _report(self, state: DeformationState, vertices: NDArray[np.float32] | None) -> Report:
         errors = None if vertices is None else self.truth.compare(state.header.t_host_ns, vertices)
@@ -113,24 +141,33 @@ class TrackerLog:
             error_mm=errors.vertex_mm if errors else None,
             surface_mm=errors.surface_mm if errors else None,
             solve_ms=state.solve_ms,
-            age_ms=state.age_ms,
+            age_ms=None if math.isnan(state.age_ms) else state.age_ms,
             generations=state.generations,
             evaluations=state.evaluations,
             skipped=state.skipped,
         )
         self.last, self.estimates, self.skipped = report, self.estimates + 1, self.skipped + report.skipped
+        self.statuses[report.status] += 1
         self.error_mm.add(report.error_mm)
         self.surface_mm.add(report.surface_mm)
         self.solve_ms.add(report.solve_ms)
         return report
 
 
-@dataclass
+@dataclass(frozen=True)
 class Heard:
-    """The last health of a component and when it came, CLOCK_MONOTONIC [ns]."""
+    """The last health of a component, when it came, CLOCK_MONOTONIC [ns], and the one before."""
 
     health: Health = field(default_factory=Health)
     t_ns: int = 0
+    before: "Heard | None" = None
+
+    def rate(self, gauge: str) -> float:
+        """How fast a gauge grew lately, per second; 0 if it shrank, as a file's size does when a new one begins."""
+        if self.before is None or self.t_ns <= self.before.t_ns:
+            return 0.0
+        growth = self.health.gauges.get(gauge, 0.0) - self.before.health.gauges.get(gauge, 0.0)
+        return max(growth, 0.0) * 1e9 / (self.t_ns - self.before.t_ns)
 
 
 class Live:
@@ -163,7 +200,8 @@ class Live:
     def _take(self, sample: Sample) -> list[Report]:
         if sample.message == Health.DESCRIPTOR.full_name:
             health = Health.FromString(sample.payload)
-            self.heard[health.component] = Heard(health, self._clock())
+            before = replace(self.heard.get(health.component, Heard()), before=None)
+            self.heard[health.component] = Heard(health, self._clock(), before if before.t_ns else None)
         elif sample.message == SurfaceTruth.DESCRIPTOR.full_name:
             self._take_truth(SurfaceTruth.FromString(sample.payload))
         elif (tracker := self.trackers.get(sample.topic.partition("/")[0])) is not None:

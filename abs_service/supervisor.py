@@ -183,7 +183,8 @@ class Supervisor:
 
     def _give_up(self, child: Child, reason: str) -> None:
         child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
-        _log.error("%s is given up: %s", child.component, reason)
+        if child is not self.refused():  # whose message is the last word of the whole run
+            _log.error("%s is given up: %s", child.component, reason)
 
     def _bury(self, child: Child) -> None:
         if child.process.poll() is None:

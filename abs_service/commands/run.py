@@ -1,0 +1,168 @@
+"""Tracks live: starts the devices, the trackers and the recorder of a rig, looks after them and shows how they are.
+
+  abs-service run                            the simulated demo rig, nothing to connect or configure
+  abs-service run rig.toml --out takes       your own sensors, recorded to takes/
+  abs-service run --no-record --json         one JSON object per estimate, for scripts
+  abs-service run --seed 3 --duration 20     another simulated motion, for 20 s
+
+Applications connect to bus.endpoint; the keys are abs/<rig>/<tracker>/state and so on. Ctrl-C ends everything in order.
+"""
+
+import argparse
+import logging
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
+
+from rich.console import Console
+
+from abs_service import config, keys
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.commands import participant
+from abs_service.display.lines import JsonDisplay, PlainDisplay
+from abs_service.display.table import TableDisplay
+from abs_service.display.view import Display
+from abs_service.exits import Exit
+from abs_service.processes import ChildProcess, Process
+from abs_service.session import Session
+from abs_service.stamps import WallClock
+from abs_service.supervisor import Child, Limits, Supervisor
+
+
+class ChildError(Exception):
+    """A child cannot work until the user changes something; the message is the child's own."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service run`."""
+    parser.add_argument(
+        "config", metavar="CONFIG", nargs="?", type=Path, help="TOML file of the rig (default: the simulated demo rig)"
+    )
+    parser.add_argument("--duration", metavar="S", type=float, default=float("inf"), help="end after this many seconds")
+    parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
+    parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
+    parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
+    parser.add_argument("--seed", metavar="N", type=int, help="seed of all simulated devices")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per estimate instead of a table")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Runs a rig until told to stop, until its devices are at their end, or until nothing can go on."""
+    rig = effective(participant.load_config(arguments), arguments)
+    stop = participant.stop_on_signals()
+    with (
+        ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
+        _file(rig) as path,
+        _display(as_json=arguments.json) as display,
+        _logging_to(display),
+    ):
+        supervisor = Supervisor(children(rig, path), partial(_spawn, display), time.monotonic_ns, limits(rig))
+        about = (rig.name, rig.bus.endpoint, rig.record.directory)
+        session = Session(bus, *about, rig.trackers, supervisor, display, WallClock())
+        try:
+            session.go_on_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
+        finally:
+            session.stop()
+        display.close(session.view())
+    refused = supervisor.refused()
+    if refused is not None:
+        raise ChildError(refused.reason.rpartition("abs-service: error: ")[2])
+    return supervisor.verdict() or Exit.OK
+
+
+def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
+    """The configuration with what the command line says in its place.
+
+    Raises:
+        KeyNameError: the rig cannot be called so.
+    """
+    record = {"enabled": rig.record.enabled and not arguments.no_record}
+    if arguments.out:
+        record["directory"] = arguments.out.resolve()
+    devices = rig.devices
+    if arguments.seed is not None:
+        devices = {
+            name: device.model_copy(update={"uri": with_seed(device.uri, arguments.seed)})
+            for name, device in devices.items()
+        }
+    changes = {
+        "name": keys.check_name(arguments.rig or rig.name),
+        "devices": devices,
+        "record": rig.record.model_copy(update=record),
+    }
+    return rig.model_copy(update=changes)
+
+
+def with_seed(uri: str, seed: int) -> str:
+    """The address of a simulated device with another seed; any other address as it is."""
+    parts = urlsplit(uri)
+    if parts.scheme != "simulated":
+        return uri
+    query = dict(parse_qsl(parts.query, keep_blank_values=True)) | {"seed": str(seed)}
+    return urlunsplit(parts._replace(query=urlencode(query, safe=",")))
+
+
+def children(rig: config.ServiceConfig, path: Path) -> list[Child]:
+    """The processes of a rig whose effective configuration is in the file `path`; the recorder is to stop last."""
+    trackers = [Child(f"track/{name}", ("track", str(path), name), 1) for name in rig.trackers]
+    recorder = [Child("record", ("record", str(path)), 2)] if rig.record.enabled else []
+    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder]
+
+
+def limits(rig: config.ServiceConfig) -> Limits:
+    """How much patience the configuration asks for."""
+    table = rig.run
+    seconds = (table.window_s, table.startup_s, table.stall_s, table.stop_s)
+    return Limits(table.restarts, *(int(value * 1e9) for value in seconds))
+
+
+def _spawn(display: Display, component: str, arguments: Sequence[str]) -> Process:
+    return ChildProcess(component, arguments, partial(_pass_on, display))
+
+
+def _pass_on(display: Display, component: str, line: str) -> None:
+    # An error that ends a child is what this process will end with, and say once.
+    if line and not line.startswith("abs-service: error: "):
+        display.note(f"{component}: {line}")
+
+
+def _display(as_json: bool) -> Display:
+    if as_json:
+        return JsonDisplay(sys.stdout, sys.stderr)
+    return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)
+
+
+@contextmanager
+def _file(rig: config.ServiceConfig) -> Iterator[Path]:
+    """The effective configuration as a file, for the children."""
+    with tempfile.NamedTemporaryFile("w", prefix=f"{rig.name}-", suffix=".toml", encoding="utf-8") as file:
+        file.write(config.to_toml(rig))
+        file.flush()
+        yield Path(file.name)
+
+
+class _Notes(logging.Handler):
+    def __init__(self, display: Display) -> None:
+        super().__init__()
+        self._display = display
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._display.note(self.format(record))
+
+
+@contextmanager
+def _logging_to(display: Display) -> Iterator[None]:
+    """Log records as notes of the display, because lines written past it would tear a table apart."""
+    root = logging.getLogger()
+    before = root.handlers[:]
+    root.handlers[:] = [_Notes(display)]
+    try:
+        yield
+    finally:
+        root.handlers[:] = before

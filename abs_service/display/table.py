@@ -1,0 +1,156 @@
+"""The live table in a terminal."""
+
+from typing import Self
+
+from abs.v1.health_pb2 import Health
+from rich.console import Console, Group, RenderableType
+from rich.live import Live as LiveRegion
+from rich.markup import escape
+from rich.spinner import Spinner
+from rich.table import Table
+from rich.text import Text
+
+from abs_service.display.view import View, size
+from abs_service.live import Report, TrackerLog
+from abs_service.supervisor import State
+
+REFRESH_HZ = 6
+
+_STATUS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
+_STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", State.PAUSED: "yellow"}
+
+
+class TableDisplay:
+    """A table that is drawn anew some times a second, below whatever was said in passing.
+
+    Args:
+        console: the terminal.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._spinner = Spinner("dots", style="cyan")
+        self._region = LiveRegion(console=console, refresh_per_second=REFRESH_HZ, transient=True)
+
+    def __enter__(self) -> Self:
+        self._region.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Gives the terminal back."""
+        self._region.stop()
+
+    def update(self, view: View) -> None:
+        """See `Display`; the region draws by itself what it was given last."""
+        self._region.update(draw(view, self._spinner))
+
+    def estimate(self, report: Report) -> None:
+        """The table shows the last estimate only."""
+
+    def note(self, text: str) -> None:
+        """See `Display`."""
+        self._console.print(Text(text, style="dim"))
+
+    def close(self, view: View) -> None:
+        """See `Display`; leaves the last table in the terminal."""
+        self._region.stop()
+        self._console.print(draw(view, Text("")))
+        self._console.print("\n".join(view.summary()), highlight=False, markup=False)
+
+
+def draw(view: View, spinner: Spinner | Text) -> RenderableType:
+    """The whole table; `spinner` moves while something is waited for."""
+    parts: list[RenderableType] = [_head(view), _streams(view)]
+    if view.live.trackers:
+        parts.append(_trackers(view))
+    parts += [_recording(view), _processes(view)]
+    parts += [Text(f" {component}: {message}", style=_level(level)) for component, level, message in view.troubles]
+    if view.activity and isinstance(spinner, Spinner):
+        spinner.update(text=f" {view.activity}")
+        parts.append(spinner)
+    return Group(*parts)
+
+
+def _level(level: int) -> str:
+    return "red" if level == Health.LEVEL_ERROR else "yellow"
+
+
+def _head(view: View) -> Text:
+    minutes, seconds = divmod(int(view.elapsed_s), 60)
+    return Text.assemble(
+        (f" {view.rig}", "bold"), f"   {minutes:02d}:{seconds:02d}   applications connect to ", (view.endpoint, "cyan")
+    )
+
+
+def _table(*columns: str) -> Table:
+    # The first column is a name; what follows are numbers.
+    table = Table(box=None, padding=(0, 2, 0, 1), header_style="dim", pad_edge=False)
+    for index, column in enumerate(columns):
+        table.add_column((" " if index == 0 else "") + column, justify="left" if index == 0 else "right", no_wrap=True)
+    return table
+
+
+def _streams(view: View) -> RenderableType:
+    table = _table("stream", "rate", "age", "images", "dropped")
+    for stream in view.streams:
+        table.add_row(
+            f" {stream.name}",
+            f"{stream.rate_hz:.1f} Hz",
+            "–" if stream.age_ms is None else f"{stream.age_ms:.0f} ms",
+            str(stream.published),
+            Text(str(stream.dropped), style="yellow" if stream.dropped else ""),
+        )
+    return table if view.streams else Text(" no images yet", style="dim")
+
+
+def _trackers(view: View) -> RenderableType:
+    table = _table("tracker", "status", "error", "surface", "solve", "age", "search", "skipped")
+    parts: list[RenderableType] = [table]
+    for name, tracker in view.live.trackers.items():
+        table.add_row(f" {name}", *_numbers(tracker))
+        if tracker.last is not None:
+            parts.append(_theta(name, tracker.last))
+            parts += [Text(f" {name}: {reason}", style="yellow") for reason in tracker.last.reasons]
+    return Group(*parts)
+
+
+def _numbers(tracker: TrackerLog) -> list[RenderableType]:
+    last = tracker.last
+    if last is None:
+        return [Text("–", style="dim")] * 7
+    return [
+        Text(last.status, style=_STATUS.get(last.status, "")),
+        "–" if last.error_mm is None else f"{last.error_mm:.2f} mm",
+        "–" if last.surface_mm is None else f"{last.surface_mm:.2f} mm",
+        f"{last.solve_ms:.1f} ms",
+        f"{last.age_ms:.0f} ms",
+        f"{last.generations}/{last.evaluations}",
+        str(tracker.skipped),
+    ]
+
+
+def _theta(name: str, report: Report) -> Text:
+    numbers = " ".join(f"{value:+.3f}" for value in report.theta)
+    text = Text(f" {name} Θ[{len(report.theta)}] {numbers}", style="dim", no_wrap=True, overflow="ellipsis")
+    return text
+
+
+def _recording(view: View) -> Text:
+    recording = view.recording
+    if recording is None:
+        return Text(" not recording", style="dim")
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(f" recording {recording.file.name}  {size(recording.size)}  {size(recording.rate)}/s  ")
+    text.append(f"{recording.dropped} dropped", style="yellow" if recording.dropped else "")
+    return text
+
+
+def _processes(view: View) -> Text:
+    text = Text(" processes")
+    for child in view.children:
+        number = str(child.process.pid) if child.state is State.RUNNING else child.state.value
+        text.append(f"  {escape(child.component)} ")
+        text.append(number, style=_STATE.get(child.state, "dim"))
+        if child.restarts:
+            text.append(f" restarted {child.restarts}×", style="yellow")
+    return text

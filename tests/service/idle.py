@@ -1,0 +1,26 @@
+"""A process that does nothing until it is asked to end."""
+
+
+class Idle:
+    """Keeps the promises of `abs_service.processes.Process`; notes its name in `ended` when it is asked to end."""
+
+    def __init__(self, component: str = "", ended: list[str] | None = None):
+        self._component, self._ended = component, [] if ended is None else ended
+        self._code: int | None = None
+
+    @property
+    def pid(self) -> int:
+        return 4711
+
+    def poll(self) -> int | None:
+        return self._code
+
+    def terminate(self) -> None:
+        self._ended.append(self._component)
+        self._code = 0
+
+    def kill(self) -> None:
+        self.terminate()
+
+    def last_words(self) -> str:
+        return ""
