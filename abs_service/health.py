@@ -85,7 +85,7 @@ class Health:
             self._labels[name] = value
 
     def report(self, condition: str, level: Level, message: str = "") -> None:
-        """Says how one condition is, in plain words; a change of level is published at once, the rest with the next tick."""
+        """Says how one condition is, in plain words; a change of level is published at once, all else with `tick`."""
         with self._lock:
             before, _ = self._conditions.get(condition, (Level.OK, ""))
             self._conditions[condition] = (level, message)

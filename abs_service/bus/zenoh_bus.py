@@ -34,10 +34,12 @@ class ZenohBus:
     def __init__(self, session: zenoh.Session, rig: str) -> None:
         self._session = session
         self._rig = keys.check_name(rig)
+        self._kept: list[Subscription] = []
 
     @classmethod
     def open(cls, rig: str, endpoint: str, role: Role, shared_memory: bool = True) -> Self:
         """Opens a session and a bus on it; errors as in `open_session`."""
+        keys.check_name(rig)  # before there is a session to be closed
         return cls(open_session(endpoint, role, shared_memory), rig)
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
@@ -72,7 +74,7 @@ class ZenohBus:
         def on_query(query: zenoh.Query) -> None:
             query.reply(key, payload(), encoding=f"{ENCODING};{message}")
 
-        return _Declared(self._session.declare_queryable(key, on_query))
+        return self._keep(self._session.declare_queryable(key, on_query))
 
     def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.ask`."""
@@ -82,13 +84,13 @@ class ZenohBus:
     def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
         """See `contract.Bus.subscribe`."""
         # The bytes are copied here, in zenoh's thread, so that a slow reader never holds shared memory.
-        return _Declared(
+        return self._keep(
             self._session.declare_subscriber(self._key(pattern), lambda sample: on_sample(self._sample(sample)))
         )
 
     def show_alive(self, component: str) -> Subscription:
         """See `contract.Bus.show_alive`."""
-        return _Declared(self._session.liveliness().declare_token(self._key(keys.live(component))))
+        return self._keep(self._session.liveliness().declare_token(self._key(keys.live(component))))
 
     def watch_alive(self, on_change: Callable[[str, bool], None]) -> Subscription:
         """See `contract.Bus.watch_alive`."""
@@ -99,7 +101,7 @@ class ZenohBus:
             on_change(component, sample.kind == zenoh.SampleKind.PUT)
 
         tokens = self._session.liveliness()
-        return _Declared(tokens.declare_subscriber(self._key(keys.live("**")), on_token, history=True))
+        return self._keep(tokens.declare_subscriber(self._key(keys.live("**")), on_token, history=True))
 
     def close(self) -> None:
         """Ends the session; may be called again."""
@@ -113,6 +115,11 @@ class ZenohBus:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _keep(self, declared: Any) -> Subscription:
+        # zenoh takes back a token, and may take back the rest, when Python forgets the object.
+        self._kept.append(_Declared(declared))
+        return self._kept[-1]
 
     def _key(self, topic: str) -> str:
         return keys.key(self._rig, topic)

@@ -1,5 +1,6 @@
 """The bus on real sessions: what arrives, what does not block, and which errors are understood."""
 
+import gc
 import queue
 import subprocess
 import sys
@@ -76,6 +77,9 @@ def test_components_come_and_go(buses):
     assert changes.get(timeout=5) == ("track/sheet", False)
     one.show_alive("capture")
     assert changes.get(timeout=5) == ("capture", True)
+    gc.collect()
+    with pytest.raises(queue.Empty):
+        changes.get(timeout=0.3)  # nobody has to hold on to what was declared
     one.close()
     assert changes.get(timeout=5) == ("capture", False)
 

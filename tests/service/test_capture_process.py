@@ -47,6 +47,7 @@ def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint,
             *("config", "schema", "tf"),
             *("tof/model", "tof/calibration", "color/model", "color/calibration"),
         }
+        assert changes.empty(), "it is not alive for others any more"
         process.send_signal(signal.SIGTERM)
         assert process.wait(5) == 0
         assert changes.get(timeout=5) == ("capture", False)
