@@ -11,13 +11,11 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 
 import abs_service
+from abs_service import keys
 from abs_service.envelope import MESSAGES
 from calib import pose
 from calib.camera import Camera
 from drivers.mcap_file import file_descriptor_set
-
-#: Coordinate frame that all poses refer to.
-RIG_FRAME = "rig"
 
 
 def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:
@@ -41,7 +39,7 @@ def transforms(cameras: Mapping[str, Camera], wall_ns: int) -> FrameTransforms:
     """Where the sensors are in the rig, by sensor name."""
     message = FrameTransforms()
     for sensor, camera in cameras.items():
-        transform = message.transforms.add(parent_frame_id=RIG_FRAME, child_frame_id=sensor)
+        transform = message.transforms.add(parent_frame_id=keys.RIG_FRAME, child_frame_id=sensor)
         transform.timestamp.FromNanoseconds(wall_ns)
         x, y, z = camera.center.tolist()
         transform.translation.x, transform.translation.y, transform.translation.z = x, y, z

@@ -48,6 +48,8 @@ OURS = frozenset({"abs_service", "drivers", "calib"})
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
+    # Read when NumPy is first imported. Its matrices are small here: more threads cost time, and order of summation.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     lifeline.hold()
     given = list(sys.argv[1:] if argv is None else argv)
     if not given:

@@ -7,6 +7,9 @@ CONFIG = "config"
 SCHEMA = "schema"
 TRANSFORMS = "tf"
 
+#: Coordinate frame that all poses and vertices refer to.
+RIG_FRAME = "rig"
+
 #: First parts of topics that no sensor, device or tracker may be called.
 RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "health", "live"})
 

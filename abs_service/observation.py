@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.rig import Rig
+from calib.noise.color import GaussianColor
+from calib.rig import Rig, Sensor
 from drivers.frame import Frame, FrameSet, Geometry, Kind
 
 
@@ -80,7 +81,7 @@ class Observer:
             members = {frame.kind: frame for frame in frames.frames.values() if frame.sensor == name}
             for frame in members.values():
                 _check_size(frame, sensor.camera)
-            if Kind.DEPTH in members:
+            if Kind.DEPTH in members and (Kind.AMPLITUDE in members or not _needs_amplitude(sensor)):
                 images[name] = self._depth(members[Kind.DEPTH], members.get(Kind.AMPLITUDE))
                 sources[name] = Source(members[Kind.DEPTH].seq, members[Kind.DEPTH].t_host_ns)
             elif Kind.COLOR in members:
@@ -100,6 +101,10 @@ class Observer:
 def _ray_length(camera: Camera) -> NDArray[np.float32]:
     """Radial distance per unit of z of every pixel (height, width)."""
     return (1 / camera.rays()[..., 2]).astype(np.float32)
+
+
+def _needs_amplitude(sensor: Sensor) -> bool:
+    return not isinstance(sensor.noise, GaussianColor) and sensor.noise.uses_amplitude
 
 
 def _rgb(frame: Frame) -> NDArray[np.uint8]:

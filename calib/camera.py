@@ -82,13 +82,13 @@ class Camera:
         """
         return self.directions(np.stack(np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1))
 
-    def directions(self, pixels: NDArray[np.floating | np.integer]) -> NDArray[np.float64]:
+    def directions(self, pixels: NDArray[np.number]) -> NDArray[np.float64]:
         """Unit directions (…, 3) in sensor coordinates of the lines of sight through pixel coordinates (…, 2).
 
         Raises:
             LensError: if the lens has no inverse at one of them.
         """
-        ideal = self.lens.undistort((pixels - np.array([self.cx, self.cy])) / (self.fx, self.fy))
+        ideal = self.lens.undistort((np.asarray(pixels, np.float64) - (self.cx, self.cy)) / (self.fx, self.fy))
         directions = np.concatenate([ideal, np.ones((*ideal.shape[:-1], 1))], axis=-1)
         return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 

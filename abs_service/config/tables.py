@@ -78,6 +78,7 @@ class TrackerTable(Table):
         model, region, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, `.regions`, ….
         mesh: the triangle mesh.
         priors, status: `Settings` of `abs_service.tracker.priors` and of `.status`.
+        budget_ms: time that the live search may take per frame set; replay does not look at the clock.
     """
 
     sensors: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -89,6 +90,7 @@ class TrackerTable(Table):
     priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "cma"})
+    budget_ms: Positive = 24.0
 
 
 class RecordTable(Table):

@@ -5,11 +5,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import quote, unquote, urlsplit, urlunsplit
 
 from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from abs_service import keys, plugins
+
+
+#: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
+FILE_SCHEMES = frozenset({"replay"})
 
 
 def _endpoint(value: str) -> str:
@@ -19,10 +24,14 @@ def _endpoint(value: str) -> str:
     return value
 
 
-def _uri(value: str) -> str:
+def _uri(value: str, info: ValidationInfo) -> str:
     if not re.fullmatch(r"[a-z][a-z0-9_]*:\S+", value):
         raise ValueError('a device URI begins with the name of its driver, for example "simulated://sheet?seed=1"')
-    return value
+    parts = urlsplit(value)
+    if parts.scheme not in FILE_SCHEMES:
+        return value
+    path = _base(info) / unquote(parts.netloc + parts.path)
+    return urlunsplit(parts._replace(netloc="", path=quote(str(path))))
 
 
 def _stream(value: str) -> str:

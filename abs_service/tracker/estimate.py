@@ -1,11 +1,13 @@
 """The answer of the tracker to one observation."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.observation import Source
 from abs_service.tracker.terms.base import SensorFit
 
 
@@ -34,6 +36,7 @@ class Estimate:
         generations, evaluations: effort of the search.
         inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
         fits: how every sensor agrees.
+        sources: exposure of every sensor that contributed.
         missing: sensors that did not contribute.
     """
 
@@ -49,4 +52,5 @@ class Estimate:
     evaluations: int
     inlier_share: float
     fits: tuple[SensorFit, ...]
+    sources: Mapping[str, Source]
     missing: tuple[str, ...]

@@ -46,8 +46,8 @@ def grid_mesh(distance: NDArray[np.float32], camera: Camera, vertices: int) -> M
     """Lays a square grid over the object in the image, along the sides of the smallest rectangle around it.
 
     What one camera sees is one distance per direction, so the grid never folds, whatever the object's shape. Every
-    vertex is a plane fitted to the distances around it, so it is less noisy than a pixel; where the object is not, there
-    is no vertex, so the mesh has its outline.
+    vertex is a plane fitted to the distances around it, so it is less noisy than a pixel; where the object is not,
+    there is no vertex, so the mesh has its outline.
 
     Args:
         distance: radial distances (height, width) [m], NaN outside the object.
@@ -100,7 +100,7 @@ def _colors_in(image: ColorImage, camera: Camera, positions: NDArray[np.float64]
 
 
 def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
-    """Pixel coordinates (rows, columns, 2) of a grid over the smallest rectangle around pixels (k, 2), long side first."""
+    """Pixel coordinates (rows, columns, 2) of a grid over the smallest rectangle around pixels (k, 2)."""
     center, size, angle = cv2.minAreaRect(pixels)
     if size[0] < size[1]:
         size, angle = size[::-1], angle + 90

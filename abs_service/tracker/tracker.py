@@ -90,6 +90,7 @@ class Tracker:
             evaluations=evaluations,
             inlier_share=share,
             fits=fits,
+            sources=observation.sources,
             missing=observation.missing,
         )
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+from abs.v1.frame_info_pb2 import FrameInfo
 from abs.v1.sensor_model_pb2 import SensorModel
 from google.protobuf.message import DecodeError
 from mcap.records import Message
 
-from calib.camera import Camera, CameraError
-from calib.lens import Lens, LensError
+from calib.camera import Camera
 from drivers import codec
 from drivers.codec import CodecError
 from drivers.device import Truth
@@ -32,6 +32,7 @@ class Recording:
         path: of the file.
         truncated: whether the file was never finished.
         duration_s: from the first to the last message [s].
+        wall_offset_ns: wall-clock time minus `t_host_ns` of the first frame [ns]; 0 if there is none.
         counts: number of images by (sensor, stream).
         models: what the recording says about each sensor, by sensor name.
         cameras: the camera model of each sensor, by sensor name.
@@ -47,9 +48,10 @@ class Recording:
         self.path = path
         self.truncated = contents.truncated
         self.duration_s = (contents.end_ns - contents.start_ns) * 1e-9
+        self._contents = contents
+        self.wall_offset_ns = self._wall_offset()
         self.config = contents.attachments.get("rig.toml", b"").decode("utf-8", "replace")
         self.unpaired = 0
-        self._contents = contents
         self.counts = _image_counts(path, contents)
         self.models = self._read_models()
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
@@ -100,6 +102,14 @@ class Recording:
                     message = heapq.heappop(held)[-1]
                     yield self._contents.topics[message.channel_id], message
 
+    def _wall_offset(self) -> int:
+        for _, message in self._messages({codec.INFO_SCHEMA}):
+            try:
+                return message.log_time - FrameInfo.FromString(message.data).header.t_host_ns
+            except DecodeError as error:
+                raise RecordingError(f"{self.path}: a frame is described by no {codec.INFO_SCHEMA}: {error}") from error
+        return 0
+
     def _read_models(self) -> dict[str, SensorModel]:
         """The first model of every sensor."""
         missing = {
@@ -119,18 +129,9 @@ class Recording:
 
     def _camera(self, model: SensorModel) -> Camera:
         try:
-            return Camera(
-                model.width,
-                model.height,
-                model.fx,
-                model.fy,
-                model.cx,
-                model.cy,
-                Lens(np.array(model.lens)),
-                np.array(model.T_rs, float).reshape(4, 4),
-            )
-        except (CameraError, LensError, ValueError) as error:
-            raise RecordingError(f"{self.path}: the model of sensor {model.sensor!r} is no camera: {error}") from error
+            return codec.decode_camera(model)
+        except CodecError as error:
+            raise RecordingError(f"{self.path}: {error}") from error
 
 
 def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], int]:

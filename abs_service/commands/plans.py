@@ -1,0 +1,63 @@
+"""From the configuration to what a tracker is made of."""
+
+from collections.abc import Mapping
+
+from abs_service import plugins
+from abs_service.config import ServiceConfig
+from abs_service.tracking import Plan
+from calib.camera import Camera
+from calib.rig import Rig, Sensor
+
+
+class PlanError(Exception):
+    """A tracker that cannot be made from this configuration and these sensors."""
+
+
+def plan(config: ServiceConfig, tracker: str) -> Plan:
+    """The plan of one tracker.
+
+    Raises:
+        PlanError: the configuration has no such tracker, or its reference is none of its sensors.
+    """
+    if tracker not in config.trackers:
+        raise PlanError(
+            f'there is no tracker "{tracker}"; the configuration has: {", ".join(config.trackers) or "none"}'
+        )
+    table = config.trackers[tracker]
+    reference = config.reference(tracker)[0]
+    if reference not in table.sensors:
+        raise PlanError(
+            f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
+            f'the sensor of the tracker\'s reference, "{reference}"'
+        )
+    return Plan(
+        reference=reference,
+        model=table.model,
+        region=table.region,
+        objective=table.objective,
+        optimizer=table.optimizer,
+        vertices=table.mesh.vertices,
+        priors=table.priors,
+        status=table.status,
+    )
+
+
+def model_name(config: ServiceConfig, tracker: str) -> str:
+    """`type` of a tracker's deformation model."""
+    return plugins.table(config.trackers[tracker].model)["type"]
+
+
+def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> Rig:
+    """The sensors of one tracker with their cameras and noise models.
+
+    Raises:
+        PlanError: a sensor has no camera or no noise model.
+    """
+    sensors: dict[str, Sensor] = {}
+    for name in config.trackers[tracker].sensors:
+        noise = config.sensors[name].noise
+        if name not in cameras or noise is None:
+            missing = "noise model" if name in cameras else "camera model"
+            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no {missing}')
+        sensors[name] = Sensor(name, cameras[name], noise.build())
+    return Rig(config.name, sensors)

@@ -1,0 +1,159 @@
+"""Tracks a recording again: every frame set, nothing dropped, the same estimates each time; writes them to a new file.
+
+  abs-service replay recordings/x.mcap                          with the configuration that it was recorded with
+  abs-service replay recordings/x.mcap --config rig.toml        with another one
+  abs-service replay recordings/x.mcap --json > estimates.jsonl one JSON object per estimate, for scripts
+  abs-service replay recordings/x.mcap --speed 1                in real time, through the processes of `run`
+
+The configuration's devices are not opened. Cameras come from the recording, unless the configuration has its own.
+"""
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from abs_service import config
+from abs_service.commands import plans
+from abs_service.commands import run as run_command
+from abs_service.exits import Exit
+from abs_service.replay import OfflineTracker, free_path, replay
+from abs_service.stamps import Speaker, WallClock
+from abs_service.synchroniser import Synchroniser
+from abs_service.tracking import Tracking, streams
+from drivers.mcap_file import McapFile
+from drivers.replay import Recording
+
+
+class ReplayOptionError(Exception):
+    """Options that do not fit the recording."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service replay`."""
+    parser.add_argument("recording", metavar="FILE", type=Path, help="recording to track")
+    parser.add_argument("--config", metavar="RIG", type=Path, help="TOML file (default: the one in the recording)")
+    parser.add_argument("--out", metavar="PATH", type=Path, help="file to write; with --speed the folder")
+    parser.add_argument("--speed", metavar="X", type=float, help="play live, X times as fast as it was recorded")
+    parser.add_argument("--json", action="store_true", help="print one JSON object per estimate, no progress bar")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replays a recording, offline or live."""
+    recording = Recording(arguments.recording)
+    settings = _settings(recording, arguments.config)
+    if arguments.speed is not None:
+        return _live(settings, arguments)
+    out = arguments.out or free_path(arguments.recording)
+    if out.exists():
+        raise ReplayOptionError(f"--out {out}: exists already; choose another name or remove it")
+    with _writing(out, config.to_toml(settings)) as file:
+        trackers = {name: _tracker(settings, name, recording, file) for name in settings.trackers}
+        _run_through(recording, trackers, arguments.json)
+    notes = sys.stderr if arguments.json else sys.stdout
+    for name, tracker in trackers.items():
+        print(*(f"{name}: {line}" for line in tracker.log.summary()), sep="\n", file=notes)
+    print(f"wrote {out}", file=notes)
+    return Exit.OK
+
+
+def _settings(recording: Recording, path: Path | None) -> config.ServiceConfig:
+    """The configuration to replay with.
+
+    Raises:
+        ReplayOptionError: none is given and the recording holds none, or it has no tracker.
+    """
+    if path is None and not recording.config:
+        raise ReplayOptionError(f"{recording.path}: no configuration is in this recording; name one with --config")
+    source = f"{recording.path} (rig.toml)"
+    base = recording.path.resolve().parent
+    settings = config.load(path) if path else config.loads(recording.config, source, base)
+    if not settings.trackers:
+        raise ReplayOptionError(f"{path or source}: trackers: there is none, so there is nothing to do")
+    return settings
+
+
+def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
+    cameras = {
+        sensor: settings.sensors[sensor].camera.applied_to(camera)
+        for sensor, camera in recording.cameras.items()
+        if sensor in settings.sensors
+    }
+    rig = plans.rig(settings, name, cameras)
+    members = streams(rig.sensors.values())
+    missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
+    if missing:
+        raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
+    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
+    clock = WallClock(monotonic=lambda: 0, wall=lambda: recording.wall_offset_ns)
+    return OfflineTracker(
+        name,
+        Tracking(rig, plans.plan(settings, name)),
+        Synchroniser(settings.reference(name), members, tolerance_ns),
+        plans.model_name(settings, name),
+        rig.calib_id,
+        Speaker(settings.name, clock, boot_id="replay"),
+        file,
+        time.monotonic_ns,
+    )
+
+
+def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], as_json: bool) -> None:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), disable=as_json) as progress:
+        task = progress.add_task("images", total=sum(recording.counts.values()))
+        for _, report in replay(recording, trackers):
+            if report is None:
+                progress.advance(task)
+            elif as_json:
+                print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
+            else:
+                error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
+                progress.update(task, description=f"{report.tracker} {report.status}{error}")
+
+
+@contextmanager
+def _writing(path: Path, toml: str) -> Iterator[McapFile]:
+    """A new MCAP file, called *.active until it is complete."""
+    active = path.with_name(f"{path.name}.active")
+    try:
+        stream = active.open("wb")
+    except OSError as error:
+        raise ReplayOptionError(f"--out {path}: cannot be written: {error.strerror}") from None
+    with stream:
+        file = McapFile(stream)
+        file.attach("rig.toml", "text/toml", toml.encode(), 0)
+        yield file
+        file.finish()
+    os.replace(active, path)
+
+
+def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
+    """Plays the recording as the only device of the rig, through `run`."""
+    recording_uri = f"replay://{arguments.recording.resolve()}?speed={arguments.speed:g}"
+    with tempfile.NamedTemporaryFile("w", prefix="replay-", suffix=".toml", encoding="utf-8") as file:
+        file.write(config.to_toml(_played(settings, recording_uri)))
+        file.flush()
+        options = ["--json"] if arguments.json else []
+        options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
+        parser = argparse.ArgumentParser()
+        run_command.add_arguments(parser)
+        return run_command.run(parser.parse_args([file.name, *options]))
+
+
+def _played(settings: config.ServiceConfig, uri: str) -> config.ServiceConfig:
+    """The configuration with the device `uri` in place of all others."""
+    table = next(iter(settings.devices.values())).model_copy(update={"uri": uri})
+    sensors = {
+        name: sensor.model_copy(update={"device": "recording", "head": name})
+        for name, sensor in settings.sensors.items()
+    }
+    return settings.model_copy(update={"devices": {"recording": table}, "sensors": sensors})

@@ -1,0 +1,116 @@
+"""Tracks one deformation: subscribes to the sensors' images, publishes the estimates, until SIGTERM or Ctrl-C.
+
+  abs-service track rig.toml sheet                                  for the rig that `abs-service run` hosts elsewhere
+  abs-service track rig.toml sheet --connect tcp/192.168.1.7:7447   of a rig on another host
+
+Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
+"""
+
+import argparse
+import threading
+import time
+from collections.abc import Callable
+
+from abs.v1.sensor_model_pb2 import SensorModel
+
+from abs_service import config, keys
+from abs_service.bus.contract import Bus
+from abs_service.bus.frames import FrameSubscriber
+from abs_service.commands import participant, plans
+from abs_service.exits import Exit
+from abs_service.health import Health, Level
+from abs_service.stamps import Speaker, WallClock
+from abs_service.synchroniser import Synchroniser
+from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
+from abs_service.tracking import Tracking, streams
+from abs_service.warmup import warm_up
+from calib.camera import Camera
+from calib.rig import Rig
+from drivers import codec
+
+#: How long one question for calibrations waits for answers [s].
+ASK_S = 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service track`."""
+    participant.add_arguments(parser)
+    parser.add_argument("tracker", metavar="TRACKER", nargs="?", help="its name (default: the first one)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Tracks until told to stop."""
+    settings = participant.load_config(arguments)
+    name = arguments.tracker or next(iter(settings.trackers), "")
+    plan = plans.plan(settings, name)
+    stop = participant.stop_on_signals()
+    clock = WallClock()
+    speaker = Speaker(settings.name, clock)
+    with participant.open_bus(settings, arguments) as bus:
+        health = Health(bus, f"track/{name}", speaker)
+        bus.show_alive(f"track/{name}")
+        cameras = _cameras(bus, settings.trackers[name].sensors, health, stop)
+        if stop.is_set():
+            return Exit.OK
+        rig = plans.rig(settings, name, cameras)
+        _in_background(lambda: warm_up(rig, plan), "compiling", health, stop)
+        live = _live(bus, settings, name, rig, Tracking(rig, plan), speaker, health)
+        while not stop.is_set():
+            live.turn()
+            if health.due():
+                clock.measure()
+                health.tick()
+        health.publish()
+    return Exit.OK
+
+
+def _live(
+    bus: Bus,
+    settings: config.ServiceConfig,
+    name: str,
+    rig: Rig,
+    tracking: Tracking,
+    speaker: Speaker,
+    health: Health,
+) -> LiveTracker:
+    members = streams(rig.sensors.values())
+    frames = FrameSubscriber(bus, members)
+    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
+    synchroniser = Synchroniser(settings.reference(name), members, tolerance_ns)
+    return LiveTracker(
+        tracking,
+        NewestSets(frames, synchroniser, time.monotonic_ns),
+        EstimatePublisher(bus, speaker, name, plans.model_name(settings, name), rig.calib_id),
+        health,
+        time.monotonic_ns,
+        settings.trackers[name].budget_ms,
+    )
+
+
+def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading.Event) -> dict[str, Camera]:
+    """Asks until every sensor's camera is known, or until told to stop."""
+    cameras: dict[str, Camera] = {}
+    while not stop.is_set():
+        for sensor in set(sensors) - set(cameras):
+            for sample in bus.ask(keys.model(sensor), ASK_S):
+                cameras[sensor] = codec.decode_camera(SensorModel.FromString(sample.payload))
+        missing = [sensor for sensor in sensors if sensor not in cameras]
+        if not missing:
+            break
+        health.label("phase", "waiting")
+        health.report("calibration", Level.WARNING, f"waits for the calibration of {', '.join(missing)}")
+        health.tick()
+        stop.wait(0.1)
+    health.report("calibration", Level.OK)
+    return cameras
+
+
+def _in_background(work: Callable[[], None], phase: str, health: Health, stop: threading.Event) -> None:
+    """Does something long while the health goes on to be published."""
+    health.label("phase", phase)
+    health.publish()
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    while thread.is_alive() and not stop.is_set():
+        thread.join(0.1)
+        health.tick()

@@ -1,0 +1,120 @@
+"""What a tracker tells the world: its estimates and its mesh as messages."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from abs.v1 import common_pb2, deformation_state_pb2, deformed_mesh_pb2
+
+from abs_service.observation import Source
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.mesh import Mesh
+
+State = deformation_state_pb2.DeformationState
+
+STATE = State.DESCRIPTOR.full_name
+MESH = deformed_mesh_pb2.DeformedMesh.DESCRIPTOR.full_name
+TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
+
+_STATUS = {
+    Status.INITIALIZING: State.STATUS_INITIALIZING,
+    Status.TRACKING: State.STATUS_TRACKING,
+    Status.DEGRADED: State.STATUS_DEGRADED,
+    Status.LOST: State.STATUS_LOST,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who made an estimate, and with what.
+
+    Attributes:
+        tracker: name of the tracker.
+        model: type of its deformation model.
+        model_id: hash of model and mesh.
+        calib_id: hash of the rig's calibration.
+        mesh_version: counts the tracker's meshes.
+    """
+
+    tracker: str
+    model: str
+    model_id: str
+    calib_id: str
+    mesh_version: int
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What an estimate cost: time from frame set to Θ, from exposure to now [ms], frame sets passed over before it."""
+
+    solve_ms: float
+    age_ms: float
+    skipped: int
+
+
+def model_id(model: str, mesh: Mesh) -> str:
+    """Short hash that is equal where Θ means the same: same model, same undeformed mesh."""
+    digest = hashlib.sha256(model.encode())
+    digest.update(mesh.vertices.astype("<f8").tobytes())
+    digest.update(mesh.faces.astype("<i4").tobytes())
+    return digest.hexdigest()[:16]
+
+
+def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
+    """An estimate as a message."""
+    message = State(
+        header=header,
+        tracker=identity.tracker,
+        status=_STATUS[estimate.status],
+        reasons=estimate.reasons,
+        model=identity.model,
+        model_id=identity.model_id,
+        calib_id=identity.calib_id,
+        theta=estimate.theta.tolist(),
+        log_likelihood=-estimate.cost,
+        search_deviation=estimate.deviation,
+        generations=estimate.generations,
+        evaluations=estimate.evaluations,
+        solve_ms=effort.solve_ms,
+        age_ms=effort.age_ms,
+        skipped=effort.skipped,
+        mesh_version=identity.mesh_version,
+        inlier_share=estimate.inlier_share,
+    )
+    for fit in estimate.fits:
+        source = estimate.sources.get(fit.sensor, Source(0, 0))
+        message.sensors.add(
+            sensor=fit.sensor,
+            seq=source.seq,
+            t_host_ns=source.t_host_ns,
+            samples=fit.samples,
+            mean_log_likelihood=fit.mean_log_likelihood,
+            normalized_residual=fit.normalized_residual,
+        )
+    for sensor in estimate.missing:
+        message.sensors.add(sensor=sensor, missing=True)
+    return message
+
+
+def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> deformed_mesh_pb2.DeformedMesh:
+    """The deformed vertices of an estimate as a message."""
+    return deformed_mesh_pb2.DeformedMesh(
+        header=header,
+        tracker=identity.tracker,
+        mesh_version=identity.mesh_version,
+        vertices_f32=estimate.vertices.astype("<f4").tobytes(),
+    )
+
+
+def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) -> deformed_mesh_pb2.MeshTopology:
+    """The undeformed mesh as a message; the header tells the moment of the frames that it was made from."""
+    colored = np.isfinite(undeformed.colors).any()
+    colors = np.nan_to_num(undeformed.colors).astype(np.uint8).tobytes() if colored else b""
+    return deformed_mesh_pb2.MeshTopology(
+        header=header,
+        tracker=identity.tracker,
+        mesh_version=identity.mesh_version,
+        rest_vertices_f32=undeformed.vertices.astype("<f4").tobytes(),
+        faces_u32=undeformed.faces.astype("<u4").tobytes(),
+        colors_u8=colors,
+    )

@@ -1,0 +1,160 @@
+"""One tracker from its first frame set on: finds the object, makes the mesh and the model, then tracks."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from abs_service.observation import Observation, Observer
+from abs_service.tracker import priors, status
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.initialization import initial_mesh
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import DeformationModel, ModelError
+from abs_service.tracker.objectives.base import Objective
+from abs_service.tracker.optimizers.base import Optimizer
+from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.regions.base import Region, RegionError
+from abs_service.tracker.tracker import Tracker
+from calib.noise.color import GaussianColor
+from calib.rig import Rig, Sensor
+from drivers.frame import FrameSet, Kind
+
+
+class ModelSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.models`."""
+
+    def build(self, mesh: Mesh) -> DeformationModel:
+        """The model of a mesh."""
+        ...
+
+
+class ObjectiveSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.objectives`."""
+
+    def build(self, rig: Rig, mesh: Mesh) -> Objective:
+        """The objective of a mesh in a rig."""
+        ...
+
+
+class OptimizerSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.optimizers`."""
+
+    def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
+        """A search that draws from `generator`."""
+        ...
+
+
+class RegionSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.regions`."""
+
+    def build(self) -> Region:
+        """The region."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that a tracker is made of.
+
+    Attributes:
+        reference: sensor whose depth image gives the initial mesh.
+        model, region, objective, optimizer: settings of the exchangeable parts.
+        vertices: about how many vertices the mesh is to have.
+        priors, status: settings of the fixed parts.
+        seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
+    """
+
+    reference: str
+    model: ModelSettings
+    region: RegionSettings
+    objective: ObjectiveSettings
+    optimizer: OptimizerSettings
+    vertices: int
+    priors: priors.Settings
+    status: status.Settings
+    seed: int = 0
+
+
+class Tracking:
+    """Turns frame sets of one rig into estimates.
+
+    Attributes:
+        mesh: the undeformed mesh; None until the object was found.
+        mesh_version: counts the meshes made.
+        made_ns: moment of the frames that the mesh was made from, CLOCK_MONOTONIC [ns].
+    """
+
+    def __init__(self, rig: Rig, plan: Plan):
+        self.mesh: Mesh | None = None
+        self.mesh_version = 0
+        self.made_ns = 0
+        self._rig = rig
+        self._plan = plan
+        self._region = plan.region.build()
+        self._observer = Observer(rig)
+        self._tracker: Tracker | None = None
+
+    def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
+        """The estimate for a frame set; the search goes on while `in_time` allows.
+
+        Raises:
+            ObservationError: the frames do not fit the rig.
+        """
+        return self.track_observation(self._observer.observe(frames), in_time)
+
+    def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
+        """The estimate for an observation, see `track`."""
+        if self._tracker is None:
+            try:
+                self._tracker = self._begin(observation)
+            except (RegionError, ModelError) as error:
+                return _initializing(observation, str(error))
+        return self._tracker.track(observation, in_time)
+
+    def _begin(self, observation: Observation) -> Tracker:
+        plan = self._plan
+        mesh = initial_mesh(observation, self._rig, plan.reference, self._region, plan.vertices)
+        model = plan.model.build(mesh)
+        self.mesh, self.made_ns = model.mesh, observation.t_host_ns
+        self.mesh_version += 1
+        return Tracker(
+            model,
+            plan.objective.build(self._rig, model.mesh),
+            StretchPrior(model.mesh, plan.priors.stretch),
+            MotionPrior(model.rest, model.scales, plan.priors),
+            plan.optimizer.build(len(model.rest), np.random.default_rng(plan.seed)),
+            plan.status,
+        )
+
+
+def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
+    """The (sensor, stream) of every image that the sensors' noise models need; streams are called by their kind."""
+    keys: list[tuple[str, str]] = []
+    for sensor in sensors:
+        if isinstance(sensor.noise, GaussianColor):
+            keys.append((sensor.name, Kind.COLOR.value))
+        else:
+            keys.append((sensor.name, Kind.DEPTH.value))
+            keys += [(sensor.name, Kind.AMPLITUDE.value)] if sensor.noise.uses_amplitude else []
+    return keys
+
+
+def _initializing(observation: Observation, reason: str) -> Estimate:
+    return Estimate(
+        seq=observation.seq,
+        t_host_ns=observation.t_host_ns,
+        status=Status.INITIALIZING,
+        reasons=(reason,),
+        theta=np.zeros(0),
+        vertices=np.zeros((0, 3), np.float32),
+        cost=float("nan"),
+        deviation=float("nan"),
+        generations=0,
+        evaluations=0,
+        inlier_share=0.0,
+        fits=(),
+        sources=observation.sources,
+        missing=observation.missing,
+    )
