@@ -2,6 +2,7 @@
 
 import logging
 import threading
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -62,6 +63,7 @@ class DeviceKeeper:
         self._clock = clock
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
+        self._earlier: Counter[str] = Counter()  # what earlier openings of the device counted
         self.finished = False
         self.refusal: Exception | None = None
 
@@ -109,13 +111,16 @@ class DeviceKeeper:
             reason = self._watch(device, watch)
         finally:
             device.close()
+            self._earlier.update(device.counters)
+            self._earlier["unwanted"] += watch.unwanted
         return watch.latest_ns > 0, reason
 
     def _watch(self, device: Device, watch: "_Watch") -> str:
         shown = (DeviceState.OPENING, "")
         while not self._stop.wait(0.1):
-            self._health.count_up_to(device.counters, f"device.{self._name}.")
-            self._health.count_up_to({"unwanted": watch.unwanted}, f"device.{self._name}.")
+            counters = Counter({"unwanted": watch.unwanted, **device.counters})
+            counters.update(self._earlier)
+            self._health.count_up_to(counters, f"device.{self._name}.")
             state, reason = watch.state
             if (state, reason) != shown:
                 shown = (state, reason)

@@ -83,7 +83,8 @@ class Recorder:
         self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes)
         self._standing: dict[str, Sample] = {}
         self._last_seq: dict[str, int] = {}
-        self._counts: Counter[str] = Counter()
+        self._counts: Counter[str] = Counter()  # of the open file
+        self._told: Counter[str] = Counter()  # dropped messages that finished files tell of
         self._failed = ""
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
@@ -133,7 +134,6 @@ class Recorder:
     def _record_one_file(self) -> bool:
         """Records until a reason to end the file; returns whether another one shall follow."""
         settings, started_ns = self._settings, self._clock.monotonic()
-        dropped_before = Counter(self._queue.dropped)
         file = RecordingFile(
             settings.directory,
             settings.name,
@@ -150,10 +150,7 @@ class Recorder:
             for sample in self._standing.values():
                 self._write(file, sample, is_repeated=True)
             reason = self._fill(file, started_ns)
-            dropped = Counter(self._queue.dropped) - dropped_before
-            self._counts.update({f"dropped.{topic}": number for topic, number in dropped.items()})
-            counts = {name: str(number) for name, number in sorted(self._counts.items())}
-            file.finish({"ended": reason, **counts})
+            file.finish({"ended": reason, **self._summary()})
         except BaseException:
             self._health.label("file", file.abandon().name)
             raise
@@ -215,6 +212,14 @@ class Recorder:
             self._counts[f"missing.{topic}"] += gap
             self._health.count(f"missing.{topic}", gap)
         self._last_seq[topic] = seq
+
+    def _summary(self) -> dict[str, str]:
+        """What is in the file, and what should be."""
+        dropped = Counter(self._queue.dropped)
+        for topic, number in (dropped - self._told).items():
+            self._counts[f"dropped.{topic}"] = number
+        self._told = dropped
+        return {name: str(number) for name, number in sorted(self._counts.items())}
 
     def _fail(self, reason: str) -> None:
         self._failed = reason

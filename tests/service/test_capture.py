@@ -123,6 +123,7 @@ def test_a_failed_device_is_opened_again_in_a_later_epoch(keep):
     assert second.epoch > first.epoch
     assert eventually(lambda: health.level == Level.OK)
     assert health._counters["device.sim.reconnects"] == 1
+    assert eventually(lambda: health._counters["device.sim.frames"] == 2), "both devices count one frame"
     assert eventually(lambda: health._labels["device.sim"] == "streaming")
 
 

@@ -1,79 +1,15 @@
-"""What the recorder promises: everything, unchanged, readable by anyone; and never silence about what is missing."""
+"""What the recorder promises: everything, unchanged, readable by anyone."""
 
-import queue
 import threading
-from collections import Counter
 
-import numpy as np
 import pytest
 from abs.v1 import frame_info_pb2
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import announcements, envelope, keys
-from abs_service.bus.contract import EVENTS, IMAGES, Sample
-from abs_service.health import Health
-from abs_service.record import Recorder, RecorderSettings
-from abs_service.recording_file import open_for_writing
-from abs_service.stamps import Speaker, WallClock
+from abs_service.bus.contract import Sample
 from calib.camera import Camera
 from drivers import codec
-from drivers.frame import Frame, Geometry, Kind
-from tests.service.loopback import LoopbackBus
-
-DEPTH = keys.image("tof", "depth")
-
-
-class Rig:
-    """A rig on a loopback bus, with a recorder."""
-
-    def __init__(self, directory, free_bytes=lambda folder: 1 << 40, open_file=open_for_writing, **settings):
-        self.bus = LoopbackBus()
-        self.clock = WallClock()
-        self.speaker = Speaker("demo", self.clock)
-        self.health = Health(self.bus, "record", self.speaker)
-        settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)
-        self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes)
-
-    def publish_image(self, frame):
-        header = self.speaker.header(frame.t_host_ns, frame.seq)
-        image = codec.encode_image(frame, self.clock.wall(frame.t_host_ns))
-        info = codec.encode_info(frame, header)
-        self.bus.publisher(keys.image(frame.sensor, frame.stream), codec.IMAGE_SCHEMA, IMAGES).put(image, info)
-        return image, info
-
-    @property
-    def said(self):
-        return Counter(self.health._counters), self.health._conditions
-
-
-def depth(seq, stream="depth"):
-    return Frame(
-        "tof",
-        stream,
-        Kind.DEPTH,
-        np.full((24, 32), seq % 1000, "<u2"),
-        "16UC1",
-        seq,
-        seq,
-        seq,
-        geometry=Geometry.RADIAL,
-    )
-
-
-def read(path):
-    with path.open("rb") as stream:
-        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        messages = list(reader.iter_decoded_messages())
-        return messages, {a.name: a.data for a in reader.iter_attachments()}, list(reader.iter_metadata())
-
-
-def metadata(path, name="abs.recording"):
-    return next(record.metadata for record in read(path)[2] if record.name == name)
-
-
-def recordings(directory):
-    return sorted(directory.glob("*.mcap"))
+from tests.service.recording import DEPTH, Rig, depth, metadata, read, recordings
 
 
 def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
@@ -164,98 +100,8 @@ def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
     assert metadata(recordings(tmp_path)[0])[f"missing.{DEPTH}"] == "3"
 
 
-class SlowFile:
-    """A disk that takes nothing until it is released."""
-
-    def __init__(self, path):
-        self._file = path.open("xb")
-        self.entered, self.release = queue.SimpleQueue(), threading.Event()
-        self.release.set()
-
-    def write(self, data):
-        if not self.release.is_set():
-            self.entered.put(None)
-            self.release.wait()
-        return self._file.write(data)
-
-    def __getattr__(self, name):
-        return getattr(self._file, name)
-
-
-def test_a_slow_disk_costs_a_bounded_queue_and_every_drop_is_counted(tmp_path):
-    files = []
-
-    def slow(path):
-        files.append(SlowFile(path))
-        return files[-1]
-
-    rig = Rig(tmp_path, open_file=slow, queue_bytes=20_000, flush_s=0.01)
-    rig.recorder.start()
-    while not files:
-        threading.Event().wait(0.001)
-    files[0].release.clear()
-    rig.publish_image(depth(0))
-    files[0].entered.get(timeout=5)
-    for seq in range(1, 101):
-        rig.publish_image(depth(seq))
-    rig.recorder.report()
-    counters, conditions = rig.said
-    dropped = counters[f"dropped.{DEPTH}"]
-    assert 80 < dropped < 100
-    assert conditions["queue"][1] == f"the disk is too slow: {dropped} messages dropped"
-    files[0].release.set()
-    rig.recorder.stop(5)
-    (path,) = recordings(tmp_path)
-    written = [m for m in read(path)[0] if m.channel.topic == f"/{DEPTH}"]
-    assert len(written) + dropped == 101
-    assert metadata(path)[f"dropped.{DEPTH}"] == str(dropped)
-
-
-def test_it_stops_before_the_disk_is_full_with_a_complete_file(tmp_path):
-    free = iter([10**9, 10**9, 999])
-    rig = Rig(tmp_path, free_bytes=lambda folder: next(free, 999), minimum_free_bytes=1000, flush_s=0.005)
-    rig.recorder.start()
-    rig.publish_image(depth(1))
-    rig.recorder._thread.join(5)
-    assert rig.recorder.failed.startswith("only 0 MB free in")
-    assert rig.said[1]["record"][1].startswith("RECORD_FAILED only 0 MB free")
-    (path,) = recordings(tmp_path)
-    assert metadata(path)["ended"] == "low space"
-    rig.recorder.stop(5)
-
-
-def test_a_disk_error_is_said_at_once_and_leaves_the_file_to_be_recovered(tmp_path):
-    class Full(SlowFile):
-        def write(self, data):
-            if self._file.tell() > 5000:
-                raise OSError(28, "No space left on device")
-            return self._file.write(data)
-
-    rig = Rig(tmp_path, open_file=Full, flush_s=0.005)
-    rig.recorder.start()
-    seq = 0
-    while rig.recorder._thread.is_alive():
-        rig.publish_image(depth(seq := seq + 1))
-        threading.Event().wait(0.001)
-    assert rig.recorder.failed == "[Errno 28] No space left on device"
-    assert rig.said[1]["record"][1] == "RECORD_FAILED [Errno 28] No space left on device"
-    assert recordings(tmp_path) == []
-    assert len(list(tmp_path.glob("*.mcap.active"))) == 1
-    rig.publish_image(depth(0))  # harmless
-    rig.recorder.stop(5)
-
-
-def test_a_folder_that_is_gone_is_an_error_like_any_other(tmp_path):
-    rig = Rig(tmp_path / "nowhere")
-    rig.recorder.start()
-    rig.recorder._thread.join(5)
-    assert "No such file or directory" in rig.recorder.failed
-    rig.recorder.stop(5)
-
-
 def test_messages_of_every_type_have_an_envelope():
     for message in envelope.MESSAGES - {envelope.INFO}:
         envelope.read(Sample("x", message, b"", b""))
     with pytest.raises(envelope.EnvelopeError, match="is none of"):
         envelope.read(Sample("x", "google.protobuf.Timestamp", b""))
-    assert EVENTS.history == 0
