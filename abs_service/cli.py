@@ -15,7 +15,7 @@ from types import ModuleType
 
 import abs_service
 from abs_service import lifeline
-from abs_service.exits import Exit
+from abs_service.exits import Exit, is_for_user
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
@@ -42,9 +42,6 @@ examples:
 abs-service COMMAND --help says more about each command.
 """
 
-#: Where the exceptions come from whose message is meant for the user. Everything else is our own mistake.
-OURS = frozenset({"abs_service", "drivers", "calib"})
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
@@ -70,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.PIPE_CLOSED
     except Exception as error:
-        if type(error).__module__.partition(".")[0] not in OURS:
+        if not is_for_user(error):
             raise
         print(f"abs-service: error: {error}", file=sys.stderr)
         return Exit.USER

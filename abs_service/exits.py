@@ -12,3 +12,8 @@ class Exit(IntEnum):
     GIVE_UP = 3  # cannot start, and starting again will not help
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
     PIPE_CLOSED = 141  # whoever read the output is gone
+
+
+def is_for_user(error: Exception) -> bool:
+    """Whether an exception is one of ours, whose message says what to change. All others are our own mistakes."""
+    return type(error).__module__.partition(".")[0] in ("abs_service", "drivers", "calib")

@@ -12,11 +12,16 @@ from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds CONFIG, --connect and --listen."""
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Adds CONFIG."""
     parser.add_argument(
         "config", metavar="CONFIG", nargs="?", type=Path, help="TOML file of the rig (default: the simulated demo rig)"
     )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds CONFIG, --connect and --listen."""
+    add_config(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--connect", metavar="ENDPOINT", help="connect to this endpoint instead of bus.endpoint")
     where.add_argument("--listen", metavar="ENDPOINT", help="let the others connect here, instead of connecting")

@@ -41,9 +41,7 @@ class ChildError(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service run`."""
-    parser.add_argument(
-        "config", metavar="CONFIG", nargs="?", type=Path, help="TOML file of the rig (default: the simulated demo rig)"
-    )
+    participant.add_config(parser)
     parser.add_argument("--duration", metavar="S", type=float, default=float("inf"), help="end after this many seconds")
     parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")

@@ -5,13 +5,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import quote, unquote, urlsplit, urlunsplit
+from urllib.parse import quote, unquote, urlsplit
 
 from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
 from abs_service import keys, plugins
-
 
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
 FILE_SCHEMES = frozenset({"replay"})
@@ -31,7 +30,7 @@ def _uri(value: str, info: ValidationInfo) -> str:
     if parts.scheme not in FILE_SCHEMES:
         return value
     path = _base(info) / unquote(parts.netloc + parts.path)
-    return urlunsplit(parts._replace(netloc="", path=quote(str(path))))
+    return f"{parts.scheme}://{quote(str(path))}" + (f"?{parts.query}" if parts.query else "")
 
 
 def _stream(value: str) -> str:

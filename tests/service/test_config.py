@@ -56,6 +56,19 @@ def test_paths_start_from_the_folder_of_the_file(tmp_path):
     assert config.load(file).record.directory == tmp_path / "takes"
 
 
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("replay://../a b.mcap".replace(" ", "%20"), "replay:///rig/../a%20b.mcap"),
+        ("replay://takes/a.mcap?loop=1&speed=2", "replay:///rig/takes/a.mcap?loop=1&speed=2"),
+        ("replay:///data/a.mcap", "replay:///data/a.mcap"),
+        ("simulated://sheet?seed=1", "simulated://sheet?seed=1"),
+    ],
+)
+def test_a_device_that_is_a_file_starts_from_the_folder_of_the_configuration(given, meant):
+    assert loads(SENSORS.replace("simulated://sheet?seed=1", given)).devices["sim"].uri == meant
+
+
 def test_the_effective_configuration_loads_to_an_equal_one_from_anywhere():
     turned = "{ rotation_vector = [0.1, -0.2, 0.3], translation = [0.05, 0.0, 0.0] }"
     made = loads(SENSORS + f"[sensors.tof.camera]\nT_rs = {turned}\n[record]\nrotate_s = 12.5\n")

@@ -1,0 +1,148 @@
+"""Says what a configuration describes, or all that is wrong with it. No device is touched and nothing is started.
+
+  abs-service check                 the simulated demo rig
+  abs-service check rig.toml        your own
+  abs-service check rig.toml --json the same for scripts
+
+Exit code 0 if `abs-service run` could use it, 2 if not.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from abs_service import config, keys, plugins
+from abs_service.commands import participant, plans
+from abs_service.exits import Exit, is_for_user
+from abs_service.problems import none_of
+from drivers import opening
+
+#: Drivers that touch no hardware, so that opening a device is the best check of its address.
+HARMLESS = frozenset({"replay", "simulated"})
+
+
+class CheckError(Exception):
+    """A configuration that reads well and still cannot work; the message lists every reason."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service check`."""
+    participant.add_config(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Checks one configuration."""
+    try:
+        rig = participant.load_config(arguments)
+        found = describe(rig, str(arguments.config or "demo.toml"))
+    except (config.ConfigError, CheckError) as error:
+        if not arguments.json:
+            raise
+        print(json.dumps({"ok": False, "error": str(error)}, ensure_ascii=False))
+        return Exit.USER
+    print(json.dumps(found, ensure_ascii=False) if arguments.json else text(found))
+    return Exit.OK
+
+
+def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
+    """What a configuration describes, as plain data.
+
+    Args:
+        rig: the configuration.
+        source: where it came from.
+
+    Raises:
+        CheckError: something that it names does not exist or cannot be made.
+    """
+    problems: list[str] = []
+    streams: dict[str, list[str]] = {}
+    for name in rig.devices:
+        with _noting(f"devices.{name}.uri", problems):
+            streams |= _streams(rig, name)
+    for name, sensor in rig.sensors.items():
+        with _noting(f"sensors.{name}.noise", problems):
+            if sensor.noise is not None:
+                sensor.noise.build()
+    for name, tracker in rig.trackers.items():
+        with _noting(f"trackers.{name}", problems):
+            plans.plan(rig, name)
+        with _noting(f"trackers.{name}.region", problems):
+            tracker.region.build()
+    if problems:
+        raise CheckError("\n".join([f"{source}: cannot work", *(f"  {problem}" for problem in problems)]))
+    return {
+        "ok": True,
+        "config": source,
+        "rig": rig.name,
+        "endpoint": rig.bus.endpoint,
+        "devices": {name: device.uri for name, device in rig.devices.items()},
+        "sensors": {name: _sensor(rig, name, streams) for name in rig.sensors},
+        "trackers": {name: _tracker(rig, name) for name in rig.trackers},
+        "publishes": [keys.key(rig.name, keys.state(name)) for name in rig.trackers],
+        "records": str(rig.record.directory) if rig.record.enabled else None,
+    }
+
+
+def text(found: dict[str, Any]) -> str:
+    """The same for people."""
+    lines = [f'{found["config"]} describes rig "{found["rig"]}"', ""]
+    lines += [f"  device   {name}: {uri}" for name, uri in found["devices"].items()]
+    for name, sensor in found["sensors"].items():
+        streams = ", ".join(sensor["streams"]) or "streams known once it is open"
+        lines.append(f"  sensor   {name}: {streams}; noise {sensor['noise'] or 'unknown, only recorded'}")
+    for name, tracker in found["trackers"].items():
+        what = f"{tracker['model']} from {', '.join(tracker['sensors'])}, {tracker['vertices']} vertices"
+        how = f"{tracker['objective']}, {tracker['optimizer']}, paced by {tracker['reference']}"
+        lines.append(f"  tracker  {name}: {what}; {how}")
+    lines += [f"  publishes {key} …" for key in found["publishes"]]
+    lines += ["", f"  applications connect to {found['endpoint']}", f"  records to {found['records'] or 'nowhere'}"]
+    return "\n".join(lines)
+
+
+def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
+    """Streams of a device by sensor; none if it cannot be opened without touching hardware."""
+    uri = rig.devices[name].uri
+    scheme = uri.partition(":")[0]
+    if scheme not in opening.available():
+        raise CheckError(f'"{uri}": no such driver, {none_of(scheme, opening.available())}')
+    if scheme not in HARMLESS:
+        return {}
+    device = opening.open_device(uri, time.monotonic_ns)
+    device.close()
+    found: dict[str, list[str]] = {}
+    for head, sensor in rig.heads(name).items():
+        streams = [stream for stream in device.streams if stream.sensor == head]
+        if not streams:
+            heads = {stream.sensor for stream in device.streams}
+            raise CheckError(f'sensor "{sensor}": no head "{head}", {none_of(head, heads)}')
+        found[sensor] = [f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams]
+    return found
+
+
+def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]]) -> dict[str, Any]:
+    sensor = rig.sensors[name]
+    noise = None if sensor.noise is None else plugins.table(sensor.noise)["type"]
+    return {"device": sensor.device, "streams": streams.get(name, []), "noise": noise}
+
+
+def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:
+    tracker = rig.trackers[name]
+    parts = {
+        part: plugins.table(getattr(tracker, part))["type"] for part in ("model", "region", "objective", "optimizer")
+    }
+    reference = "/".join(rig.reference(name))
+    return {"sensors": list(tracker.sensors), "reference": reference, "vertices": tracker.mesh.vertices, **parts}
+
+
+@contextmanager
+def _noting(key: str, problems: list[str]) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:
+        if not is_for_user(error):
+            raise
+        problems.append(f"{key}: {error}")

@@ -1,0 +1,95 @@
+import json
+
+import pytest
+
+from abs_service import cli, config
+from abs_service.commands import check
+from abs_service.exits import Exit
+
+RIG = """
+version = 1
+name = "bench"
+[devices.sim]
+uri = "simulated://sheet?seed=1&sensors=tof"
+[sensors.tof]
+device = "sim"
+noise = { type = "gaussian_polynomial", sigma = [[0.005]] }
+[synchronisation]
+reference = "tof/depth"
+[trackers.sheet]
+sensors = ["tof"]
+model = { type = "rigid" }
+"""
+
+
+@pytest.fixture
+def checked(tmp_path, capsys):
+    """Checks a configuration; gives the exit code and what was printed."""
+
+    def checked(text, *options):
+        path = tmp_path / "rig.toml"
+        path.write_text(text)
+        code = cli.main(["check", str(path), *options])
+        return code, *capsys.readouterr()
+
+    return checked
+
+
+def test_what_a_configuration_describes(checked, tmp_path):
+    code, out, _ = checked(RIG)
+    assert code == Exit.OK
+    for part in (
+        'describes rig "bench"',
+        "device   sim: simulated://sheet?seed=1&sensors=tof",
+        "sensor   tof: depth 176×144 16UC1 30 Hz, amplitude 176×144 16UC1 30 Hz; noise gaussian_polynomial",
+        "tracker  sheet: rigid from tof, 300 vertices; likelihood, cma, paced by tof/depth",
+        "publishes abs/bench/sheet/state",
+        "connect to tcp/127.0.0.1:7447",
+        f"records to {tmp_path / 'recordings'}",
+    ):
+        assert part in out
+
+
+def test_the_same_for_scripts(checked):
+    code, out, _ = checked(RIG + "[record]\nenabled = false\n", "--json")
+    found = json.loads(out)
+    assert (code, found["ok"], found["records"]) == (Exit.OK, True, None)
+    assert found["trackers"]["sheet"]["reference"] == "tof/depth"
+
+
+def test_a_mistake_for_scripts(checked):
+    code, out, err = checked(RIG.replace("rigid", "rigit"), "--json")
+    found = json.loads(out)
+    assert (code, err, found["ok"]) == (Exit.USER, "", False)
+    assert 'did you mean "rigid"?' in found["error"]
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "message"),
+    [
+        ("simulated://sheet", "simulatde://sheet", 'no such driver, did you mean "simulated"? allowed: '),
+        ("seed=1&", "sede=1&", "devices.sim.uri: simulated://sheet?sede=1&sensors=tof: unknown key 'sede'"),
+        ("sensors=tof", "sensors=color", 'devices.sim.uri: sensor "tof": no head "tof", allowed: color'),
+        ("sheet?seed=1&sensors=tof", "sheet?seed=x", "seed = 'x' must be a number"),
+        ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "none.mcap"),
+        ('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }', "trackers.sheet.region: file = "),
+    ],
+)
+def test_what_reads_well_and_cannot_work_is_named(checked, good, bad, message):
+    code, out, err = checked(RIG.replace(good, bad))
+    assert (code, out) == (Exit.USER, "")
+    assert err.startswith("abs-service: error: ")
+    assert message in err
+
+
+def test_all_of_it_is_told_at_once(checked):
+    text = RIG.replace("sede", "x").replace("simulated:", "simulatde:")
+    text = text.replace('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }')
+    assert len(checked(text)[2].splitlines()) == 3
+
+
+def test_no_driver_that_could_touch_hardware_is_opened(monkeypatch, tmp_path):
+    monkeypatch.setattr(check, "HARMLESS", frozenset())
+    monkeypatch.setattr(check.opening, "open_device", lambda *_: pytest.fail("opened"))
+    found = check.describe(config.loads(RIG, "rig.toml", tmp_path), "rig.toml")
+    assert found["sensors"]["tof"]["streams"] == []
