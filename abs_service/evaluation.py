@@ -73,7 +73,9 @@ def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np
     place = np.stack(np.unravel_index(nearest, (rows, columns)), axis=1).astype(np.float64)
     for _ in range(8):
         points, tangents = _bilinear(grid, place)
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangents), vertices - points)
+        normal_matrix = np.einsum("nij,nik->njk", tangents, tangents)
+        gradient = np.einsum("nij,ni->nj", tangents, vertices - points)
+        step = np.linalg.solve(normal_matrix, gradient[..., None])[..., 0]
         place = np.clip(place + np.clip(step, -1, 1), 0, (rows - 1, columns - 1))
     return place
 

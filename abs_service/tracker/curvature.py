@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.terms.base import Linearization
 
 #: Surface motion [m] of the central differences that give the vertices' derivatives.
 STEP_M = 1e-3
@@ -18,13 +19,17 @@ def vertex_jacobian(model: DeformationModel, theta: NDArray[np.float64]) -> NDAr
     return ((plus - minus) / (2 * steps)[:, None, None]).transpose(2, 1, 0)
 
 
-def search_metric(residual_jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
+def search_metric(jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
     """Matrix A (dim, dim) such that Θ = prediction + A ξ makes the curvature of the cost the identity.
 
     With J the derivatives (m, dim) of all normalised residuals, JᵀJ is the Gauss–Newton curvature of the negative
     log-likelihood and its inverse A Aᵀ the posterior covariance. The search is invariant under such a change of
     coordinates in principle; in practice it saves CMA-ES the generations that it would spend on learning them.
     """
-    hessian = residual_jacobian.T @ residual_jacobian
-    values, vectors = np.linalg.eigh(hessian)
-    return vectors / np.sqrt(np.maximum(values, values[-1] * 1e-12))
+    lower = np.linalg.cholesky(jacobian.T @ jacobian)
+    return np.asarray(np.linalg.inv(lower).T, np.float64)
+
+
+def newton_step(linear: Linearization, metric: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Change of Θ (dim,) that minimises the linearised cost, for the metric of the same linearisation."""
+    return -metric @ (metric.T @ (linear.jacobian.T @ linear.residual))

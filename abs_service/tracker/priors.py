@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import Linearization
 from calib.jit import kernel
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
@@ -47,13 +48,14 @@ class StretchPrior:
         _stretch_cost(surface.vertices, self._edges, self._inverse_lengths, out)
         return out * (0.5 * self._inverse_deviation**2)
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (edges, dim) of the normalised residuals of a population of one; jacobian (n, 3, dim)."""
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """The edges' normalised residuals of a population of one, and their derivatives; jacobian (n, 3, dim)."""
         first, second = self._edges.T
         difference = (surface.vertices[0][:, first] - surface.vertices[0][:, second]).T.astype(np.float64)
-        direction = difference / np.linalg.norm(difference, axis=1, keepdims=True)
-        rows = np.einsum("ei,eid->ed", direction, jacobian[first] - jacobian[second])
-        return rows * (self._inverse_lengths[:, None] * self._inverse_deviation)
+        length = np.linalg.norm(difference, axis=1, keepdims=True)
+        scale = self._inverse_lengths[:, None] * self._inverse_deviation
+        rows = np.einsum("ei,eid->ed", difference / length * scale, jacobian[first] - jacobian[second])
+        return Linearization((length * scale)[:, 0] - self._inverse_deviation, rows)
 
 
 class MotionPrior:
@@ -89,9 +91,9 @@ class MotionPrior:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
         return 0.5 * np.sum(((thetas - self.predicted) * self._inverse_deviation) ** 2, axis=1)
 
-    def residual_jacobian(self) -> NDArray[np.float64]:
-        """Derivatives (dim, dim) of the normalised residuals."""
-        return np.diag(self._inverse_deviation)
+    def linearize(self) -> Linearization:
+        """The normalised residuals at the predicted parameters, all zero, and their derivatives."""
+        return Linearization(np.zeros(len(self._scales)), np.diag(self._inverse_deviation))
 
     @property
     def _inverse_deviation(self) -> NDArray[np.float64]:

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker import status
-from abs_service.tracker.curvature import search_metric, vertex_jacobian
+from abs_service.tracker.curvature import newton_step, search_metric, vertex_jacobian
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.priors import MotionPrior, StretchPrior
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.base import SensorFit, stack
 
 
 class Tracker:
@@ -43,32 +43,40 @@ class Tracker:
         """Searches until the optimiser's generations are used up or `in_time` says no, after one at least."""
         self._objective.observe(observation)
         self._motion.predict(observation.t_host_ns)
-        metric = self._search_metric(self._motion.predicted)
+        start, metric = self._start(self._motion.predicted)
         self._optimizer.restart()
         generations = evaluations = 0
         while generations < self._optimizer.generations and (generations == 0 or in_time()):
             candidates = self._optimizer.ask()
-            costs = self._cost(self._motion.predicted + candidates @ metric.T)
+            costs = self._cost(start + candidates @ metric.T)
             self._optimizer.tell(candidates, costs)
             generations += 1
             evaluations += len(candidates)
-        theta = self._motion.predicted + metric @ self._optimizer.mean
+        theta = self._better(start, start + metric @ self._optimizer.mean)
         self._motion.update(theta)
         return self._estimate(observation, theta, generations, evaluations)
+
+    def _start(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Where the search begins, the prediction or a Newton step from it, and the metric of its coordinates."""
+        surface, jacobian = self.model.deform(predicted[None]), vertex_jacobian(self.model, predicted)
+        parts = [
+            self._objective.linearize(surface, jacobian),
+            self._stretch.linearize(surface, jacobian),
+            self._motion.linearize(),
+        ]
+        linear = stack(parts, len(predicted))
+        metric = search_metric(linear.jacobian)
+        step = newton_step(linear, metric)
+        return self._better(predicted, predicted + step / 2, predicted + step), metric
+
+    def _better(self, *thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The parameters (dim,) of least cost."""
+        return thetas[int(np.argmin(self._cost(np.stack(thetas))))]
 
     def _cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative logarithm (population,) of likelihood times priors."""
         surface = self.model.deform(thetas)
         return self._objective.cost(surface) + self._stretch.cost(surface) + self._motion.cost(thetas)
-
-    def _search_metric(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        surface, jacobian = self.model.deform(theta[None]), vertex_jacobian(self.model, theta)
-        rows = [
-            self._objective.residual_jacobian(surface, jacobian),
-            self._stretch.residual_jacobian(surface, jacobian),
-            self._motion.residual_jacobian(),
-        ]
-        return search_metric(np.concatenate(rows))
 
     def _estimate(
         self, observation: Observation, theta: NDArray[np.float64], generations: int, evaluations: int

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import SensorFit, Term
+from abs_service.tracker.terms.base import Linearization, SensorFit, Term, stack
 
 
 class Objective(Protocol):
@@ -22,8 +22,8 @@ class Objective(Protocol):
         """Cost (population,) of every deformed mesh; lower explains the measurements better."""
         ...
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, dim) of the normalised residuals of a population of one.
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """Normalised residuals of a population of one, and their derivatives by the parameters.
 
         Args:
             surface: the deformed mesh.
@@ -56,10 +56,9 @@ class TermSum:
             total += term.cost(surface)
         return total
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, dim) of all sensors' normalised residuals."""
-        rows = [term.residual_jacobian(surface, jacobian) for term in self._active]
-        return np.concatenate([np.zeros((0, jacobian.shape[2])), *rows])
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """All sensors' normalised residuals and their derivatives."""
+        return stack([term.linearize(surface, jacobian) for term in self._active], jacobian.shape[2])
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """How every contributing sensor agrees with a population of one."""

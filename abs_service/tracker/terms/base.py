@@ -1,5 +1,6 @@
 """What a term is, and how its agreement with a deformed mesh is summed up."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,6 +27,27 @@ class Bounds:
     inlier: float
     uniform: float
     outlier: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearization:
+    """Normalised residuals and their derivatives by the parameters: the cost is about ½‖residual + jacobian δΘ‖².
+
+    Attributes:
+        residual: (m,).
+        jacobian: (m, dim).
+    """
+
+    residual: NDArray[np.float64]
+    jacobian: NDArray[np.float64]
+
+
+def stack(parts: Sequence[Linearization], dimension: int) -> Linearization:
+    """All residuals of several linearisations below each other."""
+    return Linearization(
+        np.concatenate([np.zeros(0), *(part.residual for part in parts)]),
+        np.concatenate([np.zeros((0, dimension)), *(part.jacobian for part in parts)]),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +102,8 @@ class Term(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, dim) of the inliers' normalised residuals; arguments as in `Objective`."""
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """The inliers' normalised residuals around a deformed mesh; arguments as in `Objective`."""
         ...
 
     def fit(self, surface: Surface) -> SensorFit:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.observation import ColorImage, DepthImage
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis import SparseSynthesis
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from calib.camera import Camera
 from calib.jit import kernel
@@ -52,12 +52,13 @@ class ColorTerm:
         _color_cost(pixel, self._texture, self._colors, *constants, out)
         return out
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, dim) of the inliers' normalised residuals, three channels each."""
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
         rows = color_rows(self._image, self._camera, surface.vertices[0].T[use])
-        return np.einsum("nci,nid->ncd", rows * self._inverse_deviation, jacobian[use]).reshape(-1, jacobian.shape[2])
+        change = (rows * self._inverse_deviation) @ jacobian[use]
+        return Linearization(residual[use].ravel(), change.reshape(-1, jacobian.shape[2]))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.observation import ColorImage, DepthImage
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis import SparseSynthesis
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import depth_rows
 from calib.camera import Camera
 from calib.jit import kernel
@@ -42,12 +42,13 @@ class DepthTerm:
         _depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return out
 
-    def residual_jacobian(self, surface: Surface, jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, dim) of the inliers' normalised residuals."""
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """The inliers' normalised residuals, and how they change with the parameters."""
         residual, inverse_deviation, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
         rows = depth_rows(surface.vertices[0].T[use], surface.normals[0].T[use], self._center)
-        return np.einsum("ni,nid->nd", rows * inverse_deviation[use, None], jacobian[use])
+        rows *= inverse_deviation[use, None]
+        return Linearization(residual[use], np.einsum("ni,nid->nd", rows, jacobian[use]))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
