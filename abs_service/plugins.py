@@ -13,9 +13,8 @@ from abs_service.problems import Problem, ProblemsError, from_pydantic, none_of,
 
 
 def available(package: str) -> list[str]:
-    """The values of `type` that name a module with `Settings` in a package."""
-    names = [module.name for module in pkgutil.iter_modules(import_module(package).__path__)]
-    return sorted(name for name in names if hasattr(import_module(f"{package}.{name}"), "Settings"))
+    """The values of `type` that name a module with `Settings` in a package; imports all of its modules."""
+    return sorted(name for name in _modules(package) if _is_part(package, name))
 
 
 def load(package: str, table: Any, base: Path) -> Any:
@@ -35,7 +34,7 @@ def load(package: str, table: Any, base: Path) -> Any:
             [Problem((), f"must be a table such as {example}; types: {', '.join(available(package))}", table)]
         )
     name = table["type"]
-    if not name.isidentifier() or name not in available(package):
+    if name not in _modules(package) or not _is_part(package, name):
         raise ProblemsError([Problem(("type",), f"no such type, {none_of(name, available(package))}", name)])
     return settings(f"{package}.{name}", {key: value for key, value in table.items() if key != "type"}, base)
 
@@ -61,6 +60,14 @@ def settings(module: str, table: Any, base: Path) -> Any:
         raise ProblemsError(problems)
     paths = {field.name: getattr(made, field.name) for field in fields(Settings)}
     return replace(made, **{name: base / value for name, value in paths.items() if isinstance(value, Path)})
+
+
+def _modules(package: str) -> set[str]:
+    return {module.name for module in pkgutil.iter_modules(import_module(package).__path__)}
+
+
+def _is_part(package: str, name: str) -> bool:
+    return hasattr(import_module(f"{package}.{name}"), "Settings")
 
 
 def table(made: Any) -> dict[str, Any]:

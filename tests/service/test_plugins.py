@@ -55,6 +55,12 @@ def test_only_modules_with_settings_are_available(package):
     assert plugins.available(package) == ["bendy"]
 
 
+def test_parts_that_were_not_asked_for_are_not_imported(package, tmp_path):
+    (tmp_path / package / "heavy.py").write_text("raise ImportError('this takes long')")
+    plugins.load(package, {"type": "bendy"}, Path())
+    assert f"{package}.heavy" not in sys.modules
+
+
 def test_relative_paths_start_from_the_given_folder(package):
     table = {"type": "bendy", "mask": "masks/a.png"}
     assert plugins.load(package, table, Path("/rig")).mask == Path("/rig/masks/a.png")
