@@ -99,6 +99,7 @@ class TrackerLog:
         self.seen_ns: dict[str, int] = {}
         self.truth = TruthComparison()
         self._pending: DeformationState | None = None
+        self._mesh: DeformedMesh | None = None
 
     def take_state(self, state: DeformationState) -> Iterator[Report]:
         """Takes an estimate; it is reported when its mesh has come, or at the latest with the next estimate."""
@@ -106,12 +107,17 @@ class TrackerLog:
             yield self._report(self._pending, None)
         self._pending = state
         self.seen_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
+        yield from self._pair()
 
     def take_mesh(self, mesh: DeformedMesh) -> Iterator[Report]:
-        """Takes the deformed vertices of an estimate."""
-        state = self._pending
-        if state is not None and state.header.t_host_ns == mesh.header.t_host_ns:
-            self._pending = None
+        """Takes the deformed vertices of an estimate, which may come before or after it."""
+        self._mesh = mesh
+        yield from self._pair()
+
+    def _pair(self) -> Iterator[Report]:
+        state, mesh = self._pending, self._mesh
+        if state is not None and mesh is not None and state.header.t_host_ns == mesh.header.t_host_ns:
+            self._pending = self._mesh = None
             yield self._report(state, _points(mesh.vertices_f32))
 
     def summary(self) -> list[str]:

@@ -58,6 +58,7 @@ def live():
         take_health(live, Health(component="track/sheet", level=Health.LEVEL_OK, labels={"phase": "tracking"}))
     tracker = live.trackers["sheet"]
     tracker.last, tracker.estimates, tracker.skipped = report(), 12, 3
+    tracker.statuses["TRACKING"] = 12
     tracker.seen_ns = {"tof": clock.now_ns - 50_000_000}
     for total, value in ((tracker.error_mm, 2.345), (tracker.surface_mm, 0.987), (tracker.solve_ms, 17.3)):
         total.add(value)
@@ -196,7 +197,7 @@ def test_the_table_leaves_notes_above_and_the_summary_below(live):
 def test_the_summary_tells_images_estimates_errors_losses_the_file_and_restarts(live):
     assert view(live).summary() == [
         "83.4 s, 60 images, 4 dropped",
-        "sheet: 12 estimates, 3 frame sets skipped, 17.3 ms each",
+        "sheet: 12 estimates, 3 frame sets skipped, 17.3 ms each, 12 TRACKING",
         "sheet: vertex error mean 2.35 mm, max 2.35 mm; surface error mean 0.99 mm, max 0.99 mm",
         "/takes/demo_2026.mcap: 2.0 MB, 500 messages, 3 dropped",
         "restarts: record 2",

@@ -74,6 +74,12 @@ def test_an_estimate_whose_mesh_was_lost_is_reported_with_the_next_one_and_witho
     assert second.error_mm == pytest.approx(0.0, abs=1e-3)
 
 
+def test_the_mesh_may_overtake_its_estimate(live):
+    take(live, truth(1), topology(1), truth(2))
+    (report,) = take(live, mesh(2), state(2, 1))
+    assert report.error_mm == pytest.approx(0.0, abs=1e-3)
+
+
 def test_without_truth_the_error_is_not_known(live):
     (report,) = take(live, topology(1), state(2, 1), mesh(2))
     assert report.error_mm is None
