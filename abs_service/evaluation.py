@@ -4,8 +4,8 @@ from collections import OrderedDict
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 Grid = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def closest_points(vertices: NDArray[np.floating], grid: Grid) -> NDArray[np.flo
 def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:
     """Grid coordinates (n, 2) = (row, column) of the nearest surface points, by Gauss–Newton from the nearest node."""
     rows, columns = grid.shape[:2]
-    nearest = KDTree(grid.reshape(-1, 3)).query(vertices)[1]
+    nearest = scipy.spatial.KDTree(grid.reshape(-1, 3)).query(vertices)[1]
     place = np.stack(np.unravel_index(nearest, (rows, columns)), axis=1).astype(np.float64)
     for _ in range(8):
         points, tangents = _bilinear(grid, place)

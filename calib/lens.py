@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.jit import kernel
-
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
@@ -43,8 +41,17 @@ class Lens:
 
     def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
         """Forward distortion of ideal normalised coordinates, shape (…, 2)."""
-        flat = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
-        return distort_points(flat, self.coefficients).reshape(np.shape(xy))
+        k1, k2, p1, p2, k3, k4, k5, k6 = self.coefficients
+        x, y = np.moveaxis(np.asarray(xy, np.float64), -1, 0)
+        r2 = x * x + y * y
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+        return np.stack(
+            [
+                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+            ],
+            axis=-1,
+        )
 
     def undistort(self, xy: NDArray[np.floating], tolerance: float = 1e-10) -> NDArray[np.float64]:
         """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method.
@@ -68,17 +75,3 @@ class Lens:
             for delta in (np.array([step, 0.0]), np.array([0.0, step]))
         ]
         return np.stack(columns, axis=-1)
-
-
-@kernel
-def distort_points(xy: NDArray[np.float64], coefficients: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Brown–Conrady forward distortion of (n, 2) ideal normalised coordinates; coefficients as in `Lens`."""
-    k1, k2, p1, p2, k3, k4, k5, k6 = coefficients
-    out = np.empty_like(xy)
-    for i in range(xy.shape[0]):
-        x, y = xy[i, 0], xy[i, 1]
-        r2 = x * x + y * y
-        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-        out[i, 0] = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-        out[i, 1] = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
-    return out

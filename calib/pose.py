@@ -1,8 +1,8 @@
 """Rigid poses as 4×4 matrices. `T_ab` maps coordinates in b to coordinates in a; lengths in metres, angles in rad."""
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 Pose = NDArray[np.float64]
 
@@ -15,19 +15,19 @@ def identity() -> Pose:
 def from_rotation_vector(rotation_vector: ArrayLike, translation: ArrayLike) -> Pose:
     """The pose with the given rotation vector [rad] (axis times angle) and translation [m], both of shape (3,)."""
     T_ab = np.eye(4)
-    T_ab[:3, :3] = Rotation.from_rotvec(np.asarray(rotation_vector, float)).as_matrix()
+    T_ab[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(np.asarray(rotation_vector, float)).as_matrix()
     T_ab[:3, 3] = np.asarray(translation, float)
     return T_ab
 
 
 def to_rotation_vector(T_ab: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The rotation vector [rad] and translation [m] of a pose; inverse of `from_rotation_vector`."""
-    return Rotation.from_matrix(T_ab[:3, :3]).as_rotvec(), T_ab[:3, 3].copy()
+    return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_rotvec(), T_ab[:3, 3].copy()
 
 
 def to_quaternion(T_ab: Pose) -> NDArray[np.float64]:
     """The unit quaternion (x, y, z, w) of a pose's rotation."""
-    return Rotation.from_matrix(T_ab[:3, :3]).as_quat()
+    return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_quat()
 
 
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:

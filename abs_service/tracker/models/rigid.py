@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
@@ -39,7 +39,7 @@ class Rigid:
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Moves the mesh with every row of `thetas` (population, 6)."""
-        rotations = Rotation.from_rotvec(thetas[:, :3]).as_matrix()
+        rotations = scipy.spatial.transform.Rotation.from_rotvec(thetas[:, :3]).as_matrix()
         centers = (self._centroid + thetas[:, 3:])[:, :, None]
         vertices = rotations @ self._arms.T + centers
         normals = rotations @ self._normals.T

@@ -1,8 +1,8 @@
 """Base splines of NURBS surfaces and their derivatives (eqs. 3–5)."""
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 Basis = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ def clamped_knots(control_points: int, degree: int) -> NDArray[np.float64]:
 def base_splines(u: NDArray[np.floating], control_points: int, degree: int, derivative: int = 0) -> Basis:
     """Values n_{i,d}(u) of eqs. 4 and 5, or of their derivative, shape (len(u), control_points); u = 1 is included."""
     knots = clamped_knots(control_points, degree)
-    return BSpline(knots, np.eye(control_points), degree)(np.clip(u, 0.0, 1.0), nu=derivative)
+    return scipy.interpolate.BSpline(knots, np.eye(control_points), degree)(np.clip(u, 0.0, 1.0), nu=derivative)
 
 
 def rational_basis(

@@ -5,7 +5,6 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt
-from cma import CMAEvolutionStrategy
 from numpy.typing import NDArray
 
 
@@ -34,6 +33,8 @@ class Cma:
     """Mean, step size and covariance of one frame start the next; see `Optimizer` for the interface."""
 
     def __init__(self, settings: Settings, dimension: int, generator: np.random.Generator):
+        from cma import CMAEvolutionStrategy  # noqa: PLC0415  # imports a second's worth of statistics and plotting
+
         self.generations = settings.generations
         self._settings = settings
         options = {
