@@ -63,11 +63,24 @@ class Lens:
         ideal = target.copy()
         for _ in range(30):
             residual = self.distort(ideal) - target
-            if np.all(np.abs(residual) < tolerance):
+            if np.all(np.abs(residual) < tolerance) and np.all(self._is_before_fold(ideal)):
                 return ideal.reshape(np.shape(xy))
             ideal -= np.einsum("nij,nj->ni", np.linalg.inv(self._jacobian(ideal)), residual)
-        worst = target[np.abs(self.distort(ideal) - target).max(axis=1).argmax()]
+        error = np.where(self._is_before_fold(ideal), np.abs(self.distort(ideal) - target).max(axis=1), np.inf)
+        worst = target[error.argmax()]
         raise LensError(f"the distortion {self.coefficients.tolist()} has no inverse at normalised {worst.tolist()}")
+
+    def _is_before_fold(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether the distortion is one-to-one from the centre to each point (n, 2).
+
+        A barrel's polynomial turns back at some radius. Beyond it every pixel has a second solution, from where no
+        light reaches the sensor.
+        """
+        before = np.ones(len(xy), np.bool_)
+        for part in (0.25, 0.5, 0.75, 1.0):
+            jacobian = self._jacobian(part * xy)
+            before &= (np.linalg.det(jacobian) > 0) & (np.trace(jacobian, axis1=1, axis2=2) > 0)
+        return before
 
     def _jacobian(self, xy: NDArray[np.float64], step: float = 1e-6) -> NDArray[np.float64]:
         columns = [

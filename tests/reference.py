@@ -1,0 +1,155 @@
+"""The equations of the method as plain, slow NumPy: one vertex at a time, as the paper writes them.
+
+Numbers in parentheses are the paper's equations. The service uses nothing of this; tests compare the two.
+"""
+
+import numpy as np
+
+from calib.camera import Camera
+from calib.noise.base import DepthNoise
+
+
+def knots(control_points: int, degree: int) -> np.ndarray:
+    """Equidistant knots η in [0, 1], the first and the last repeated degree + 1 times."""
+    spans = control_points - degree
+    return np.array([0.0] * degree + [i / spans for i in range(spans + 1)] + [1.0] * degree)
+
+
+def base_spline(i: int, d: int, u: float, eta: np.ndarray) -> float:
+    """n_{i,d}(u) by Cox–de Boor (4, 5); 0/0 := 0, and the last span that is not empty includes its end."""
+    if d == 0:
+        closes = eta[i] < eta[i + 1] == eta[-1] and u == eta[-1]
+        return 1.0 if eta[i] <= u < eta[i + 1] or closes else 0.0
+    rise, fall = eta[i + d] - eta[i], eta[i + d + 1] - eta[i + 1]
+    left = (u - eta[i]) / rise * base_spline(i, d - 1, u, eta) if rise > 0 else 0.0
+    right = (eta[i + d + 1] - u) / fall * base_spline(i + 1, d - 1, u, eta) if fall > 0 else 0.0
+    return left + right
+
+
+def base_spline_slope(i: int, d: int, u: float, eta: np.ndarray) -> float:
+    """Derivative of n_{i,d} at u, which is exact in terms of the splines of one degree less."""
+    rise, fall = eta[i + d] - eta[i], eta[i + d + 1] - eta[i + 1]
+    left = d / rise * base_spline(i, d - 1, u, eta) if rise > 0 else 0.0
+    right = d / fall * base_spline(i + 1, d - 1, u, eta) if fall > 0 else 0.0
+    return left - right
+
+
+def rational_basis(u: float, w: float, degree: int, weights: np.ndarray) -> np.ndarray:
+    """R_ij(u, w) for every control point (rows, columns) (3)."""
+    rows, columns = weights.shape
+    n_u = [base_spline(i, degree, u, knots(rows, degree)) for i in range(rows)]
+    n_w = [base_spline(j, degree, w, knots(columns, degree)) for j in range(columns)]
+    products = np.outer(n_u, n_w) * weights
+    return products / products.sum()
+
+
+def surface(u: float, w: float, control: np.ndarray, degree: int) -> np.ndarray:
+    """N((u, w), Θ) for control points (rows, columns, 3) of equal weight (2)."""
+    basis = rational_basis(u, w, degree, np.ones(control.shape[:2]))
+    return np.einsum("ij,ijk->k", basis, control)
+
+
+def surface_normal(u: float, w: float, control: np.ndarray, degree: int) -> np.ndarray:
+    """N̂ = ∂u × ∂w / ‖∂u × ∂w‖ for control points (rows, columns, 3) of equal weight."""
+    rows, columns = control.shape[:2]
+    eta_u, eta_w = knots(rows, degree), knots(columns, degree)
+    n_u = [base_spline(i, degree, u, eta_u) for i in range(rows)]
+    n_w = [base_spline(j, degree, w, eta_w) for j in range(columns)]
+    d_u = [base_spline_slope(i, degree, u, eta_u) for i in range(rows)]
+    d_w = [base_spline_slope(j, degree, w, eta_w) for j in range(columns)]
+    normal = np.cross(np.einsum("i,j,ijk->k", d_u, n_w, control), np.einsum("i,j,ijk->k", n_u, d_w, control))
+    return normal / np.linalg.norm(normal)
+
+
+def deform(u: float, w: float, offset: float, control: np.ndarray, degree: int) -> np.ndarray:
+    """D_Θ(v) = N((u, w), Θ) + N̂((u, w), Θ) · o (8)."""
+    return surface(u, w, control, degree) + surface_normal(u, w, control, degree) * offset
+
+
+def distort(x: float, y: float, coefficients: np.ndarray) -> tuple[float, float]:
+    """Brown–Conrady with rational part: normalised coordinates (x, y) as the lens bends them."""
+    k1, k2, p1, p2, k3, k4, k5, k6 = coefficients
+    r2 = x**2 + y**2
+    radial = (1 + k1 * r2 + k2 * r2**2 + k3 * r2**3) / (1 + k4 * r2 + k5 * r2**2 + k6 * r2**3)
+    return x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2), y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
+
+
+def project(camera: Camera, vertex: np.ndarray) -> np.ndarray:
+    """P_s(v) = D_s(K_s R_s (v − c_s) / (R_s (v − c_s))_z) (10); NaN where the vertex is not before the camera."""
+    x, y, z = camera.T_rs[:3, :3].T @ (vertex - camera.T_rs[:3, 3])
+    if z <= 0:
+        return np.full(2, np.nan)
+    u, v = distort(x / z, y / z, camera.lens.coefficients)
+    return np.array([camera.fx * u + camera.cx, camera.fy * v + camera.cy])
+
+
+def distance(camera: Camera, vertex: np.ndarray) -> float:
+    """d = ‖c_s − v‖₂ (11)."""
+    return float(np.sqrt(np.sum((camera.T_rs[:3, 3] - vertex) ** 2)))
+
+
+def seen_pixel(camera: Camera, vertex: np.ndarray, normal: np.ndarray) -> tuple[int, int] | None:
+    """Row and column of p = ⌊P_s(v) + (½, ½)⌋ (20); None outside the image, behind the camera or facing away."""
+    column, row = np.floor(project(camera, vertex) + 0.5)
+    facing = normal @ (vertex - camera.T_rs[:3, 3]) < 0
+    if not (facing and 0 <= column < camera.width and 0 <= row < camera.height):
+        return None
+    return int(row), int(column)
+
+
+def depth_cost(  # one argument per symbol
+    camera: Camera,
+    noise: DepthNoise,
+    image: np.ndarray,
+    amplitude: np.ndarray,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    outlier_share: float,
+    range_m: float,
+) -> float:
+    """−Σ_v log φ (17–19), where φ is the larger of (1 − ε) times the Gaussian and ε times the uniform density.
+
+    A vertex that is not seen, or is seen by a pixel without a return, has the uniform density in the Gaussian's place.
+    """
+    total = 0.0
+    for vertex, normal in zip(vertices, normals):
+        pixel = seen_pixel(camera, vertex, normal)
+        density = 1 / range_m
+        if pixel is not None and np.isfinite(image[pixel]):
+            x, a = np.array([distance(camera, vertex)]), np.array([float(amplitude[pixel])])
+            p = (np.array([pixel[0]]), np.array([pixel[1]]))
+            sigma = noise.deviation(x, a, p)[0]
+            e = (image[pixel] - x[0] - noise.mean(x, a, p)[0]) / sigma
+            density = np.exp(-0.5 * e**2) / (np.sqrt(2 * np.pi) * sigma)
+        total -= np.log(max((1 - outlier_share) * density, outlier_share / range_m))
+    return float(total)
+
+
+def color_cost(
+    camera: Camera,
+    sigma: float,
+    image: np.ndarray,
+    colors: np.ndarray,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    outlier_share: float,
+) -> float:
+    """−Σ_v log of the density of the measured colour given the vertex's; uniform where one of them is unknown."""
+    total, uniform = 0.0, 256.0**-3
+    for vertex, normal, color in zip(vertices, normals, colors):
+        pixel = seen_pixel(camera, vertex, normal)
+        density = uniform
+        if pixel is not None and np.all(np.isfinite(color)):
+            e = (image[pixel].astype(float) - color) / sigma
+            density = np.exp(-0.5 * e @ e) / (np.sqrt(2 * np.pi) * sigma) ** 3
+        total -= np.log(max((1 - outlier_share) * density, outlier_share * uniform))
+    return float(total)
+
+
+def stretch_cost(rest: np.ndarray, vertices: np.ndarray, edges: np.ndarray, deviation: float) -> float:
+    """½ Σ (relative change of length / deviation)² over the edges."""
+    total = 0.0
+    for i, j in edges:
+        before, now = np.linalg.norm(rest[i] - rest[j]), np.linalg.norm(vertices[i] - vertices[j])
+        total += 0.5 * ((now / before - 1) / deviation) ** 2
+    return float(total)
