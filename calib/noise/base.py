@@ -5,7 +5,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-#: Texels describe the density for |measured − synthesised| up to this [m]; beyond, they keep their edge value.
+#: Texels describe the density for |measured − mean offset − synthesised| up to this [m]; beyond, they keep their edge
+#: value.
 WINDOW_M = 0.05
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
@@ -56,10 +57,11 @@ def render_texture(
 ) -> NDArray[np.float32]:
     """Renders eq. 18 for one frame into the coefficients that the likelihood kernel reads.
 
-    Every noise model becomes the same texture, so all of them run at the same speed. With t = measured − x, a texel
-    holds [measured, m0, m1, s0, s1, s2, n0, n1]: mean offset m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the
-    negative logarithm of the normaliser n0 + n1 t. A pixel without a return, and the border of one pixel that stands
-    for everything outside the image, hold the uniform density instead.
+    Every noise model becomes the same texture, so all of them run at the same speed. With y the measurement without
+    the mean offset that it has if it is right, and t = y − x, a texel holds [y, m0, m1, s0, s1, s2, n0, n1]: mean
+    offset beyond that one m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the negative logarithm of the normaliser
+    n0 + n1 t. A pixel without a return, and the border of one pixel that stands for everything outside the image, hold
+    the uniform density instead.
 
     Args:
         model: the noise model.
@@ -73,17 +75,19 @@ def render_texture(
     height, width = distance.shape
     texture = np.zeros((height + 2, width + 2, 8), np.float32)
     texture[..., 6] = uniform
-    valid = distance > 0
+    valid = np.isfinite(distance) & (distance > 0)  # some devices report infinity for what is out of range
     if model.uses_amplitude:
         valid &= np.isfinite(amplitude)
     rows, columns = np.nonzero(valid)
     p = (rows, columns)
     measured, a = distance[p].astype(np.float64), amplitude[p].astype(np.float64)
-    nodes = [np.maximum(measured - t, 1e-3) for t in (-WINDOW_M, 0.0, WINDOW_M)]
+    offset = model.mean(measured, a, p)  # may be larger than the window, which has to lie where the surface is
+    center = measured - offset
+    nodes = [np.maximum(center - t, 1e-3) for t in (-WINDOW_M, 0.0, WINDOW_M)]
     deviation = [model.deviation(x, a, p) for x in nodes]
     texels = np.empty((measured.size, 8), np.float32)
-    texels[:, 0] = measured
-    texels[:, 1], texels[:, 2], _ = _parabola(*(model.mean(x, a, p) for x in nodes))
+    texels[:, 0] = center
+    texels[:, 1], texels[:, 2], _ = _parabola(*(model.mean(x, a, p) - offset for x in nodes))
     texels[:, 3], texels[:, 4], texels[:, 5] = _parabola(*(1 / sigma for sigma in deviation))
     texels[:, 6], texels[:, 7], _ = _parabola(*(np.log(sigma) + LOG_SQRT_2PI for sigma in deviation))
     texture[rows + 1, columns + 1] = texels

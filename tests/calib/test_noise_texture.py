@@ -1,0 +1,73 @@
+"""The texture that the likelihood kernel reads says what eq. 18 says, and uniform where there is nothing to say."""
+
+import numpy as np
+import pytest
+
+from calib.noise.base import WINDOW_M, log_density, render_texture
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.structured_light import StructuredLight
+from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
+
+#: The simulated time-of-flight head's law, the same with a mean offset that depends on both, and a Kinect's.
+TOF = GaussianPolynomial(SIGMA_POLYNOMIAL, amplitudes=(400.0, 10_000.0))
+BIASED = GaussianPolynomial(SIGMA_POLYNOMIAL, ((0.10, 2e-6), (-0.02, 0.0)), amplitudes=(400.0, 10_000.0))
+MODELS = {"tof": TOF, "biased": BIASED, "structured_light": StructuredLight()}
+UNIFORM = 1.6
+
+
+def negative_log_density(texels, t):
+    """What the kernel computes from texels (n, 8) at t = y − x (m,), y the first number of a texel: (n, m)."""
+    _, m0, m1, s0, s1, s2, n0, n1 = texels.astype(np.float64).T[:, :, None]
+    t = np.asarray(t)
+    inside = np.clip(t, -WINDOW_M, WINDOW_M)
+    e = (t - m0 - m1 * inside) * (s0 + inside * (s1 + inside * s2))
+    return 0.5 * e**2 + n0 + n1 * inside
+
+
+@pytest.mark.parametrize(("name", "allowed"), [("tof", 1e-5), ("biased", 2e-4), ("structured_light", 1e-3)])
+@pytest.mark.parametrize("distance", [0.7, 1.0, 1.6, 3.0])
+def test_it_is_eq_18_within_three_deviations(name, allowed, distance):
+    """In units of the log-density itself, whose difference between 0 and 3 deviations is 4.5."""
+    model = MODELS[name]
+    amplitude = np.array([[500.0, 3000.0, 9000.0]], np.float32)
+    p = (np.zeros(3, int), np.arange(3))
+    texels = render_texture(model, np.full((1, 3), distance, np.float32), amplitude, UNIFORM)[1, 1:4]
+    measured, a = np.full(3, np.float32(distance), float), amplitude[0].astype(float)
+    middle, sigma = measured - model.mean(measured, a, p), model.deviation(measured, a, p)
+    for z in np.linspace(-3, 3, 25):
+        x = middle + z * sigma
+        exact = -log_density(model, measured, x, a, p)
+        rendered = np.diagonal(negative_log_density(texels, texels[:, 0] - x))
+        np.testing.assert_allclose(rendered, exact, atol=allowed)
+
+
+def test_where_nothing_returned_and_around_the_image_it_is_uniform():
+    distance = np.array([[1.0, np.nan, 0.0], [np.inf, -1.0, 2.0]], np.float32)
+    texture = render_texture(TOF, distance, np.full((2, 3), 3000, np.float32), UNIFORM)
+    assert texture.shape == (4, 5, 8)
+    assert texture.dtype == np.float32
+    measured = np.zeros((4, 5), bool)
+    measured[1, 1] = measured[2, 3] = True
+    np.testing.assert_array_equal(texture[..., 3] > 0, measured)
+    silent = texture[~measured]
+    np.testing.assert_array_equal(silent, np.tile(np.array([0, 0, 0, 0, 0, 0, UNIFORM, 0], np.float32), (18, 1)))
+    np.testing.assert_allclose(negative_log_density(silent, [-3.0, 0.0, 3.0]), UNIFORM, rtol=1e-7)
+
+
+def test_infinite_distances_are_no_returns_for_every_model():
+    distance = np.full((2, 2), np.inf, np.float32)
+    for model in MODELS.values():
+        assert np.isfinite(render_texture(model, distance, np.ones_like(distance), UNIFORM)).all()
+
+
+def test_a_pixel_without_an_amplitude_cannot_be_judged_by_a_model_that_needs_one():
+    amplitude = np.array([[np.nan, 3000.0]], np.float32)
+    distance = np.ones((1, 2), np.float32)
+    assert (render_texture(TOF, distance, amplitude, UNIFORM)[1, 1:3, 3] > 0).tolist() == [False, True]
+    assert (render_texture(StructuredLight(), distance, amplitude, UNIFORM)[1, 1:3, 3] > 0).all()
+
+
+def test_beyond_the_window_the_density_still_falls():
+    texels = render_texture(TOF, np.ones((1, 1), np.float32), np.full((1, 1), 3000, np.float32), UNIFORM)[1, 1:2]
+    cost = negative_log_density(texels, np.linspace(0, 2, 201))[0]
+    assert np.all(np.diff(cost) > 0)
