@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError, Pixels
@@ -66,13 +68,17 @@ class Settings:
             NoiseError: the file or one of its arrays is missing or has the wrong shape.
         """
         try:
-            arrays = np.load(self.file)
-        except (OSError, ValueError) as error:
+            with self.file.open("rb") as stream, NpzFile(stream) as archive:
+                arrays = dict(archive)
+        except (OSError, ValueError, BadZipFile) as error:
             raise NoiseError(f"file = {str(self.file)!r} cannot be read as .npz: {error}") from error
-        missing = {"sigma", "mu", "distances", "amplitudes"} - set(arrays.files)
+        missing = {"sigma", "mu", "distances", "amplitudes"} - set(arrays)
         if missing:
             raise NoiseError(f"file = {str(self.file)!r} lacks the array(s) {sorted(missing)}")
         sigma, mu = arrays["sigma"], arrays["mu"]
         if sigma.ndim != 4 or mu.ndim != 4 or sigma.shape[2:] != mu.shape[2:]:
             raise NoiseError(f"sigma and mu in {str(self.file)!r} must be (i, j, height, width) of one image size")
+        for key in ("distances", "amplitudes"):
+            if arrays[key].shape != (2,) or not arrays[key][0] < arrays[key][1]:
+                raise NoiseError(f"{key} in {str(self.file)!r} must be [lowest, highest], not {arrays[key].tolist()}")
         return PixelPolynomial(sigma, mu, arrays["distances"], arrays["amplitudes"])
