@@ -1,8 +1,10 @@
 """The bus between processes: zenoh."""
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import zenoh
 from zenoh import ext
@@ -14,6 +16,8 @@ from abs_service.bus.session import Role, open_session
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
 HEARTBEAT_S = 0.5
+
+T = TypeVar("T")
 
 _PRIORITIES = {
     Priority.REAL_TIME: zenoh.Priority.REAL_TIME,
@@ -74,7 +78,7 @@ class ZenohBus:
         def on_query(query: zenoh.Query) -> None:
             query.reply(key, payload(), encoding=f"{ENCODING};{message}")
 
-        return self._keep(self._session.declare_queryable(key, on_query))
+        return self._keep(_outside_daemons(lambda: self._session.declare_queryable(key, on_query)))
 
     def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.ask`."""
@@ -83,10 +87,13 @@ class ZenohBus:
 
     def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
         """See `contract.Bus.subscribe`."""
+
         # The bytes are copied here, in zenoh's thread, so that a slow reader never holds shared memory.
-        return self._keep(
-            self._session.declare_subscriber(self._key(pattern), lambda sample: on_sample(self._sample(sample)))
-        )
+        def on_zenoh_sample(sample: zenoh.Sample) -> None:
+            on_sample(self._sample(sample))
+
+        key = self._key(pattern)
+        return self._keep(_outside_daemons(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
 
     def show_alive(self, component: str) -> Subscription:
         """See `contract.Bus.show_alive`."""
@@ -100,8 +107,8 @@ class ZenohBus:
             component = keys.topic(self._rig, str(sample.key_expr)).removeprefix(prefix)
             on_change(component, sample.kind == zenoh.SampleKind.PUT)
 
-        tokens = self._session.liveliness()
-        return self._keep(tokens.declare_subscriber(self._key(keys.live("**")), on_token, history=True))
+        tokens, key = self._session.liveliness(), self._key(keys.live("**"))
+        return self._keep(_outside_daemons(lambda: tokens.declare_subscriber(key, on_token, history=True)))
 
     def close(self) -> None:
         """Ends the session; may be called again."""
@@ -151,7 +158,7 @@ class _Announcement:
         self._key = key
         self._message = message
         self._last: bytes | None = None
-        self._queryable = session.declare_queryable(key, self._on_query)
+        self._queryable = _outside_daemons(lambda: session.declare_queryable(key, self._on_query))
 
     def put(self, payload: bytes, attachment: bytes = b"") -> None:
         self._last = payload
@@ -170,6 +177,25 @@ class _Declared:
         # zenoh refuses to take back twice what it may do once.
         undeclare, self._undeclare = self._undeclare, _nothing
         undeclare()
+
+
+def _outside_daemons(declare: Callable[[], T]) -> T:
+    """Declares something with a callback, from a thread that is no daemon.
+
+    The thread in which zenoh calls back is a daemon if the declaring thread is one. The interpreter does not wait for
+    daemons when it ends: such a thread, awakened by the session's close, would return from Rust to an interpreter that
+    is gone, and abort the process ("FATAL: exception not rethrown").
+    """
+    declared: Future[T] = Future()
+
+    def run() -> None:
+        try:
+            declared.set_result(declare())
+        except Exception as error:
+            declared.set_exception(error)
+
+    threading.Thread(target=run, name="declare", daemon=False).start()
+    return declared.result()
 
 
 def _nothing() -> None:

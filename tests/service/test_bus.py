@@ -4,6 +4,7 @@ import gc
 import queue
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
@@ -205,3 +206,25 @@ def test_closing_twice_is_fine(endpoint):
     bus = ZenohBus.open("demo", endpoint, Role.ROUTER, shared_memory=False)
     bus.close()
     bus.close()
+
+
+def test_the_interpreter_waits_for_callbacks_that_a_daemon_declared(open_bus):
+    bus = open_bus()
+    before = set(threading.enumerate())
+
+    def declare():
+        bus.announce("config", "abs.v1.Config")
+        bus.answer("schema", "bytes", bytes)
+        bus.subscribe("**", lambda sample: None)
+        bus.watch_alive(lambda component, alive: None)
+
+    daemon = threading.Thread(target=declare, daemon=True)
+    daemon.start()
+    daemon.join()
+    callbacks = set(threading.enumerate()) - before
+    assert len(callbacks) == 4
+    assert not any(thread.daemon for thread in callbacks)
+    bus.close()
+    for thread in callbacks:
+        thread.join(5)
+        assert not thread.is_alive()
