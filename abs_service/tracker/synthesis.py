@@ -32,6 +32,7 @@ class SparseSynthesis:
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
         self._size = (camera.height, camera.width)
+        self._limit = _field_radius(camera) ** 2
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes."""
@@ -39,9 +40,29 @@ class SparseSynthesis:
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
         _synthesize(
-            surface.vertices, surface.normals, self._pose, self._matrix, self._lens, *self._size, pixel, distance
+            surface.vertices,
+            surface.normals,
+            self._pose,
+            self._matrix,
+            self._lens,
+            self._limit,
+            *self._size,
+            pixel,
+            distance,
         )
         return Synthesis(pixel, distance)
+
+
+def _field_radius(camera: Camera) -> float:
+    """Largest x/z and y/z, as a radius, that the camera sees.
+
+    Beyond, the polynomial of a lens may fold back into the image, or leave the range of numbers.
+    """
+    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    rim = (columns % (camera.width - 1 or 1) == 0) | (rows % (camera.height - 1 or 1) == 0)
+    directions = camera.directions(np.stack([columns[rim], rows[rim]], axis=-1))
+    radius = np.linalg.norm(directions[:, :2], axis=1) / directions[:, 2]
+    return float(radius.max() * (1 + 2 / min(camera.width, camera.height)) + 1 / min(camera.fx, camera.fy))
 
 
 @kernel
@@ -51,13 +72,14 @@ def _synthesize(
     pose: NDArray[np.float32],
     matrix: NDArray[np.float32],
     lens: NDArray[np.float32],
+    limit: float,
     height: int,
     width: int,
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
 ) -> None:
-    """Eqs. 10, 11 and 20 for a population; arguments as in `SparseSynthesis` and `Synthesis`, pose (3, 4) = T_sr."""
-    one, two = np.float32(1), np.float32(2)
+    """Eqs. 10, 11 and 20 for a population; as in `SparseSynthesis` and `Synthesis`, pose (3, 4) = T_sr, limit of r²."""
+    half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
     fx, fy, cx, cy = matrix
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     stride = width + 2
@@ -72,15 +94,14 @@ def _synthesize(
             nx = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
             ny = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
             nz = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
-            seen = (nx * x + ny * y + nz * z < 0) and z > np.float32(1e-6)
             inverse = one / z
             u, w = x * inverse, y * inverse
             r2 = u * u + w * w
+            facing = nx * x + ny * y + nz * z < 0
             radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-            column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx
-            row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy
-            column = min(max(column, -one), right) + np.float32(1.5)
-            row = min(max(row, -one), bottom) + np.float32(1.5)
-            index = np.int32(row) * stride + np.int32(column)
-            pixel[k, v] = index if seen else 0
+            column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx + half
+            row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy + half
+            inside = column >= 0 and column < right and row >= 0 and row < bottom
+            seen = facing and z > np.float32(1e-6) and r2 < limit and inside
+            pixel[k, v] = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
             distance[k, v] = np.sqrt(x * x + y * y + z * z)

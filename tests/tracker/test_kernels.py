@@ -1,0 +1,266 @@
+"""Every kernel computes what its equation says; also as plain Python, where coverage and debuggers can follow."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from abs_service.observation import ColorImage
+from abs_service.tracker.models.nurbs import Settings as NurbsSettings
+from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.synthesis import SparseSynthesis
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from calib import pose
+from calib.camera import Camera
+from calib.lens import Lens
+from calib.noise.color import GaussianColor
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.structured_light import StructuredLight
+from calib.rig import Rig, Sensor
+from tests import reference
+from tests.tracker.scenes import CAMERA, as_surface, depth_image, observation, sheet
+
+SHARE, RANGE_M = 0.05, 5.0
+NOISE = GaussianPolynomial(((1e-3, 1e-7), (2e-3, 0.0)), ((5e-3,), (-2e-3,)), amplitudes=(0.0, 10_000.0))
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") != "0"
+few = settings(max_examples=10 if INTERPRETED else 50)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def scattered(generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices in and around the camera's view, some behind it, with normals in all directions."""
+    vertices = generator.uniform((-0.5, -0.4, 0.4), (0.5, 0.4, 1.6), (count, 3))
+    vertices[::7, 2] -= 2
+    normals = generator.normal(size=(count, 3)) - (0, 0, 1)
+    return vertices.astype(np.float32), (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
+
+
+def undecided(camera: Camera, vertices: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Vertices (n,) so near to a pixel's rim, or so nearly edge-on, that single precision may decide otherwise."""
+    place = np.array([reference.project(camera, vertex) for vertex in vertices.astype(float)])
+    rim = np.abs(place + 0.5 - np.round(place + 0.5)).min(axis=1) < 1e-3
+    edge_on = np.abs(np.einsum("ni,ni->n", normals, vertices - camera.center)) < 1e-5
+    return rim | edge_on
+
+
+def decided(generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+    vertices, normals = scattered(generator, count)
+    keep = ~undecided(CAMERA, vertices, normals)
+    return vertices[keep], normals[keep]
+
+
+@few
+@given(seeds)
+def test_synthesis_is_eqs_10_11_and_20(seed):
+    vertices, normals = decided(np.random.default_rng(seed), 40)
+    seen = SparseSynthesis(CAMERA).synthesize(as_surface((vertices, normals)))
+    pixels = [reference.seen_pixel(CAMERA, *pair) for pair in zip(vertices.astype(float), normals)]
+    # With a border of one pixel, pixel (row, column) is at (row + 1, column + 1).
+    stride = CAMERA.width + 2
+    expected = [0 if pixel is None else (pixel[0] + 1) * stride + pixel[1] + 1 for pixel in pixels]
+    assert seen.pixel[0].tolist() == expected
+    distances = [reference.distance(CAMERA, vertex) for vertex in vertices.astype(float)]
+    np.testing.assert_allclose(seen.distance[0], distances, rtol=1e-5)
+
+
+def test_what_is_behind_the_camera_or_faces_away_is_pixel_0():
+    camera = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
+    vertices = np.array([[0, 0, 1], [0, 0, -1], [0, 0, 0], [0, 0, 1], [np.nan, 0, 1]], np.float32)
+    normals = np.array([[0, 0, -1], [0, 0, 1], [0, 0, -1], [0, 0, 1], [0, 0, -1]], np.float32)
+    with np.errstate(all="ignore"):
+        pixel = SparseSynthesis(camera).synthesize(as_surface((vertices, normals))).pixel[0]
+    assert pixel[0] > 0
+    assert pixel[1:].tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("coefficients", [[0.0], [-0.3], [0, 0, 0, 0, 9.0], [5.2, 3.4, 0, 0, 0.2, 5.5, 5.1, 0.9]])
+def test_no_vertex_however_far_aside_reads_outside_the_texture(coefficients):
+    camera = Camera(8, 6, 10.0, 10.0, 3.5, 2.5, Lens(np.array(coefficients)))
+    generator = np.random.default_rng(1)
+    direction = generator.normal(size=(400, 3)) * 10.0 ** generator.uniform(-7, 7, (400, 3))
+    vertices = np.abs(direction) * np.sign(generator.normal((0, 0, 9), 1.0, (400, 3)))
+    with np.errstate(all="ignore"):
+        surface = as_surface((vertices, -vertices / np.linalg.norm(vertices, axis=1, keepdims=True)))
+        pixel = SparseSynthesis(camera).synthesize(surface).pixel
+    assert pixel.min() >= 0
+    assert pixel.max() < 8 * 10
+
+
+def test_beyond_the_fold_of_a_barrel_nothing_is_seen():
+    """The polynomial maps x/z = 1.66 to 0.29: into the image, although it is far outside the field of view."""
+    camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5, Lens(np.array([-0.3])))
+    assert 0 < camera.project(np.array([1.66, 0, 1]))[0] < 64
+    vertices = np.array([[1.66, 0, 1], [0.29, 0, 1]])
+    pixel = SparseSynthesis(camera).synthesize(as_surface((vertices, -vertices))).pixel[0]
+    assert pixel[0] == 0
+    assert pixel[1] > 0
+
+
+def test_the_image_ends_half_a_pixel_beyond_its_outer_centres():
+    camera = Camera(4, 3, 100.0, 100.0, 0.0, 0.0)
+    columns = np.array([-0.51, -0.49, 0.49, 0.51, 3.49, 3.51, 40.0])
+    vertices = np.column_stack([columns / 100, np.zeros(7), np.ones(7)])
+    surface = as_surface((vertices, np.tile([0, 0, -1.0], (7, 1))))
+    assert SparseSynthesis(camera).synthesize(surface).pixel[0].tolist() == [0, 7, 7, 8, 10, 0, 0]
+
+
+def bounds() -> Bounds:
+    rig = Rig("r", {"tof": Sensor("tof", CAMERA, NOISE)})
+    term = likelihood.Settings(SHARE, RANGE_M).build(rig, sheet())._terms[0]
+    assert isinstance(term, DepthTerm)
+    return term._bounds
+
+
+@few
+@given(seeds)
+def test_the_depth_cost_is_the_likelihood(seed):
+    generator = np.random.default_rng(seed)
+    vertices, normals = decided(generator, 40)
+    image = np.full((CAMERA.height, CAMERA.width), np.nan, np.float32)
+    for vertex, normal in zip(vertices, normals):  # near the vertices, some of them beyond all noise
+        pixel = reference.seen_pixel(CAMERA, vertex, normal)
+        if pixel is not None:
+            image[pixel] = reference.distance(CAMERA, vertex) + generator.normal(0, 6e-3)
+    image[generator.uniform(size=image.shape) < 0.1] = np.nan
+    amplitude = generator.uniform(500, 9000, image.shape).astype(np.float32)
+    term = DepthTerm("tof", CAMERA, NOISE, bounds())
+    term.observe(type(depth_image(image))(image, amplitude))
+    expected = reference.depth_cost(
+        CAMERA, NOISE, image, amplitude, vertices.astype(float), normals.astype(float), SHARE, RANGE_M
+    )
+    assert term.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, abs=2e-3 * len(vertices))
+
+
+@pytest.mark.parametrize(
+    ("distance", "expected"),
+    [(np.nan, "uniform"), (1.0, "noise"), (3.0, "outlier"), (0.5, "outlier")],
+)
+def test_what_one_measurement_costs(distance, expected):
+    sigma = 2e-3
+    camera = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
+    term = DepthTerm("tof", camera, GaussianPolynomial(((sigma,),)), bounds())
+    term.observe(depth_image(np.full((6, 8), distance)))
+    cost = term.cost(as_surface((np.array([[0, 0, 1.0]]), np.array([[0, 0, -1.0]]))))[0]
+    density = {
+        "uniform": (1 - SHARE) / RANGE_M,
+        "noise": (1 - SHARE) / (np.sqrt(2 * np.pi) * sigma),
+        "outlier": SHARE / RANGE_M,
+    }
+    assert cost == pytest.approx(-np.log(density[expected]), rel=1e-5)
+
+
+@few
+@given(seeds)
+def test_the_color_cost_is_the_likelihood(seed):
+    generator = np.random.default_rng(seed)
+    vertices, normals = decided(generator, 40)
+    colors = generator.uniform(0, 255, (len(vertices), 3)).astype(np.float32)
+    image = generator.integers(0, 256, (CAMERA.height, CAMERA.width, 3)).astype(np.uint8)
+    for vertex, normal, color in zip(vertices, normals, colors):
+        pixel = reference.seen_pixel(CAMERA, vertex, normal)
+        if pixel is not None:
+            image[pixel] = np.clip(color + generator.normal(0, 15, 3), 0, 255)
+    colors[::5] = np.nan
+    sensor = Sensor("color", CAMERA, GaussianColor(12.0))
+    mesh = sheet()
+    objective = likelihood.Settings(SHARE).build(Rig("r", {"color": sensor}), type(mesh)(*_replaced(mesh, colors)))
+    objective.observe(observation(color=ColorImage(image)))
+    expected = reference.color_cost(
+        CAMERA, 12.0, image, colors.astype(float), vertices.astype(float), normals.astype(float), SHARE
+    )
+    assert objective.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, rel=1e-5)
+
+
+def _replaced(mesh, colors):
+    return mesh.vertices, mesh.faces, colors, mesh.chart
+
+
+@few
+@given(seeds)
+def test_the_stretch_cost_is_that_of_relative_changes_of_length(seed):
+    generator, mesh = np.random.default_rng(seed), sheet(4, 5)
+    prior = StretchPrior(mesh, 0.02)
+    moved = (mesh.vertices + generator.normal(0, 2e-3, (2, *mesh.vertices.shape))).astype(np.float32)
+    costs = prior.cost(as_surface(*((vertices, mesh.normals) for vertices in moved)))
+    expected = [reference.stretch_cost(mesh.vertices, v.astype(float), mesh.edges, 0.02) for v in moved]
+    np.testing.assert_allclose(costs, expected, rtol=2e-4)
+
+
+@few
+@given(seeds)
+def test_the_euclidean_cost_is_exactly_the_weighted_squares(seed):
+    """Missing measurements, and those beyond the cut-offs, cost as much as a difference of the cut-off."""
+    generator = np.random.default_rng(seed)
+    vertices, normals = decided(generator, 30)
+    colors = generator.uniform(0, 255, (len(vertices), 3)).astype(np.float32)
+    colors[::6] = np.nan
+    image = generator.integers(0, 256, (CAMERA.height, CAMERA.width, 3)).astype(np.uint8)
+    distance = np.full((CAMERA.height, CAMERA.width), np.nan, np.float32)
+    weights = euclidean.Settings(4000.0, 0.003, 0.02, 90.0)
+    expected = 0.0
+    for vertex, normal, color in zip(vertices.astype(float), normals, colors):
+        pixel = reference.seen_pixel(CAMERA, vertex, normal)
+        squares = [0.02**2, 90.0**2]
+        if pixel is not None:
+            synthesized = reference.distance(CAMERA, vertex)
+            distance[pixel] = np.float32(synthesized + generator.normal(0, 0.015))
+            squares[0] = min((float(distance[pixel]) - synthesized) ** 2, squares[0])
+            if np.isfinite(color).all():
+                squares[1] = min(float(np.sum((image[pixel] - color.astype(float)) ** 2)), squares[1])
+        expected += 4000.0 * squares[0] + 0.003 * squares[1]
+    rig = Rig("r", {"tof": Sensor("tof", CAMERA, StructuredLight()), "color": Sensor("color", CAMERA, GaussianColor())})
+    mesh = sheet()
+    objective = weights.build(rig, type(mesh)(*_replaced(mesh, colors)))
+    objective.observe(observation(tof=depth_image(distance), color=ColorImage(image)))
+    assert objective.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, abs=2e-3)
+
+
+def test_a_missing_sensor_costs_nothing():
+    rig = Rig("r", {"tof": Sensor("tof", CAMERA, NOISE), "color": Sensor("color", CAMERA, GaussianColor())})
+    mesh = sheet()
+    both, alone = (likelihood.Settings().build(rig, mesh) for _ in range(2))
+    depth = depth_image(np.ones((CAMERA.height, CAMERA.width)))
+    both.observe(observation(tof=depth, color=ColorImage(np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8))))
+    alone.observe(observation(tof=depth, missing=("color",)))
+    surface = as_surface((mesh.vertices, mesh.normals))
+    assert alone.cost(surface)[0] < both.cost(surface)[0]
+    assert [fit.sensor for fit in alone.fits(surface)] == ["tof"]
+
+
+def test_costs_do_not_depend_on_the_rest_of_the_population():
+    mesh = sheet()
+    term = DepthTerm("tof", CAMERA, NOISE, bounds())
+    term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)))
+    color = ColorTerm("color", CAMERA, GaussianColor(), mesh.colors, bounds())
+    color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)))
+    generator = np.random.default_rng(3)
+    population = [(mesh.vertices + generator.normal(0, 5e-3, 3), mesh.normals) for _ in range(4)]
+    for part in (term, color):
+        together = part.cost(as_surface(*population))
+        np.testing.assert_array_equal(together, [part.cost(as_surface(pair))[0] for pair in population])
+
+
+def test_deformation_of_a_population_is_eq_8():
+    mesh = sheet(5, 6)
+    model = NurbsSettings(control_points=(5, 4), degree=2).build(mesh)
+    thetas = model.rest + np.random.default_rng(2).normal(0, 5e-3, (2, len(model.rest)))
+    rigid = pose.from_rotation_vector([0.1, 0.2, -0.1], [0.05, 0, 0.1])
+    thetas[1] = pose.transform(rigid, model.rest.reshape(-1, 3)).ravel()
+    surface = model.deform(thetas)
+    np.testing.assert_allclose(surface.vertices[1].T, pose.transform(rigid, model.mesh.vertices), atol=2e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(INTERPRETED, reason="this is the run without compilation")
+def test_all_of_this_holds_without_compilation():
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-W", "ignore::RuntimeWarning", __file__]
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(sys.path)}
+    outcome = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert outcome.returncode == 0, outcome.stdout[-4000:] + outcome.stderr[-2000:]
