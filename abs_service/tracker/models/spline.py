@@ -53,9 +53,14 @@ def support(
     """
     rows, columns = shape
     spans_u, spans_w = rows - degree, columns - degree
-    i = np.minimum((np.asarray(u) * spans_u).astype(np.int32), spans_u - 1)
-    j = np.minimum((np.asarray(w) * spans_w).astype(np.int32), spans_w - 1)
+    i, j = _spans(u, rows, degree), _spans(w, columns, degree)
     corner = np.arange(degree + 1)
     local = (corner[:, None] * columns + corner).ravel()
     first = (np.arange(spans_u)[:, None] * columns + np.arange(spans_w)).ravel()
     return (i * spans_w + j).astype(np.int32), (first[:, None] + local).astype(np.int32)
+
+
+def _spans(u: NDArray[np.floating], control_points: int, degree: int) -> NDArray[np.int32]:
+    """Knot span of every parameter (n,). The knots decide: u · spans may round across one, unlike the base splines."""
+    inner = clamped_knots(control_points, degree)[degree + 1 : -degree - 1]
+    return np.searchsorted(inner, u, side="right").astype(np.int32)
