@@ -1,0 +1,159 @@
+"""The NURBS model is eqs. 2–8: it leaves the mesh at rest as it is and follows its control points."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import ModelError
+from abs_service.tracker.models.nurbs import Nurbs, Settings, bind
+from calib import pose
+from tests import reference
+from tests.tracker.scenes import flat, sheet, wave
+
+MESH = sheet()
+MODELS = {
+    (shape, degree): Settings(control_points=shape, degree=degree).build(MESH)
+    for shape, degree in [((4, 4), 2), ((3, 3), 1), ((5, 4), 3), ((6, 6), 2), ((12, 12), 4)]
+}
+CASES = pytest.mark.parametrize("case", MODELS, ids=str)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
+    return model.deform(theta[None]).vertices[0].T
+
+
+def order_of(mesh: Mesh) -> np.ndarray:
+    """For every vertex of `MESH` the place of the vertex of `mesh` with the same colour."""
+    return np.array([np.flatnonzero((mesh.colors == color).all(axis=1))[0] for color in MESH.colors])
+
+
+@CASES
+def test_at_rest_the_mesh_is_as_it_was(case):
+    model = MODELS[case]
+    np.testing.assert_allclose(vertices_of(model, model.rest), model.mesh.vertices, atol=1e-6)
+    creased = case[1] == 1  # beside a crease there is space that no normal reaches; a vertex there is moved
+    np.testing.assert_allclose(model.mesh.vertices[order_of(model.mesh)], MESH.vertices, atol=2e-4 if creased else 1e-6)
+
+
+@CASES
+def test_only_the_order_of_the_vertices_changes(case):
+    mesh, place = MODELS[case].mesh, order_of(MODELS[case].mesh)
+    assert sorted(place) == list(range(len(MESH.vertices)))
+    assert {tuple(sorted(face)) for face in mesh.faces.tolist()} == {tuple(sorted(place[f])) for f in MESH.faces}
+    np.testing.assert_array_equal(mesh.chart[place], MESH.chart)
+
+
+def bound(control, degree, count, generator):
+    """Parameters, offsets and the vertices that they belong to."""
+    u, w = generator.uniform(0.05, 0.95, (2, count))
+    offset = generator.uniform(-5e-3, 5e-3, count)
+    vertices = np.array([reference.deform(*at, control, degree) for at in zip(u, w, offset)])
+    return u, w, offset, vertices
+
+
+def bent_control(rows=5, columns=4):
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, rows), np.linspace(-0.15, 0.15, columns), indexing="ij")
+    return np.stack([x, y, wave(x, y)], axis=-1)
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+def test_binding_finds_the_closest_point_and_the_offset(degree):
+    """Eqs. 6 and 7, from a start that is some way off."""
+    generator = np.random.default_rng(7)
+    u, w, offset, vertices = bound(bent_control(), degree, 40, generator)
+    start = np.clip(np.stack([u, w]) + generator.uniform(-0.05, 0.05, (2, 40)), 0, 1)
+    found = bind(vertices, bent_control(), degree, *start)
+    np.testing.assert_allclose(found, [u, w, offset], atol=1e-9)
+
+
+def test_binding_far_from_every_normal_is_an_error():
+    control = bent_control()
+    with pytest.raises(ModelError, match=r"a vertex is 1\d\d\.\d mm away .* larger margin help"):
+        bind(np.array([[0.35, 0.0, 1.0]]), control, 2, np.array([0.9]), np.array([0.5]))
+
+
+@pytest.mark.parametrize(("shape", "degree"), [((4, 4), 2), ((5, 4), 3), ((7, 3), 1), ((6, 6), 4)])
+@given(seed=seeds)
+def test_deformation_is_eq_8(shape, degree, seed):
+    generator = np.random.default_rng(seed)
+    u, w, offset = *generator.uniform(0, 1, (2, 9)), generator.uniform(-0.02, 0.02, 9)
+    mesh = sheet(3, 3)
+    rest = bent_control(*shape)
+    model = Nurbs(mesh, rest, degree, u, w, offset)
+    control = rest + generator.normal(0, 0.01, rest.shape)
+    surface = model.deform(control.reshape(1, -1))
+    place = [np.flatnonzero((model.mesh.colors == color).all(axis=1))[0] for color in mesh.colors]
+    expected = [reference.deform(*at, control, degree) for at in zip(u, w, offset)]
+    normals = [reference.surface_normal(*at, control, degree) for at in zip(u, w)]
+    np.testing.assert_allclose(surface.vertices[0].T[place], expected, atol=2e-6)
+    np.testing.assert_allclose(surface.normals[0].T[place], normals, atol=2e-4)
+
+
+@CASES
+def test_every_candidate_is_deformed_by_itself(case):
+    model = MODELS[case]
+    thetas = model.rest + np.random.default_rng(1).normal(0, 0.01, (5, len(model.rest)))
+    together = model.deform(thetas)
+    for k in range(5):
+        alone = model.deform(thetas[k : k + 1])
+        np.testing.assert_array_equal(together.vertices[k], alone.vertices[0])
+        np.testing.assert_array_equal(together.normals[k], alone.normals[0])
+
+
+@given(
+    st.tuples(*[st.floats(-1.5, 1.5)] * 3).map(np.array), st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array), seeds
+)
+def test_moving_all_control_points_rigidly_moves_the_mesh(rotation, translation, seed):
+    model = MODELS[(4, 4), 2]
+    T = pose.from_rotation_vector(rotation, translation)
+    theta = model.rest + np.random.default_rng(seed).normal(0, 5e-3, len(model.rest))
+    surface = model.deform(np.stack([theta, pose.transform(T, theta.reshape(-1, 3)).ravel()]))
+    moved = pose.transform(T, surface.vertices[0].T)
+    np.testing.assert_allclose(surface.vertices[1].T, moved, atol=3e-6)
+    np.testing.assert_allclose(surface.normals[1].T, surface.normals[0].T @ T[:3, :3].T, atol=1e-4)
+
+
+@CASES
+def test_normals_are_of_unit_length_and_face_the_camera(case):
+    model = MODELS[case]
+    normals = model.deform(model.rest[None]).normals[0].T
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, rtol=1e-5)
+    assert np.all(np.einsum("ni,ni->n", normals, model.mesh.vertices) < 0)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_normals_are_on_the_side_of_the_mesh_s(mirrored):
+    """However the chart lies on the mesh; a chart that is mirrored does not turn the surface inside out."""
+    mesh = sheet()
+    chart = mesh.chart * (-1, 1) if mirrored else mesh.chart
+    model = Settings().build(Mesh(mesh.vertices, mesh.faces, mesh.colors, chart))
+    normals = model.deform(model.rest[None]).normals[0].T
+    assert np.all(np.einsum("ni,ni->n", normals, model.mesh.normals) > 0.98)
+
+
+def test_parameters_are_lengths_of_which_there_are_three_per_control_point():
+    model = MODELS[(5, 4), 3]
+    assert model.rest.shape == model.scales.shape == (60,)
+    assert np.all(model.scales == 1)
+    control = model.rest.reshape(5, 4, 3)
+    # The surface reaches beyond the mesh by the margin, and rows of control points follow the long side.
+    assert control[0, 0, 0] < -0.15
+    assert control[-1, 0, 0] > 0.15
+    assert np.ptp(control[..., 0], axis=0).min() > 0.3
+
+
+@pytest.mark.parametrize(("shape", "degree"), [((3, 3), 3), ((3, 12), 4), ((4, 3), 3)])
+def test_too_few_control_points_for_the_degree_are_named(shape, degree):
+    message = rf"control_points = \[{shape[0]}, {shape[1]}\] is too few for degree = {degree}: .* at least {degree + 1}"
+    with pytest.raises(ModelError, match=message):
+        Settings(control_points=shape, degree=degree).build(MESH)
+
+
+def test_a_mesh_that_the_surface_cannot_follow_is_refused():
+    """A step of 10 cm is no smooth surface of 3 × 3 control points; its normals there leave the vertices behind."""
+    mesh = sheet(height=lambda x, y: flat(x, y) + 0.3 * (np.sin(60 * x) > 0))
+    with pytest.raises(ModelError, match="away from the normal of its closest surface point"):
+        Settings(control_points=(3, 3)).build(mesh)
