@@ -18,7 +18,7 @@ from calib.rig import Rig
 LEAST_VERTICES = 25
 
 #: Share of a grid point's neighbourhood that must show the object for it to become a vertex.
-LEAST_COVER = 0.6
+LEAST_COVER = 0.75
 
 #: Distances around a grid point that differ by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
