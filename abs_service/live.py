@@ -218,9 +218,9 @@ class Live:
         """What a component said last; empty if it said nothing yet."""
         return self.heard.get(component, Heard()).health
 
-    def compiling(self) -> bool:
-        """Whether a tracker is compiling its kernels."""
-        return any(self.health(f"track/{name}").labels.get("phase") == "compiling" for name in self.trackers)
+    def preparing(self) -> bool:
+        """Whether a tracker is compiling its kernels, or loading those that it compiled once."""
+        return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
 
     def _take_truth(self, truth: SurfaceTruth) -> None:
         points_r = _points(truth.points_f32).reshape(truth.rows, truth.columns, 3)

@@ -111,7 +111,7 @@ class Session:
             self._display.estimate(report)
         if topic.startswith("health/"):
             component = topic.removeprefix("health/")
-            busy = self._live.health(component).labels.get("phase") == "compiling"
+            busy = self._live.health(component).labels.get("phase") == "preparing"
             self._supervisor.heard(component, busy)
 
     def _report(self) -> None:

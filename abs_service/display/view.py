@@ -101,8 +101,8 @@ class View:
     @property
     def activity(self) -> str:
         """What is being waited for; "" once there are estimates, or if nothing is tracked."""
-        if self.live.compiling():
-            return "Compiling kernels, once per installation; this takes a minute or so …"
+        if self.live.preparing():
+            return "Preparing kernels; the first start compiles them, which takes about half a minute …"
         if "capture" not in self.live.heard:
             return "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):

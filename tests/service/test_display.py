@@ -161,9 +161,9 @@ def test_troubles_of_components_and_children_that_were_given_up_are_shown(live):
     assert "track/sheet: given up: needed more than 5 restarts" in text
 
 
-def test_compiling_is_said_with_a_spinner(live):
-    take_health(live, Health(component="track/sheet", labels={"phase": "compiling"}))
-    assert "Compiling kernels, once per installation" in drawn(view(live))
+def test_preparing_is_said_with_a_spinner(live):
+    take_health(live, Health(component="track/sheet", labels={"phase": "preparing"}))
+    assert "Preparing kernels; the first start compiles them" in drawn(view(live))
 
 
 def test_before_anything_is_known_the_table_says_what_it_waits_for():

@@ -97,11 +97,11 @@ def test_totals_are_kept_over_all_estimates(live):
 
 
 def test_health_is_kept_with_the_time_at_which_it_came(live):
-    take(live, sample("health/track/sheet", Health(component="track/sheet", labels={"phase": "compiling"})))
+    take(live, sample("health/track/sheet", Health(component="track/sheet", labels={"phase": "preparing"})))
     assert live.heard["track/sheet"].t_ns == 42
-    assert live.compiling()
+    assert live.preparing()
     take(live, sample("health/track/sheet", Health(component="track/sheet", labels={"phase": "tracking"})))
-    assert not live.compiling()
+    assert not live.preparing()
     assert live.health("record").counters == {}
 
 
