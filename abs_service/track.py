@@ -1,6 +1,6 @@
 """A tracker in a running rig: takes the newest frame set, publishes the estimate."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from abs_service import estimates, keys
 from abs_service.bus.contract import MESH, STATE, Bus
@@ -35,6 +35,24 @@ class NewestSets:
         self._frames = frames
         self._synchroniser = synchroniser
         self._clock = clock
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """What became no estimate.
+
+        `skipped` frame sets; by topic, frames `dropped` unseen and `malformed` messages; by stream and cause, frames
+        that are in no set and so `unused`.
+        """
+        counters = {"skipped": self.skipped}
+        counters |= {f"dropped.{topic}": number for topic, number in self._frames.dropped.items()}
+        counters |= {f"malformed.{topic}": number for topic, number in self._frames.malformed.items()}
+        counters |= {f"unused.{stream}": number for stream, number in self._synchroniser.counters.items()}
+        return counters
+
+    @property
+    def last_error(self) -> str:
+        """Why the last malformed message was one; "" if there was none."""
+        return self._frames.last_error
 
     def take(self) -> FrameSet | None:
         """The newest set after everything that has arrived; None if there is none yet."""
@@ -125,9 +143,14 @@ class LiveTracker:
         self._publisher.publish(estimate, self._tracking, solve_ms, skipped)
         self._report(estimate, solve_ms)
 
+    def report(self) -> None:
+        """Enters what was lost on the way into health, also if nothing arrives; call it before `Health.tick`."""
+        self._health.count_up_to(self._sets.counters)
+        if self._sets.last_error:
+            self._health.label("malformed", self._sets.last_error)
+
     def _report(self, estimate: Estimate, solve_ms: float) -> None:
         self._health.count("estimates")
-        self._health.count_up_to({"skipped": self._sets.skipped})
         self._health.gauge("solve_ms", solve_ms)
         self._health.label("phase", estimate.status.lower())
         level = Level.OK if estimate.status in (Status.TRACKING, Status.INITIALIZING) else Level.WARNING

@@ -6,6 +6,8 @@ from abs_service import plugins
 from abs_service.config import ServiceConfig
 from abs_service.tracking import Plan
 from calib.camera import Camera
+from calib.noise.base import DepthNoise
+from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
 
 
@@ -47,17 +49,32 @@ def model_name(config: ServiceConfig, tracker: str) -> str:
     return plugins.table(config.trackers[tracker].model)["type"]
 
 
+def noises(config: ServiceConfig, tracker: str) -> dict[str, DepthNoise | GaussianColor]:
+    """The noise model of every sensor of one tracker.
+
+    Raises:
+        PlanError: a sensor has none.
+        NoiseError: one cannot be made.
+    """
+    models: dict[str, DepthNoise | GaussianColor] = {}
+    for name in config.trackers[tracker].sensors:
+        settings = config.sensors[name].noise
+        if settings is None:
+            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no noise model')
+        models[name] = settings.build()
+    return models
+
+
 def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> Rig:
     """The sensors of one tracker with their cameras and noise models.
 
     Raises:
         PlanError: a sensor has no camera or no noise model.
+        NoiseError: a noise model cannot be made.
     """
     sensors: dict[str, Sensor] = {}
-    for name in config.trackers[tracker].sensors:
-        noise = config.sensors[name].noise
-        if name not in cameras or noise is None:
-            missing = "noise model" if name in cameras else "camera model"
-            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no {missing}')
-        sensors[name] = Sensor(name, cameras[name], noise.build())
+    for name, noise in noises(config, tracker).items():
+        if name not in cameras:
+            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no camera model')
+        sensors[name] = Sensor(name, cameras[name], noise)
     return Rig(config.name, sensors)

@@ -9,7 +9,7 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Mapping
 
 from abs.v1.sensor_model_pb2 import SensorModel
 
@@ -22,9 +22,11 @@ from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
 from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
-from abs_service.tracking import Tracking, streams
+from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
 from calib.camera import Camera
+from calib.noise.base import DepthNoise
+from calib.noise.color import GaussianColor
 from calib.rig import Rig
 from drivers import codec
 
@@ -49,17 +51,26 @@ def run(arguments: argparse.Namespace) -> int:
     with participant.open_bus(settings, arguments) as bus:
         health = Health(bus, f"track/{name}", speaker)
         bus.show_alive(f"track/{name}")
+        # At once, because it takes longer than the devices take to open, and neither needs the other.
+        noises = plans.noises(settings, name)
+        preparing = threading.Thread(target=_prepare, args=(noises, plan, health), daemon=True)
+        preparing.start()
         cameras = _cameras(bus, settings.trackers[name].sensors, health, stop)
+        while preparing.is_alive() and not stop.is_set():
+            preparing.join(0.05)
+            health.tick()
+        health.publish()
         if stop.is_set():
             return Exit.OK
         rig = plans.rig(settings, name, cameras)
-        _in_background(lambda: warm_up(rig, plan), "compiling", health, stop)
         live = _live(bus, settings, name, rig, Tracking(rig, plan), speaker, health)
         while not stop.is_set():
             live.turn()
             if health.due():
                 clock.measure()
+                live.report()
                 health.tick()
+        live.report()
         health.publish()
     return Exit.OK
 
@@ -97,7 +108,6 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
         missing = [sensor for sensor in sensors if sensor not in cameras]
         if not missing:
             break
-        health.label("phase", "waiting")
         health.report("calibration", Level.WARNING, f"waits for the calibration of {', '.join(missing)}")
         health.tick()
         stop.wait(0.1)
@@ -105,12 +115,7 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     return cameras
 
 
-def _in_background(work: Callable[[], None], phase: str, health: Health, stop: threading.Event) -> None:
-    """Does something long while the health goes on to be published."""
-    health.label("phase", phase)
-    health.publish()
-    thread = threading.Thread(target=work, daemon=True)
-    thread.start()
-    while thread.is_alive() and not stop.is_set():
-        thread.join(0.1)
-        health.tick()
+def _prepare(noises: Mapping[str, DepthNoise | GaussianColor], plan: Plan, health: Health) -> None:
+    health.label("phase", "preparing")
+    warm_up(noises, plan)
+    health.label("phase", "waiting")

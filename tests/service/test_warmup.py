@@ -1,0 +1,63 @@
+"""After the warm-up nothing is left to be compiled or loaded when the first frames come."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from abs_service import config
+from abs_service.commands import plans
+from abs_service.warmup import warm_up
+from calib.noise.pixel_polynomial import PixelPolynomial
+
+#: Tracks real frames after the warm-up and tells which kernels had how many forms before and afterwards.
+PROGRAM = """
+import gc, json, time
+from numba.core.dispatcher import Dispatcher
+from abs_service import config
+from abs_service.commands import plans
+from abs_service.tracking import Tracking, streams
+from abs_service.synchroniser import Synchroniser
+from abs_service.warmup import warm_up
+from drivers.simulated import address
+
+settings = config.load_default()
+plan = plans.plan(settings, "sheet")
+warm_up(plans.noises(settings, "sheet"), plan)
+
+simulation = address.parse(settings.devices["sim"].uri).build()
+exposures = [simulation.expose(k)[0] for k in range(3)]
+
+def forms():
+    return {f.py_func.__module__ + "." + f.py_func.__name__: len(f.signatures) for f in gc.get_objects()
+             if isinstance(f, Dispatcher) and f.py_func.__module__.startswith("abs_service")}
+
+before = forms()
+rig = plans.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
+tracking = Tracking(rig, plan)
+synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 10**7)
+for frames in exposures:
+    for frame in frames:
+        for frame_set in synchroniser.add(frame):
+            estimate = tracking.track(frame_set, lambda: True)
+print(json.dumps([before, forms(), estimate.status]))
+"""
+
+
+@pytest.mark.slow
+def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare():
+    out = subprocess.run([sys.executable, "-c", PROGRAM], check=True, capture_output=True, text=True, timeout=200)
+    before, after, status = json.loads(out.stdout)
+    assert status == "TRACKING"
+    assert before == after
+    assert sum(before.values()) >= 4
+
+
+def test_a_map_of_noise_that_is_smaller_than_the_nominal_image_does_no_harm():
+    settings = config.load_default()
+    plan = plans.plan(settings, "sheet")
+    small = np.full((1, 1, 2, 2), 0.01)
+    tof = PixelPolynomial(small, np.zeros_like(small), np.array([0.0, 9.0]), np.array([0.0, 1.0]))
+    warm_up(plans.noises(settings, "sheet") | {"tof": tof}, plan)
