@@ -61,6 +61,8 @@ class GaussianPolynomial:
 
     def _polynomial(self, table: Table, x: NDArray[np.float64], a: NDArray[np.float64]) -> NDArray[np.float64]:
         coefficients = np.asarray(table)
+        if coefficients.size == 1:
+            return np.full(np.shape(x), coefficients[0, 0])
         if coefficients.shape[1] == 1:  # an amplitude that nothing depends on may be missing (NaN)
             return np.asarray(polyval(np.clip(x, *self.distances), coefficients[:, 0]), np.float64)
         x, a = np.clip(x, *self.distances), np.clip(a, *self.amplitudes)

@@ -1,10 +1,12 @@
 """Derivatives of residuals by vertex positions, from which the curvature of the objective is built."""
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
+
+#: Half the side of the neighbourhood whose colours give the image's slope at a vertex [px].
+RADIUS_PX = 2
 
 #: Grazing views: the cosine between line of sight and normal below which a row would explode.
 LEAST_COSINE = 0.2
@@ -36,13 +38,23 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    smooth = cv2.GaussianBlur(image, (0, 0), 1.0)
-    gradient = np.stack([cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)], axis=-1) / 8
     points = np.asarray(vertices, np.float64)
     step = 1e-4
     offsets = np.concatenate([np.eye(3), -np.eye(3)]) * step
     moved = camera.project(points[:, None] + offsets)
     projection = (moved[:, :3] - moved[:, 3:]).transpose(0, 2, 1) / (2 * step)
-    place = np.floor(camera.project(points) + 0.5).astype(int)
-    column, row = np.clip(place[:, 0], 0, camera.width - 1), np.clip(place[:, 1], 0, camera.height - 1)
-    return gradient[row, column].astype(np.float64) @ projection
+    return _image_gradient(image, np.floor(camera.project(points) + 0.5).astype(int)) @ projection
+
+
+def _image_gradient(image: NDArray[np.float32], pixels: NDArray[np.integer]) -> NDArray[np.float64]:
+    """Derivatives (n, 3 channels, 2) of an image by column and row at pixels (n, 2), over a Gaussian neighbourhood.
+
+    Only the vertices' pixels are smoothed; a colour image has a thousand times as many.
+    """
+    steps = np.arange(-RADIUS_PX, RADIUS_PX + 1)
+    column = np.clip(pixels[:, :1] + steps, 0, image.shape[1] - 1)
+    row = np.clip(pixels[:, 1:] + steps, 0, image.shape[0] - 1)
+    patches = image[row[:, :, None], column[:, None, :]].astype(np.float64)
+    bell = np.exp(-0.5 * steps**2)
+    weights = np.outer(bell, steps * bell) / (bell.sum() * (steps**2 * bell).sum())
+    return np.einsum("nrkc,rkd->ncd", patches, np.stack([weights, weights.T], axis=-1))
