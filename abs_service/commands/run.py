@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -56,11 +56,12 @@ def run(arguments: argparse.Namespace) -> int:
     stop = participant.stop_on_signals()
     with (
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
-        _file(rig) as path,
+        file(rig) as path,
         _display(as_json=arguments.json) as display,
         _logging_to(display),
     ):
-        supervisor = Supervisor(children(rig, path), partial(_spawn, display), time.monotonic_ns, limits(rig))
+        spawn = partial(_spawn, display, path, config.to_toml(rig))
+        supervisor = Supervisor(children(rig, path), spawn, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         session = Session(bus, *about, rig.trackers, supervisor, display, WallClock())
         try:
@@ -113,6 +114,19 @@ def children(rig: config.ServiceConfig, path: Path) -> list[Child]:
     return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder]
 
 
+@contextmanager
+def file(rig: config.ServiceConfig) -> Iterator[Path]:
+    """A configuration as a temporary file that may be gone before the end."""
+    descriptor, name = tempfile.mkstemp(prefix=f"{rig.name}-", suffix=".toml", text=True)
+    with open(descriptor, "w", encoding="utf-8") as stream:
+        stream.write(config.to_toml(rig))
+    path = Path(name)
+    try:
+        yield path
+    finally:
+        path.unlink(missing_ok=True)
+
+
 def limits(rig: config.ServiceConfig) -> Limits:
     """How much patience the configuration asks for."""
     table = rig.run
@@ -120,7 +134,10 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.restarts, *(int(value * 1e9) for value in seconds))
 
 
-def _spawn(display: Display, component: str, arguments: Sequence[str]) -> Process:
+def _spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:
+    # A child may start again after weeks, and many systems clear old files out of their temporary folder.
+    with suppress(FileExistsError), path.open("x", encoding="utf-8") as stream:
+        stream.write(toml)
     return ChildProcess(component, arguments, partial(_pass_on, display))
 
 
@@ -134,15 +151,6 @@ def _display(as_json: bool) -> Display:
     if as_json:
         return JsonDisplay(sys.stdout, sys.stderr)
     return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)
-
-
-@contextmanager
-def _file(rig: config.ServiceConfig) -> Iterator[Path]:
-    """The effective configuration as a file, for the children."""
-    with tempfile.NamedTemporaryFile("w", prefix=f"{rig.name}-", suffix=".toml", encoding="utf-8") as file:
-        file.write(config.to_toml(rig))
-        file.flush()
-        yield Path(file.name)
 
 
 class _Notes(logging.Handler):

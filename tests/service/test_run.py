@@ -87,6 +87,23 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
     assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
 
 
+class TestTheFileOfTheChildren:
+    def test_it_says_the_same_and_is_gone_at_the_end(self, rig_file):
+        rig = config.load(rig_file)
+        with run.file(rig) as path:
+            assert config.load(path) == rig
+        assert not path.exists()
+
+    def test_whoever_removes_it_does_no_harm(self, rig_file, monkeypatch):
+        rig = config.load(rig_file)
+        monkeypatch.setattr(run, "ChildProcess", lambda component, arguments, on_line: Idle(component))
+        with run.file(rig) as path:
+            path.unlink()
+            run._spawn(PlainDisplay(io.StringIO(), io.StringIO()), path, config.to_toml(rig), "capture", ())
+            assert config.load(path) == rig
+            path.unlink()
+
+
 class Bench:
     """A session around processes that do nothing, one of which may end."""
 
