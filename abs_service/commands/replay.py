@@ -12,11 +12,11 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from urllib.parse import quote
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -49,6 +49,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replays a recording, offline or live."""
     recording = Recording(arguments.recording)
+    for note in notes(recording):
+        print(f"abs-service: note: {note}", file=sys.stderr)
     settings = _settings(recording, arguments.config)
     if arguments.speed is not None:
         return _live(settings, arguments)
@@ -58,11 +60,25 @@ def run(arguments: argparse.Namespace) -> int:
     with _writing(out, config.to_toml(settings)) as file:
         trackers = {name: _tracker(settings, name, recording, file) for name in settings.trackers}
         _run_through(recording, trackers, arguments.json)
-    notes = sys.stderr if arguments.json else sys.stdout
+    output = sys.stderr if arguments.json else sys.stdout
     for name, tracker in trackers.items():
-        print(*(f"{name}: {line}" for line in tracker.log.summary()), sep="\n", file=notes)
-    print(f"wrote {out}", file=notes)
+        print(*(f"{name}: {line}" for line in [*tracker.log.summary(), *_unused(tracker)]), sep="\n", file=output)
+    if recording.unpaired:
+        print(f"{recording.unpaired} images or descriptions without their counterpart", file=output)
+    print(f"wrote {out}", file=output)
     return Exit.OK
+
+
+def notes(recording: Recording) -> list[str]:
+    """What somebody who replays a recording should know about it."""
+    if not recording.truncated:
+        return []
+    found = [f"{recording.path} was never finished; what follows is up to where it breaks off"]
+    if recording.damaged_chunks:
+        found.append(
+            f"{recording.path}: {recording.damaged_chunks} damaged chunks are left out; their images are missing"
+        )
+    return found
 
 
 def _settings(recording: Recording, path: Path | None) -> config.ServiceConfig:
@@ -106,6 +122,11 @@ def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, fi
     )
 
 
+def _unused(tracker: OfflineTracker) -> list[str]:
+    counters = tracker.synchroniser.counters
+    return [f"frames in no set: {', '.join(f'{name} {n}' for name, n in counters.items())}"] if counters else []
+
+
 def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], as_json: bool) -> None:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), disable=as_json) as progress:
@@ -138,15 +159,13 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
 
 def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
     """Plays the recording as the only device of the rig, through `run`."""
-    recording_uri = f"replay://{arguments.recording.resolve()}?speed={arguments.speed:g}"
-    with tempfile.NamedTemporaryFile("w", prefix="replay-", suffix=".toml", encoding="utf-8") as file:
-        file.write(config.to_toml(_played(settings, recording_uri)))
-        file.flush()
+    recording_uri = f"replay://{quote(str(arguments.recording.resolve()))}?speed={arguments.speed:g}"
+    with run_command.file(_played(settings, recording_uri)) as path:
         options = ["--json"] if arguments.json else []
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
         parser = argparse.ArgumentParser()
         run_command.add_arguments(parser)
-        return run_command.run(parser.parse_args([file.name, *options]))
+        return run_command.run(parser.parse_args([str(path), *options]))
 
 
 def _played(settings: config.ServiceConfig, uri: str) -> config.ServiceConfig:

@@ -55,6 +55,7 @@ class Contents:
         attachments: content by name.
         start_ns, end_ns: first and last log time [ns]; 0 for a file without messages.
         truncated: the file was never finished: its writer was killed, or is still writing.
+        damaged: chunks left out because they are damaged; those of a finished file are found when they are read.
     """
 
     chunks: tuple[ChunkPlace, ...]
@@ -63,6 +64,7 @@ class Contents:
     start_ns: int
     end_ns: int
     truncated: bool
+    damaged: int
 
 
 def survey(path: Path) -> Contents:
@@ -107,11 +109,13 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
         start_ns=min((index.message_start_time for index in summary.chunk_indexes), default=0),
         end_ns=max((index.message_end_time for index in summary.chunk_indexes), default=0),
         truncated=False,
+        damaged=0,
     )
 
 
 def _read_through(stream: BinaryIO) -> Contents:
-    """Reads every record up to the first that is cut off; a damaged chunk is left out."""
+    """Reads every record up to the first that is cut off; a damaged chunk is left out and counted."""
+    damaged = 0
     chunks: list[ChunkPlace] = []
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
@@ -126,6 +130,7 @@ def _read_through(stream: BinaryIO) -> Contents:
         try:
             contents = breakup_chunk(record, validate_crc=True)
         except DAMAGE:
+            damaged += 1
             continue
         chunks.append(ChunkPlace(offset, record.message_start_time))
         times += [record.message_start_time, record.message_end_time]
@@ -133,7 +138,15 @@ def _read_through(stream: BinaryIO) -> Contents:
         channels |= {channel.id: channel for channel in contents if isinstance(channel, Channel)}
         counts.update(message.channel_id for message in contents if isinstance(message, Message))
     topics = _topics(schemas, channels, counts)
-    return Contents(tuple(chunks), topics, attachments, min(times, default=0), max(times, default=0), truncated=True)
+    return Contents(
+        tuple(chunks),
+        topics,
+        attachments,
+        min(times, default=0),
+        max(times, default=0),
+        truncated=True,
+        damaged=damaged,
+    )
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, McapRecord]]:

@@ -31,6 +31,8 @@ class Recording:
     Attributes:
         path: of the file.
         truncated: whether the file was never finished.
+        damaged_chunks: how many parts of an unfinished file were left out because they are damaged; a finished file
+            with such a part is refused when it is reached.
         duration_s: from the first to the last message [s].
         wall_offset_ns: wall-clock time minus `t_host_ns` of the first frame [ns]; 0 if there is none.
         counts: number of images by (sensor, stream).
@@ -47,6 +49,7 @@ class Recording:
         contents = survey(path)
         self.path = path
         self.truncated = contents.truncated
+        self.damaged_chunks = contents.damaged
         self.duration_s = (contents.end_ns - contents.start_ns) * 1e-9
         self._contents = contents
         self.wall_offset_ns = self._wall_offset()

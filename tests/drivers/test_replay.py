@@ -156,6 +156,16 @@ def test_a_damaged_chunk_is_named(tmp_path: Path) -> None:
         list(recording.frames())
 
 
+def test_damaged_chunks_of_an_unfinished_file_are_left_out_and_counted(tmp_path: Path) -> None:
+    items = recorded(20)
+    path = write(tmp_path / "a.mcap", items, finish=False)
+    assert Recording(path).damaged_chunks == 0
+    damage(path)
+    recording = Recording(path)
+    assert (recording.truncated, recording.damaged_chunks) == (True, 1)
+    assert 0 < len(list(recording.frames())) < len(items)
+
+
 def test_an_image_without_its_description_is_counted(tmp_path: Path) -> None:
     items = recorded(3)
     path = tmp_path / "a.mcap"
