@@ -83,7 +83,7 @@ def _synthesize(
     fx, fy, cx, cy = matrix
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     stride = width + 2
-    right, bottom = np.float32(width), np.float32(height)
+    right, bottom, farthest = np.float32(width), np.float32(height), np.float32(limit)
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
@@ -102,6 +102,6 @@ def _synthesize(
             column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx + half
             row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy + half
             inside = column >= 0 and column < right and row >= 0 and row < bottom
-            seen = facing and z > np.float32(1e-6) and r2 < limit and inside
+            seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
             pixel[k, v] = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
             distance[k, v] = np.sqrt(x * x + y * y + z * z)
