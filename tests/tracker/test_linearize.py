@@ -1,0 +1,174 @@
+"""Residuals and their derivatives are those of the cost, on surfaces that are smooth enough for derivatives."""
+
+import numpy as np
+import pytest
+
+from abs_service.observation import ColorImage
+from abs_service.tracker.curvature import newton_step, search_metric, vertex_jacobian
+from abs_service.tracker.models.nurbs import Settings
+from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.priors import Settings as PriorSettings
+from abs_service.tracker.terms.base import Bounds, Linearization, stack
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.gradients import depth_rows
+from calib.camera import Camera
+from calib.noise.color import GaussianColor
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from tests.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet
+
+#: Many fine pixels, so that rounding to one of them is small against the steps of the derivatives.
+FINE = Camera(640, 480, 1500.0, 1500.0, 319.5, 239.5)
+#: A camera whose columns and rows fit into the levels of a colour.
+COLOR = Camera(250, 200, 560.0, 560.0, 124.5, 99.5)
+MESH = sheet(height=lambda x, y: 1.0 + 0.2 * x - 0.1 * y)
+NORMAL = np.array([-0.2, 0.1, 1.0])
+SIGMA = 5e-3
+BOUNDS = Bounds(0.05, 1.6, 4.6)
+
+
+def test_the_jacobian_of_the_vertices_is_that_of_the_model():
+    model = Settings(control_points=(4, 4)).build(sheet())
+    jacobian = vertex_jacobian(model, model.rest)
+    generator = np.random.default_rng(1)
+    step = generator.normal(0, 1e-4, len(model.rest))
+    moved = model.deform(np.stack([model.rest + step, model.rest - step])).vertices.astype(float)
+    np.testing.assert_allclose(jacobian @ step, (moved[0] - moved[1]).T / 2, atol=3e-7)
+
+
+def test_the_jacobian_of_a_rigid_motion_is_the_lever_rule():
+    model = Rigid(sheet())
+    jacobian = vertex_jacobian(model, model.rest)
+    arms = model.mesh.vertices - model.mesh.vertices.mean(axis=0)
+    np.testing.assert_allclose(jacobian[:, :, 3:], np.tile(np.eye(3), (len(arms), 1, 1)), atol=2e-4)
+    np.testing.assert_allclose(jacobian[:, :, 2], np.cross([0, 0, 1], arms), atol=2e-4)
+
+
+def depth_term() -> DepthTerm:
+    term = DepthTerm("tof", FINE, GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term.observe(depth_image(plane_distance(FINE, NORMAL, 1.0)))
+    return term
+
+
+def test_depth_rows_predict_what_the_plane_s_residuals_do():
+    """The derivative is exact for a plane that is parallel to the mesh: a vertex takes its pixel along."""
+    model, term = Rigid(MESH), depth_term()
+    theta = np.array([0, 0, 0, 2e-3, -1e-3, 3e-3])
+    there = model.deform(theta[None])
+    linear = term.linearize(there, vertex_jacobian(model, theta))
+    assert len(linear.residual) == len(MESH.vertices)
+    for step in np.diag([0.02, 0.02, 0.1, 0.02, 0.04, 5e-3]):
+        predicted = linear.jacobian @ step
+        actual = [term._residuals(model.deform((theta + part)[None]))[0] - linear.residual for part in (step, -step)]
+        np.testing.assert_allclose((actual[0] - actual[1]) / 2, predicted, atol=0.1)  # pixels are 0.7 mm wide
+        assert np.abs(predicted).max() > 0.4
+
+
+def test_depth_residuals_are_normalised_differences():
+    model, term = Rigid(MESH), depth_term()
+    nearer = np.array([0, 0, 0, 0, 0, -SIGMA])
+    linear = term.linearize(model.deform(nearer[None]), vertex_jacobian(model, nearer))
+    sight = MESH.vertices / np.linalg.norm(MESH.vertices, axis=1, keepdims=True)
+    gap = SIGMA * NORMAL[2] / (sight @ NORMAL)  # along the ray, from a plane moved by σ along z
+    np.testing.assert_allclose(linear.residual, gap / SIGMA, atol=0.04)
+    np.testing.assert_allclose(linear.jacobian[:, 5], -gap / SIGMA**2, rtol=0.02)
+
+
+def test_grazing_views_do_not_explode():
+    normals = np.array([[0.0, 0, -1], [1, 0, -1e-4]]) / [[1], [np.hypot(1, 1e-4)]]
+    rows = depth_rows(np.array([[0.0, 0, 1], [0, 0, 1]]), normals, np.zeros(3))
+    np.testing.assert_allclose(rows[0], [0, 0, -1])
+    assert np.linalg.norm(rows[1]) == pytest.approx(5)
+
+
+def ramp() -> np.ndarray:
+    """Colours that change by one level per pixel: red to the right, green downwards, blue upwards."""
+    columns, rows = np.meshgrid(np.arange(COLOR.width), np.arange(COLOR.height))
+    return np.stack([columns, rows, 255 - rows], axis=-1).astype(np.uint8)
+
+
+def test_color_rows_predict_what_a_ramp_s_residuals_do():
+    mesh = sheet(7, 9, height=flat, size=(0.2, 0.14))
+    model = Rigid(mesh)
+    columns, rows = COLOR.project(mesh.vertices).T
+    colors = np.stack([columns, rows, 255 - rows], axis=-1)
+    term = ColorTerm("color", COLOR, GaussianColor(10.0), colors.astype(np.float32), BOUNDS)
+    term.observe(ColorImage(ramp()))
+    linear = term.linearize(model.deform(model.rest[None]), vertex_jacobian(model, model.rest))
+    np.testing.assert_allclose(linear.residual, 0, atol=0.06)  # pixels are whole numbers
+    for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
+        theta = np.zeros(6)
+        theta[parameter] = step
+        moved = (
+            term._residuals(model.deform(theta[None]))[0] - term._residuals(model.deform(-theta[None]))[0]
+        ).ravel() / 2
+        predicted = linear.jacobian[:, parameter] * step
+        np.testing.assert_allclose(moved, predicted, atol=0.11)
+        assert np.abs(predicted).max() > 0.4
+
+
+def test_only_inliers_with_a_measurement_are_linearized():
+    mesh = MESH
+    distance = plane_distance(FINE, NORMAL, 1.0)
+    distance[:, :320] = np.nan
+    distance[:240] += 1
+    term = DepthTerm("tof", FINE, GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term.observe(depth_image(distance))
+    surface = as_surface((mesh.vertices, mesh.normals))
+    linear = term.linearize(surface, np.zeros((len(mesh.vertices), 3, 2)))
+    pixels = FINE.project(mesh.vertices) + 0.5
+    inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))
+    assert len(linear.residual) == inliers
+    fit = term.fit(surface)
+    assert (fit.visible, fit.inliers) == (len(mesh.vertices), inliers)
+    assert fit.samples == np.count_nonzero(pixels[:, 0] >= 320)
+    assert fit.normalized_residual < 0.2
+
+
+def test_stretch_rows_are_derivatives_of_the_stretch_cost():
+    model = Settings(control_points=(4, 4)).build(sheet(5, 6))
+    prior = StretchPrior(model.mesh, 0.02)
+    theta = model.rest + np.random.default_rng(2).normal(0, 3e-3, len(model.rest))
+    linear = prior.linearize(model.deform(theta[None]), vertex_jacobian(model, theta))
+    assert 0.5 * np.sum(linear.residual**2) == pytest.approx(prior.cost(model.deform(theta[None]))[0], rel=1e-3)
+    gradient, h = linear.jacobian.T @ linear.residual, 1e-4
+    offsets = h * np.eye(len(theta))
+    costs = prior.cost(model.deform(np.concatenate([theta + offsets, theta - offsets])))
+    numerical = (costs[: len(theta)] - costs[len(theta) :]) / (2 * h)
+    np.testing.assert_allclose(gradient, numerical, atol=0.02 * np.abs(numerical).max())
+
+
+def test_motion_rows_are_derivatives_of_the_motion_cost():
+    prior = MotionPrior(np.array([1.0, 2.0]), np.array([1.0, 3.0]), PriorSettings(speed=0.3))
+    prior.predict(0)
+    linear = prior.linearize()
+    step = np.array([0.01, -0.02])
+    assert 0.5 * np.sum((linear.jacobian @ step) ** 2) == pytest.approx(prior.cost((prior.predicted + step)[None])[0])
+    assert not linear.residual.any()
+
+
+@pytest.fixture
+def problem() -> Linearization:
+    generator = np.random.default_rng(4)
+    jacobian = generator.normal(size=(60, 7)) @ np.diag(10.0 ** np.arange(-3, 4))
+    return Linearization(generator.normal(size=60), jacobian)
+
+
+def test_the_metric_makes_the_curvature_the_identity(problem):
+    metric = search_metric(problem.jacobian)
+    np.testing.assert_allclose(metric.T @ problem.jacobian.T @ problem.jacobian @ metric, np.eye(7), atol=1e-8)
+    covariance = np.linalg.inv(problem.jacobian.T @ problem.jacobian)
+    np.testing.assert_allclose(metric @ metric.T, covariance, rtol=1e-6, atol=1e-12 * np.abs(covariance).max())
+
+
+def test_the_newton_step_solves_a_linear_problem(problem):
+    step = newton_step(problem, search_metric(problem.jacobian))
+    expected = np.linalg.lstsq(problem.jacobian, -problem.residual, rcond=None)[0]
+    np.testing.assert_allclose(step, expected, rtol=1e-6)
+
+
+def test_linearizations_are_stacked_also_if_there_is_none():
+    assert stack([], 3).jacobian.shape == (0, 3)
+    parts = [Linearization(np.ones(k), np.full((k, 3), k)) for k in (1, 2)]
+    assert stack(parts, 3).jacobian.tolist() == [[1, 1, 1], [2, 2, 2], [2, 2, 2]]

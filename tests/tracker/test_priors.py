@@ -1,0 +1,108 @@
+"""What the priors predict and what they cost."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.priors import FIRST_INTERVAL_S, LONGEST_INTERVAL_S, MotionPrior, Settings, StretchPrior
+from tests.tracker.scenes import as_surface, flat, sheet
+
+MS = 1_000_000
+
+
+def prior(speed: float = 0.3, memory_s: float = 1e9) -> MotionPrior:
+    return MotionPrior(np.zeros(2), np.array([1.0, 2.0]), Settings(speed=speed, memory_s=memory_s))
+
+
+def test_before_any_motion_it_expects_none():
+    motion = prior()
+    motion.predict(123 * MS)
+    np.testing.assert_array_equal(motion.predicted, [0, 0])
+
+
+def test_a_constant_velocity_goes_on():
+    motion = prior()
+    for k in range(5):
+        motion.predict(k * 40 * MS)
+        if k > 1:
+            np.testing.assert_allclose(motion.predicted, [0.01 * k, -0.02 * k], atol=1e-12)
+        motion.update(np.array([0.01, -0.02]) * k)
+
+
+def test_after_a_gap_the_velocity_still_is_per_second():
+    motion = prior()
+    for t_ms, x in [(0, 0.0), (50, 0.05), (150, 0.15)]:  # 1 m/s
+        motion.predict(t_ms * MS)
+        motion.update(np.array([x, 0]))
+    motion.predict(350 * MS)
+    np.testing.assert_allclose(motion.predicted, [0.35, 0], atol=1e-12)
+
+
+def test_motion_fades_with_the_age_of_the_last_estimate():
+    travelled = []
+    for gap_ms in (10, 100, 400, 5000):
+        motion = prior(memory_s=0.1)
+        for t_ms, x in [(0, 0.0), (50, 0.05)]:
+            motion.predict(t_ms * MS)
+            motion.update(np.array([x, 0]))
+        motion.predict((50 + gap_ms) * MS)
+        travelled.append(motion.predicted[0] - 0.05)
+    expected = [gap * np.exp(-gap / 0.1) for gap in (0.01, 0.1, 0.4, LONGEST_INTERVAL_S)]
+    np.testing.assert_allclose(travelled, expected, atol=1e-12)
+
+
+def test_the_cost_is_that_of_a_speed():
+    """Where the surface moves 0.3 m/s off the prediction, whatever the parameter, it costs ½."""
+    motion = prior()
+    motion.predict(0)
+    motion.update(np.zeros(2))
+    motion.predict(100 * MS)
+    off = np.array([[0.03, 0.0], [0.0, 0.06], [0.0, 0.0]])
+    np.testing.assert_allclose(motion.cost(off), [0.5, 0.5, 0])
+
+
+@pytest.mark.parametrize(("gap_ms", "seconds"), [(20, 0.02), (10_000, LONGEST_INTERVAL_S)])
+def test_the_longer_the_gap_the_less_is_known_up_to_a_bound(gap_ms, seconds):
+    motion = prior()
+    motion.predict(0)
+    motion.update(np.zeros(2))
+    motion.predict(gap_ms * MS)
+    assert motion.cost(np.array([[0.3 * seconds, 0]]))[0] == pytest.approx(0.5)
+
+
+def test_the_first_frame_is_given_the_usual_interval():
+    motion = prior()
+    motion.predict(77)
+    assert motion.cost(np.array([[0.3 * FIRST_INTERVAL_S, 0]]))[0] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("again_ns", [0, -5])
+def test_time_that_stands_still_or_goes_back_is_survived(again_ns):
+    motion = prior()
+    motion.predict(0)
+    motion.update(np.ones(2))
+    motion.predict(again_ns)
+    assert np.isfinite(motion.cost(np.ones((1, 2)))).all()
+
+
+MESH = sheet(height=flat)
+
+
+def bent(radius: float) -> np.ndarray:
+    """The flat mesh rolled onto a cylinder, which stretches nothing but chords."""
+    x, y, _ = MESH.vertices.T
+    return np.stack([radius * np.sin(x / radius), y, 1 + radius * (1 - np.cos(x / radius))], axis=1)
+
+
+def test_bending_costs_next_to_nothing_and_stretching_does():
+    costs = StretchPrior(MESH, 0.01).cost(
+        as_surface(*((v, MESH.normals) for v in (MESH.vertices, bent(0.15), MESH.vertices * (1.02, 1, 1))))
+    )
+    assert costs[0] == pytest.approx(0, abs=1e-6)
+    assert costs[1] < 0.02 * costs[2]
+    along_x = np.count_nonzero(MESH.edges[:, 1] - MESH.edges[:, 0] == 1)
+    assert costs[2] > along_x * 0.5 * 2.0**2 * 0.99
+
+
+def test_a_mesh_has_every_edge_once():
+    rows, columns = 9, 13
+    assert len(MESH.edges) == rows * (columns - 1) + columns * (rows - 1) + (rows - 1) * (columns - 1)

@@ -1,0 +1,134 @@
+"""Ways to say which pixels are the object."""
+
+import cv2
+import numpy as np
+import pytest
+
+from abs_service.tracker.regions import box, mask, nearest
+from abs_service.tracker.regions.base import RegionError
+
+SHAPE = (48, 64)
+
+
+def scene(*parts: tuple[slice, slice, float], background: float = 2.0) -> np.ndarray:
+    distance = np.full(SHAPE, background, np.float32)
+    for rows, columns, z in parts:
+        distance[rows, columns] = z
+    return distance
+
+
+def selected(region, distance):
+    return region.build().select(np.zeros((*SHAPE, 3)), distance)
+
+
+NEAR = (slice(10, 30), slice(5, 25), 1.0)
+MIDDLE = (slice(10, 40), slice(35, 60), 1.3)
+
+
+def test_the_nearest_surface_is_selected_but_for_its_rim():
+    inside = selected(nearest.Settings(), scene(NEAR, MIDDLE))
+    assert inside[12:28, 7:23].all()
+    inside[10:30, 5:25] = False
+    assert not inside.any()
+
+
+def test_noise_neither_cuts_nor_connects():
+    generator = np.random.default_rng(1)
+    distance = scene(NEAR, MIDDLE) + generator.normal(0, 5e-3, SHAPE).astype(np.float32)
+    distance[generator.uniform(size=SHAPE) < 0.03] = np.nan  # holes
+    distance[generator.uniform(size=SHAPE) < 0.02] = 1.5  # flying pixels
+    inside = selected(nearest.Settings(), distance)
+    assert np.count_nonzero(inside[12:28, 7:23]) > 0.7 * 16 * 16
+    inside[10:30, 5:25] = False
+    assert not inside.any()
+
+
+def test_small_surfaces_are_noise():
+    speck = (slice(36, 44), slice(2, 10), 0.5)
+    inside = selected(nearest.Settings(least_pixels=100), scene(NEAR, speck))
+    assert inside[20, 15]
+    assert not inside[40, 6]
+    assert selected(nearest.Settings(least_pixels=16), scene(NEAR, speck))[40, 6]
+
+
+def test_the_largest_step_decides_what_is_connected():
+    stair = scene((slice(10, 30), slice(5, 25), 1.0), (slice(10, 30), slice(25, 45), 1.03))
+    assert selected(nearest.Settings(largest_step_m=0.04), stair)[20, 40]
+    assert not selected(nearest.Settings(largest_step_m=0.02), stair)[20, 40]
+
+
+def test_an_empty_image_has_no_surface():
+    with pytest.raises(RegionError, match="least_pixels = 200"):
+        selected(nearest.Settings(), np.full(SHAPE, np.nan, np.float32))
+
+
+def grid_points() -> np.ndarray:
+    columns, rows = np.meshgrid(np.arange(64) / 64, np.arange(48) / 48)
+    return np.stack([columns, rows, np.ones(SHAPE)], axis=-1)
+
+
+def test_a_box_selects_the_points_in_it():
+    points = grid_points()
+    points[20, 20] = np.nan
+    region = box.Settings((0.25, 0.25, 0.9), (0.5, 0.75, 1.1)).build()
+    inside = region.select(points, np.ones(SHAPE, np.float32))
+    expected = np.zeros(SHAPE, bool)
+    expected[12:37, 16:33] = True
+    expected[20, 20] = False
+    np.testing.assert_array_equal(inside, expected)
+
+
+def test_an_empty_box_is_an_error():
+    region = box.Settings((0.25, 0.25, 2.0), (0.5, 0.75, 3.0))
+    with pytest.raises(RegionError, match=r"\[0.25, 0.25, 2.0\] … \[0.5, 0.75, 3.0\] holds no surface"):
+        region.select(grid_points(), np.ones(SHAPE, np.float32))
+
+
+@pytest.mark.parametrize("highest", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0)])
+def test_a_box_inside_out_is_an_error(highest):
+    with pytest.raises(RegionError, match=r"lowest = \[0.0, 0.0, 0.0\] must be below highest"):
+        box.Settings((0.0, 0.0, 0.0), highest)
+
+
+def drawn(folder, channels: int):
+    """A mask image, and which of its pixels are the object."""
+    inside = np.zeros(SHAPE, bool)
+    inside[5:25, 10:40] = True
+    image = (inside * np.uint8(255))[..., None].repeat(channels, axis=2).squeeze()
+    if channels == 4:
+        image[..., :3] = 77  # with an alpha channel brightness means nothing
+    if channels == 3:
+        image[..., :2] = 0
+    path = folder / "mask.png"
+    cv2.imwrite(str(path), image)
+    return path, inside
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_a_mask_selects_what_was_drawn_and_returned(tmp_path, channels):
+    path, expected = drawn(tmp_path, channels)
+    distance = np.ones(SHAPE, np.float32)
+    distance[10, 15] = np.nan
+    expected[10, 15] = False
+    np.testing.assert_array_equal(selected(mask.Settings(path), distance), expected)
+
+
+def test_a_mask_of_another_size_is_an_error(tmp_path):
+    path, _ = drawn(tmp_path, 1)
+    with pytest.raises(RegionError, match=r"mask is \(64, 48\) pixels, the depth image \(32, 24\)"):
+        mask.Settings(path).build().select(np.zeros((24, 32, 3)), np.ones((24, 32), np.float32))
+
+
+def test_a_mask_over_nothing_is_an_error(tmp_path):
+    path, _ = drawn(tmp_path, 1)
+    with pytest.raises(RegionError, match="holds no surface"):
+        selected(mask.Settings(path), np.full(SHAPE, np.nan, np.float32))
+
+
+@pytest.mark.parametrize("content", [None, b"no image"])
+def test_a_mask_that_cannot_be_read_is_named(tmp_path, content):
+    path = tmp_path / "mask.png"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(RegionError, match=r"mask\.png' is missing or no image"):
+        mask.Settings(path).build()

@@ -1,0 +1,31 @@
+"""When an estimate is to be trusted."""
+
+import pytest
+
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.status import Settings, judge
+
+SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
+
+
+@pytest.mark.parametrize(
+    ("share", "missing", "status", "reasons"),
+    [
+        (1.0, (), Status.TRACKING, ()),
+        (0.6, (), Status.TRACKING, ()),
+        (0.59, (), Status.DEGRADED, ("only 59% of the visible vertices agree with a measurement",)),
+        (0.3, (), Status.DEGRADED, ("only 30% of the visible vertices agree with a measurement",)),
+        (0.29, (), Status.LOST, ("only 29% of the visible vertices agree with a measurement",)),
+        (0.0, (), Status.LOST, ("only 0% of the visible vertices agree with a measurement",)),
+        (1.0, ("color",), Status.DEGRADED, ("no frame from color",)),
+        (1.0, ("a", "b"), Status.DEGRADED, ("no frame from a", "no frame from b")),
+    ],
+)
+def test_status_and_reasons(share, missing, status, reasons):
+    assert judge(share, missing, SETTINGS) == (status, reasons)
+
+
+def test_a_lost_object_names_every_reason():
+    status, reasons = judge(0.1, ("color",), SETTINGS)
+    assert status == Status.LOST
+    assert len(reasons) == 2
