@@ -1,5 +1,6 @@
 """CMA-ES by its authors' library, pycma: the reference search."""
 
+import warnings
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -33,8 +34,9 @@ class Cma:
     """Mean, step size and covariance of one frame start the next; see `Optimizer` for the interface."""
 
     def __init__(self, settings: Settings, dimension: int, generator: np.random.Generator):
-        from cma import CMAEvolutionStrategy  # noqa: PLC0415  # imports a second's worth of statistics and plotting
-
+        with warnings.catch_warnings():  # pycma regrets that it cannot plot
+            warnings.simplefilter("ignore")
+            from cma import CMAEvolutionStrategy  # noqa: PLC0415  # imports a second's worth of statistics
         self.generations = settings.generations
         self._settings = settings
         options = {
