@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from abs_service.health import Health, Level
-from drivers.device import Device, DeviceError, DeviceState, Sink, Truth
+from drivers.device import AddressError, Device, DeviceError, DeviceState, Sink, Truth
 from drivers.frame import Frame
 
 _log = logging.getLogger(__name__)
@@ -81,6 +81,9 @@ class DeviceKeeper:
         while not self._stop.is_set():
             try:
                 delivered, reason = self._serve_once()
+            except AddressError as error:
+                self.refusal = error
+                delivered, reason = False, str(error)
             except DeviceError as error:
                 delivered, reason = False, str(error)
             except Exception as error:

@@ -16,6 +16,10 @@ class DeviceError(Exception):
     """A device cannot be opened or stopped working; the message says what to do about it."""
 
 
+class AddressError(DeviceError):
+    """An address that no device can have, now or later; opening it again is of no use."""
+
+
 class DeviceState(StrEnum):
     """Where a device is in its life."""
 

@@ -7,7 +7,7 @@ from types import ModuleType
 from urllib.parse import urlsplit
 
 import drivers
-from drivers.device import Device, DeviceError
+from drivers.device import AddressError, Device
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -18,13 +18,14 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        DeviceError: no such driver, or the driver cannot open the address.
+        AddressError: no such driver, or the driver does not understand the address.
+        DeviceError: the driver cannot open the device now.
     """
     scheme = urlsplit(uri).scheme
     modules = {module.name for module in pkgutil.iter_modules(drivers.__path__)}
     driver = _driver(scheme) if scheme in modules else None
     if driver is None:
-        raise DeviceError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
+        raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
     return driver.open_device(uri, clock)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from drivers.device import Device, DeviceError
+from drivers.device import AddressError, Device
 from drivers.replay.contents import RecordingError
 from drivers.replay.device import ReplayDevice
 from drivers.replay.recording import Recording
@@ -20,19 +20,22 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     Keys: `speed`, factor on the recorded pace, 1 if not given; `loop`, 1 to begin anew at the end, 0 if not given.
 
     Raises:
-        DeviceError: the address is not understood, or the file cannot be replayed.
+        AddressError: the address is not understood, or the file cannot be replayed.
     """
     parts = urlsplit(uri)
     values = {"speed": "1", "loop": "0"}
     for key, value in parse_qsl(parts.query, keep_blank_values=True):
         if key not in values:
-            raise DeviceError(f"{uri}: unknown key {key!r}; allowed are {sorted(values)}")
+            raise AddressError(f"{uri}: unknown key {key!r}; allowed are {sorted(values)}")
         values[key] = value
     if values["loop"] not in {"0", "1"}:
-        raise DeviceError(f"{uri}: loop = {values['loop']!r} must be 0 or 1")
+        raise AddressError(f"{uri}: loop = {values['loop']!r} must be 0 or 1")
     speed = _speed(uri, values["speed"])
     path = Path(unquote(parts.netloc + parts.path))
-    return ReplayDevice(uri, Recording(path), speed, values["loop"] == "1", clock)
+    try:
+        return ReplayDevice(uri, Recording(path), speed, values["loop"] == "1", clock)
+    except RecordingError as error:
+        raise AddressError(str(error)) from error
 
 
 def _speed(uri: str, value: str) -> float:
@@ -41,5 +44,5 @@ def _speed(uri: str, value: str) -> float:
     except ValueError:
         speed = float("nan")
     if not _SPEEDS[0] <= speed <= _SPEEDS[1]:
-        raise DeviceError(f"{uri}: speed = {value!r} must be a number from {_SPEEDS[0]:g} to {_SPEEDS[1]:g}")
+        raise AddressError(f"{uri}: speed = {value!r} must be a number from {_SPEEDS[0]:g} to {_SPEEDS[1]:g}")
     return speed

@@ -14,6 +14,6 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens an address such as `simulated://sheet?seed=1&sensors=tof,color`; its keys are the fields of `Address`.
 
     Raises:
-        DeviceError: the address is not understood; names key, value and what is allowed.
+        AddressError: the address is not understood; names key, value and what is allowed.
     """
     return SimulatedDevice(uri, parse(uri).build(), clock)

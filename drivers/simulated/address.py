@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from calib import pose
 from calib.camera import Camera
-from drivers.device import DeviceError
+from drivers.device import AddressError
 from drivers.simulated import scene
 from drivers.simulated.color import SIGMA, Bayer, Color
 from drivers.simulated.exposure import Head
@@ -121,17 +121,17 @@ def parse(uri: str) -> Address:
     """Reads an address such as `simulated://sheet?seed=1&sensors=tof,color&color=640x480`.
 
     Raises:
-        DeviceError: unknown scene or key, a key given twice, or a value outside its range; names all three.
+        AddressError: unknown scene or key, a key given twice, or a value outside its range; names all three.
     """
     parts = urlsplit(uri)
     name = parts.netloc + parts.path
     if name not in SCENES:
-        raise DeviceError(f"{uri}: scene {name!r} is none of {sorted(SCENES)}")
+        raise AddressError(f"{uri}: scene {name!r} is none of {sorted(SCENES)}")
     fields: dict[str, Any] = {}
     sizes: dict[str, tuple[int, int]] = {}
     for key, value in parse_qsl(parts.query, keep_blank_values=True):
         if key in fields or key in sizes:
-            raise DeviceError(f"{uri}: {key} is given twice")
+            raise AddressError(f"{uri}: {key} is given twice")
         if key in OPTICS:
             sizes[key] = _size(uri, key, value)
         elif key == "sensors":
@@ -141,7 +141,7 @@ def parse(uri: str) -> Address:
         elif key in RANGES:
             fields[key] = _number(uri, key, value, float, RANGES[key])
         else:
-            raise DeviceError(
+            raise AddressError(
                 f"{uri}: unknown key {key!r}; allowed are {sorted(['seed', 'sensors', *RANGES, *OPTICS])}"
             )
     return Address(name, sizes=sizes, **fields)
@@ -153,14 +153,14 @@ def _number(uri: str, key: str, value: str, kind: type[Number], allowed: tuple[f
     except ValueError:
         number = None
     if number is None or not allowed[0] <= number <= allowed[1]:
-        raise DeviceError(f"{uri}: {key} = {value!r} must be a number from {allowed[0]:g} to {allowed[1]:g}")
+        raise AddressError(f"{uri}: {key} = {value!r} must be a number from {allowed[0]:g} to {allowed[1]:g}")
     return number
 
 
 def _sensors(uri: str, value: str) -> tuple[str, ...]:
     names = tuple(value.split(","))
     if not set(names) <= set(OPTICS) or len(set(names)) != len(names):
-        raise DeviceError(f"{uri}: sensors = {value!r} must be one or more of {sorted(OPTICS)}, each once")
+        raise AddressError(f"{uri}: sensors = {value!r} must be one or more of {sorted(OPTICS)}, each once")
     return names
 
 
@@ -168,5 +168,5 @@ def _size(uri: str, key: str, value: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", value)
     width, height = (int(number) for number in match.groups()) if match else (0, 0)
     if not (SIZES[0] <= width <= SIZES[1] and SIZES[0] <= height <= SIZES[1]):
-        raise DeviceError(f"{uri}: {key} = {value!r} must be WIDTHxHEIGHT, each from {SIZES[0]} to {SIZES[1]}")
+        raise AddressError(f"{uri}: {key} = {value!r} must be WIDTHxHEIGHT, each from {SIZES[0]} to {SIZES[1]}")
     return width, height

@@ -21,7 +21,7 @@ from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib import pose
 from calib.camera import Camera
-from drivers.device import DeviceError, DeviceInfo, DeviceState
+from drivers.device import AddressError, DeviceError, DeviceInfo, DeviceState
 from drivers.frame import Frame, Kind
 from tests.service.loopback import LoopbackBus
 
@@ -133,6 +133,15 @@ def test_what_is_wrong_with_a_device_is_said_until_it_can_be_opened(keep):
     assert health._conditions["device sim"][1] == "sim: no such device; plug it in; trying again in 0.2 s"
     assert collector.frames.get(timeout=5)
     assert eventually(lambda: health.level == Level.OK)
+
+
+def test_an_address_that_no_device_can_have_is_refused(keep):
+    def misspelt():
+        raise AddressError("simulated://shet: there is no such scene")
+
+    keeper, collector, _ = keep(misspelt, working)
+    assert eventually(lambda: isinstance(keeper.refusal, AddressError))
+    assert collector.frames.empty()
 
 
 def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
