@@ -13,7 +13,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from calib.camera import Camera
 from drivers import codec
-from drivers.device import DeviceError, DeviceState, Truth
+from drivers.device import AddressError, DeviceState, Truth
 from drivers.frame import Frame
 from drivers.mcap_file import Compression, McapFile
 from drivers.opening import open_device
@@ -339,12 +339,12 @@ def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ],
 )
 def test_addresses_are_strict(query: str, complaint: str) -> None:
-    with pytest.raises(DeviceError, match=complaint):
+    with pytest.raises(AddressError, match=complaint):
         open_device(f"replay://a.mcap?{query}", Time().clock)
 
 
 def test_a_sensor_without_a_model_cannot_be_replayed(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(2), sensors=("tof",))
     assert Recording(path).cameras.keys() == {"tof"}
-    with pytest.raises(RecordingError, match=r"topic /color/model .* is missing"):
+    with pytest.raises(AddressError, match=r"topic /color/model .* is missing"):
         open_device(f"replay://{path}", Time().clock)
