@@ -12,6 +12,8 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.regions.base import Region, RegionError
 from calib import pose
 from calib.camera import Camera
+from calib.noise.base import without_offset
+from calib.noise.color import GaussianColor
 from calib.rig import Rig
 
 #: A mesh with fewer vertices carries no deformation.
@@ -36,9 +38,12 @@ def initial_mesh(observation: Observation, rig: Rig, reference: str, region: Reg
     image = observation.images.get(reference)
     if not isinstance(image, DepthImage):
         raise RegionError(f"no depth image from {reference} yet")
-    camera = rig.sensors[reference].camera
-    inside = region.select(camera.unproject(image.distance), image.distance)
-    mesh = grid_mesh(np.where(inside, image.distance, np.nan), camera, vertices)
+    camera, noise = rig.sensors[reference].camera, rig.sensors[reference].noise
+    if isinstance(noise, GaussianColor):
+        raise RegionError(f"sensor {reference} delivers depth, but its noise model is one of colours")
+    distance = without_offset(noise, image.distance, image.amplitude)
+    inside = region.select(camera.unproject(distance), distance)
+    mesh = grid_mesh(np.where(inside, distance, np.nan), camera, vertices)
     return replace(mesh, colors=vertex_colors(mesh.vertices, observation.images, rig))
 
 

@@ -52,6 +52,15 @@ def sample(
     return x + model.mean(x, a, p) + model.deviation(x, a, p) * generator.standard_normal(x.shape)
 
 
+def without_offset(
+    model: DepthNoise, distance: NDArray[np.floating], amplitude: NDArray[np.floating]
+) -> NDArray[np.float32]:
+    """A depth image (height, width) [m] without the mean offset that each distance has if it is right."""
+    x, a = distance.astype(np.float64), amplitude.astype(np.float64)
+    pixels = np.indices(distance.shape)
+    return (x - model.mean(x, a, (pixels[0], pixels[1]))).astype(np.float32)
+
+
 def render_texture(
     model: DepthNoise, distance: NDArray[np.float32], amplitude: NDArray[np.float32], uniform: float
 ) -> NDArray[np.float32]:
