@@ -1,0 +1,73 @@
+"""A simulated device's exposures straight into a tracking, without processes, clocks or files."""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service import config
+from abs_service.commands import plans
+from abs_service.evaluation import Errors, TruthComparison
+from abs_service.tracker.estimate import Estimate
+from abs_service.tracking import Plan, Tracking
+from calib.rig import Rig
+from drivers.frame import Frame, FrameSet
+from drivers.simulated import address
+from drivers.simulated.simulation import Simulation
+
+CONFIG = config.load_default()
+TRACKER = next(iter(CONFIG.trackers))
+
+
+def default_plan(**changes: object) -> Plan:
+    """The default rig's plan with some parts exchanged."""
+    return dataclasses.replace(plans.plan(CONFIG, TRACKER), **changes)
+
+
+def rig_of(simulation: Simulation) -> Rig:
+    """The default rig around a simulation's cameras."""
+    return plans.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
+
+
+def simulate(uri: str) -> Simulation:
+    """The simulation of an address."""
+    return address.parse(uri).build()
+
+
+def frame_set(frames: list[Frame], seq: int) -> FrameSet:
+    """Frames of one exposure."""
+    return FrameSet(seq, frames[0].t_host_ns, {frame.key: frame for frame in frames})
+
+
+@dataclass(frozen=True)
+class Step:
+    """An estimate, and how far it is from the truth where that is known."""
+
+    estimate: Estimate
+    errors: Errors | None
+
+
+def drive(
+    tracking: Tracking,
+    simulation: Simulation,
+    exposures: range,
+    change: Callable[[int, list[Frame]], list[Frame]] = lambda k, frames: frames,
+    in_time: Callable[[], bool] = lambda: True,
+) -> Iterator[Step]:
+    """Tracks exposures; `change` alters the frames of an exposure before the tracker sees them."""
+    truths = TruthComparison()
+    for k in exposures:
+        frames, truth = simulation.expose(k)
+        truths.add_truth(truth.t_host_ns, truth.points_r)
+        known = tracking.mesh_version
+        estimate = tracking.track(frame_set(change(k, frames), k), in_time)
+        if tracking.mesh is not None and tracking.mesh_version != known:
+            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
+        yield Step(estimate, truths.compare(truth.t_host_ns, estimate.vertices))
+
+
+def mean_errors(steps: list[Step]) -> tuple[float, float]:
+    """Mean vertex and surface error [mm] of the steps with a known error."""
+    errors = [step.errors for step in steps if step.errors is not None]
+    return float(np.mean([e.vertex_mm for e in errors])), float(np.mean([e.surface_mm for e in errors]))
