@@ -1,6 +1,10 @@
-"""What every test may ask for: repeatable property tests, a real device, and the data sets kept beside the checkout."""
+"""What every test may ask for: repeatable property tests, processes of the service, a real device, large data sets."""
 
 import os
+import signal
+import socket
+import subprocess
+import sys
 from pathlib import Path
 
 import hypothesis
@@ -38,3 +42,34 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"no data sets in {folder}; name their folder with ABS_SHARED_DATA")
     return folder
+
+
+@pytest.fixture
+def endpoint():
+    """An address on which nobody listens."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture
+def launch():
+    """Starts `abs-service ARGUMENTS` as a process of its own; whatever still runs after the test is killed."""
+    started = []
+
+    def launch(*arguments, **settings):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "abs_service", *map(str, arguments)],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            stderr=subprocess.PIPE,
+            text=True,
+            **settings,
+        )
+        started.append(process)
+        return process
+
+    yield launch
+    for process in started:
+        if process.poll() is None:
+            process.send_signal(signal.SIGKILL)
+        process.communicate()

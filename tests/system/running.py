@@ -1,0 +1,148 @@
+"""A running demo rig as the tests see it: its configuration, its processes and everything that it publishes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from abs.v1.deformation_state_pb2 import DeformationState
+from abs.v1.frame_info_pb2 import FrameInfo
+from abs.v1.health_pb2 import Health
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+
+from abs_service.bus.contract import Sample
+from abs_service.bus.session import BusError, Role
+from abs_service.bus.zenoh_bus import ZenohBus
+
+#: The first start on a machine compiles the kernels.
+START_S = 150.0
+
+TRACKING = DeformationState.STATUS_TRACKING
+
+
+def write_rig(path: Path, endpoint: str) -> Path:
+    """The demo rig on an endpoint of its own; records to `takes` beside the file."""
+    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    text = text.replace("tcp/127.0.0.1:7447", endpoint).replace('directory = "recordings"', 'directory = "takes"')
+    text = text.replace("minimum_free_bytes = 1_000_000_000", "minimum_free_bytes = 0")
+    assert endpoint in text
+    assert '"takes"' in text
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A message and when it arrived, CLOCK_MONOTONIC [ns]."""
+
+    t_ns: int
+    sample: Sample
+
+
+class Ear:
+    """A client of the rig that keeps everything that was published, images without their pixels."""
+
+    def __init__(self, endpoint: str, pattern: str = "**"):
+        self.heard: list[Heard] = []
+        self._bus = _connect(endpoint)
+        self._bus.subscribe(pattern, self._take)
+
+    def _take(self, sample: Sample) -> None:
+        is_image = sample.message == RawImage.DESCRIPTOR.full_name
+        kept = Sample(sample.topic, sample.message, b"" if is_image else sample.payload, sample.attachment)
+        self.heard.append(Heard(time.monotonic_ns(), kept))
+
+    def close(self) -> None:
+        self._bus.close()
+
+    def __enter__(self) -> "Ear":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def states(self) -> list[tuple[int, DeformationState]]:
+        """Every estimate so far and when it arrived [ns]."""
+        return [(one.t_ns, DeformationState.FromString(one.sample.payload)) for one in self._of("sheet/state")]
+
+    def frames(self, topic: str) -> list[FrameInfo]:
+        """The descriptions of all images of a topic."""
+        return [FrameInfo.FromString(one.sample.attachment) for one in self._of(topic)]
+
+    def health(self, component: str) -> list[Health]:
+        """All that a component said about itself."""
+        return [Health.FromString(one.sample.payload) for one in self._of(f"health/{component}")]
+
+    def tracks_since(self, t_ns: int, count: int = 3) -> Callable[[], bool]:
+        """A condition: so many estimates whose exposure was after `t_ns` say TRACKING."""
+
+        def holds() -> bool:
+            late = [state for _, state in self.states() if state.header.t_host_ns > t_ns and state.status == TRACKING]
+            return len(late) >= count
+
+        return holds
+
+    def _of(self, topic: str) -> list[Heard]:
+        return [one for one in self.heard if one.sample.topic == topic]
+
+
+def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any:
+    """What the condition returns as soon as it is true."""
+    deadline_s = time.monotonic() + timeout_s
+    while not (result := condition()):
+        assert time.monotonic() < deadline_s, f"{what} did not happen within {timeout_s:g} s"
+        time.sleep(0.05)  # looks at processes and files, which wake nobody up
+    return result
+
+
+def _connect(endpoint: str) -> ZenohBus:
+    """A client session, as soon as the router listens."""
+    for _ in range(9):
+        try:
+            return ZenohBus.open("demo", endpoint, Role.CLIENT)
+        except BusError:
+            continue  # after three seconds
+    return ZenohBus.open("demo", endpoint, Role.CLIENT)
+
+
+def children(pid: int) -> dict[str, int]:
+    """Process numbers of the children of `run`, by their command."""
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    found: dict[str, int] = {}
+    for child in map(int, listed):
+        words = Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0")
+        if "abs_service" in words:
+            found[words[words.index("abs_service") + 1]] = child
+    return found
+
+
+def is_running(pid: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def kill(pid: int) -> int:
+    """`kill -9`; returns the moment, CLOCK_MONOTONIC [ns]."""
+    os.kill(pid, signal.SIGKILL)
+    return time.monotonic_ns()
+
+
+def abs_service(*arguments: object, timeout_s: float = 120.0) -> subprocess.CompletedProcess[str]:
+    """Runs `abs-service ARGUMENTS` to its end."""
+    return subprocess.run(
+        [sys.executable, "-m", "abs_service", *map(str, arguments)],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True,
+        text=True,
+        timeout=timeout_s,
+        check=False,
+    )

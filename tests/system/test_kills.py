@@ -1,0 +1,74 @@
+"""What `kill -9` does to a running rig: whoever is killed comes back, the others go on, and no recording is lost."""
+
+import time
+from collections.abc import Sequence
+
+import pytest
+from abs.v1.frame_info_pb2 import FrameInfo
+from mcap.reader import make_reader
+
+from tests.system.running import children, is_running, kill, wait_until
+
+pytestmark = pytest.mark.slow
+
+DEPTH = "tof/depth/image"
+
+
+def lost(frames: Sequence[FrameInfo]) -> int:
+    """Exposures whose images did not arrive; the device must not have begun anew."""
+    assert len({info.epoch for info in frames}) == 1, "the device was opened again"
+    numbers = [info.header.seq for info in frames]
+    assert numbers == sorted(set(numbers)), "twice, or out of order"
+    return numbers[-1] - numbers[0] + 1 - len(numbers)
+
+
+def not_published(ear) -> int:
+    """Exposures that capture itself says it left out."""
+    counters = ear.health("capture")[-1].counters
+    return counters["device.sim.late"] + counters[f"dropped.{DEPTH}"]
+
+
+def test_a_killed_tracker_comes_back_and_capture_goes_on(run):
+    process, ear = run
+    boot_id = ear.states()[-1][1].header.boot_id
+    killed_ns = kill(children(process.pid)["track"])
+    wait_until(ear.tracks_since(killed_ns), 30, "TRACKING again")
+    back_ns, state = next((t, s) for t, s in ear.states() if s.header.t_host_ns > killed_ns)
+    print(f"estimates again {(back_ns - killed_ns) * 1e-9:.1f} s after kill -9 of the tracker")
+    assert state.header.boot_id != boot_id
+    wait_until(lambda: ear.health("run")[-1].counters["restarts.track/sheet"] == 1, 5, "the restart in health")
+    assert lost(ear.frames(DEPTH)) <= not_published(ear)
+
+
+def newest_image_ns(path) -> int:
+    with path.open("rb") as stream:
+        last = next(make_reader(stream).iter_messages(topics=f"/{DEPTH}", reverse=True))
+    return last[2].log_time
+
+
+def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_second(run, tmp_path):
+    process, ear = run
+    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in ear.health("record")), 20, "a growing file")
+    kill(children(process.pid)["record"])
+    killed_s = time.time()
+    (cut,) = (tmp_path / "takes").glob("*.mcap.active")
+    saved = cut.with_name(cut.name.removesuffix(".active"))
+    wait_until(saved.exists, 30, "recovery")
+    lost_s = killed_s - newest_image_ns(saved) * 1e-9
+    print(f"kill -9 of the recorder lost {lost_s:.2f} s")
+    assert lost_s < 1.3  # what is not flushed within a second, and what was on its way
+    (active,) = wait_until(lambda: list((tmp_path / "takes").glob("*.mcap.active")), 10, "a new file")
+    assert active != cut
+    size = active.stat().st_size
+    wait_until(lambda: active.stat().st_size > size + 1_000_000, 10, "growth of the new file")
+    assert lost(ear.frames(DEPTH)) <= not_published(ear)
+    assert len({state.header.boot_id for _, state in ear.states()}) == 1, "the tracker was not restarted"
+
+
+def test_nothing_survives_a_killed_run(run):
+    process, _ = run
+    alive = children(process.pid)
+    assert alive.keys() == {"capture", "track", "record"}
+    begin_ns = kill(process.pid)
+    wait_until(lambda: not any(map(is_running, alive.values())), 5, "the end of the children")
+    print(f"the children ended {(time.monotonic_ns() - begin_ns) * 1e-9:.1f} s after kill -9 of run")
