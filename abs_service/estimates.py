@@ -1,7 +1,8 @@
 """What a tracker tells the world: its estimates and its mesh as messages."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from abs.v1 import common_pb2, deformation_state_pb2, deformed_mesh_pb2
@@ -45,19 +46,27 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What an estimate cost: time from frame set to Θ, from exposure to now [ms], frame sets passed over before it."""
+    """What an estimate cost.
+
+    Attributes:
+        solve_ms: time from frame set to Θ [ms].
+        age_ms: time from exposure to now [ms].
+        skipped: frame sets passed over since the last estimate.
+        dropped: frames so far that are in no estimate, by sensor.
+    """
 
     solve_ms: float
     age_ms: float
     skipped: int
+    dropped: Mapping[str, int]
 
 
-def model_id(model: str, mesh: Mesh) -> str:
-    """Short hash that is equal where Θ means the same: same model, same undeformed mesh."""
-    digest = hashlib.sha256(model.encode())
+def with_mesh(identity: Identity, mesh: Mesh, version: int) -> Identity:
+    """The identity with a new mesh; `model_id` is equal where Θ means the same: same model, same undeformed mesh."""
+    digest = hashlib.sha256(identity.model.encode())
     digest.update(mesh.vertices.astype("<f8").tobytes())
     digest.update(mesh.faces.astype("<i4").tobytes())
-    return digest.hexdigest()[:16]
+    return replace(identity, model_id=digest.hexdigest()[:16], mesh_version=version)
 
 
 def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
@@ -80,6 +89,10 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         skipped=effort.skipped,
         mesh_version=identity.mesh_version,
         inlier_share=estimate.inlier_share,
+        covariance=estimate.covariance[np.triu_indices(len(estimate.theta))].tolist(),
+        covariance_valid=estimate.status in (Status.TRACKING, Status.DEGRADED),
+        samples=sum(fit.samples for fit in estimate.fits),
+        clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
     )
     for fit in estimate.fits:
         source = estimate.sources.get(fit.sensor, Source(0, 0))
@@ -90,9 +103,10 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
             samples=fit.samples,
             mean_log_likelihood=fit.mean_log_likelihood,
             normalized_residual=fit.normalized_residual,
+            dropped=effort.dropped.get(fit.sensor, 0),
         )
     for sensor in estimate.missing:
-        message.sensors.add(sensor=sensor, missing=True)
+        message.sensors.add(sensor=sensor, missing=True, dropped=effort.dropped.get(sensor, 0))
     return message
 
 

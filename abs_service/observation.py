@@ -37,10 +37,11 @@ class ColorImage:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Which exposure an image of the observation comes from."""
+    """Which exposure an image of the observation comes from, and how well its time is known [ns]."""
 
     seq: int
     t_host_ns: int
+    t_sigma_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,10 +84,10 @@ class Observer:
                 _check_size(frame, sensor.camera)
             if Kind.DEPTH in members and (Kind.AMPLITUDE in members or not _needs_amplitude(sensor)):
                 images[name] = self._depth(members[Kind.DEPTH], members.get(Kind.AMPLITUDE))
-                sources[name] = Source(members[Kind.DEPTH].seq, members[Kind.DEPTH].t_host_ns)
+                sources[name] = _source(members[Kind.DEPTH])
             elif Kind.COLOR in members:
                 images[name] = ColorImage(_rgb(members[Kind.COLOR]))
-                sources[name] = Source(members[Kind.COLOR].seq, members[Kind.COLOR].t_host_ns)
+                sources[name] = _source(members[Kind.COLOR])
         missing = tuple(name for name in self._rig.sensors if name not in images)
         return Observation(frames.seq, frames.stamp_ns, images, sources, missing)
 
@@ -101,6 +102,10 @@ class Observer:
 def _ray_length(camera: Camera) -> NDArray[np.float32]:
     """Radial distance per unit of z of every pixel (height, width)."""
     return (1 / camera.rays()[..., 2]).astype(np.float32)
+
+
+def _source(frame: Frame) -> Source:
+    return Source(frame.seq, frame.t_host_ns, frame.t_sigma_ns)
 
 
 def _needs_amplitude(sensor: Sensor) -> bool:

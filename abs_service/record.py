@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from abs.v1.sensor_model_pb2 import SensorModel
+from google.protobuf.json_format import MessageToJson
+
 from abs_service import envelope, keys
 from abs_service.bus.contract import Bus, Sample
 from abs_service.envelope import EnvelopeError
@@ -84,6 +87,7 @@ class Recorder:
         self._standing: dict[str, Sample] = {}
         self._last_seq: dict[str, int] = {}
         self._counts: Counter[str] = Counter()  # of the open file
+        self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
         self._told: Counter[str] = Counter()  # dropped messages that finished files tell of
         self._failed = ""
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
@@ -146,6 +150,7 @@ class Recorder:
         self._health.label("file", file.path.name)
         self._health.count("files")
         self._counts = Counter()
+        self._attached = {}
         try:
             for sample in self._standing.values():
                 self._write(file, sample, is_repeated=True)
@@ -196,9 +201,19 @@ class Recorder:
             self._health.count("refused")
             self._health.label("refused", str(error))
             return
+        if sample.message == envelope.MODEL:
+            self._attach_calibration(file, sample, stamp_ns)
         self._count(sample.topic, about.seq)
         if sample.message in _STANDING:
             self._standing[sample.topic] = sample
+
+    def _attach_calibration(self, file: RecordingFile, sample: Sample, stamp_ns: int) -> None:
+        """Attaches what a sensor is, when the file does not hold it yet, to be had without reading messages."""
+        model = SensorModel.FromString(sample.payload)
+        if self._attached.get(model.sensor) != model.calib_id:
+            text = MessageToJson(model, preserving_proto_field_name=True)
+            file.attach(f"calibration/{model.sensor}.json", "application/json", text, stamp_ns)
+            self._attached[model.sensor] = model.calib_id
 
     def _stamp_ns(self, stamp_ns: int, is_repeated: bool) -> int:
         is_usable = 0 < stamp_ns < 1 << 63

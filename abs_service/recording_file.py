@@ -68,6 +68,10 @@ class RecordingFile:
         """Appends one message; see `McapFile.write`. After an `OSError` only `abandon` makes sense."""
         self._file.write(f"/{topic}", message, payload, stamp_ns, seq)
 
+    def attach(self, name: str, media_type: str, text: str, stamp_ns: int) -> None:
+        """Adds an attachment, at the start or later; see `McapFile.attach`."""
+        self._file.attach(name, media_type, text.encode(), stamp_ns)
+
     def flush(self) -> None:
         """Brings everything written so far to the disk, past the caches: neither a kill nor a power cut takes it."""
         self._file.flush()

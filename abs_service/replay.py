@@ -77,7 +77,7 @@ class OfflineTracker:
         solve_ms = (self._clock() - begin_ns) * 1e-6
         self._write_new_topology()
         header = self._speaker.header(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
-        state = estimates.state(header, estimate, self._identity, Effort(solve_ms, NO_AGE, 0))
+        state = estimates.state(header, estimate, self._identity, Effort(solve_ms, NO_AGE, 0, {}))
         mesh = estimates.mesh(header, estimate, self._identity)
         self._write(keys.state(self._name), estimates.STATE, state, estimate)
         self._write(keys.mesh(self._name), estimates.MESH, mesh, estimate)
@@ -88,9 +88,7 @@ class OfflineTracker:
         mesh, version = self._tracking.mesh, self._tracking.mesh_version
         if mesh is None or version == self._identity.mesh_version:
             return
-        identity = self._identity
-        model_id = estimates.model_id(identity.model, mesh)
-        self._identity = Identity(identity.tracker, identity.model, model_id, identity.calib_id, version)
+        self._identity = estimates.with_mesh(self._identity, mesh, version)
         header = self._speaker.header(self._tracking.made_ns, version, keys.RIG_FRAME)
         topology = estimates.topology(header, mesh, self._identity)
         topic = f"/{keys.topology(self._name)}"

@@ -1,5 +1,6 @@
 """A tracker in a running rig: takes the newest frame set, publishes the estimate."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 
 from abs_service import estimates, keys
@@ -50,6 +51,15 @@ class NewestSets:
         return counters
 
     @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames so far that are in no set, by sensor, whatever the cause."""
+        total: Counter[str] = Counter()
+        for counts in (self._frames.dropped, self._frames.malformed, self._synchroniser.counters):
+            for name, number in counts.items():
+                total[name.partition("/")[0]] += number
+        return total
+
+    @property
     def last_error(self) -> str:
         """Why the last malformed message was one; "" if there was none."""
         return self._frames.last_error
@@ -77,20 +87,13 @@ class EstimatePublisher:
         self._identity = Identity(tracker, model, "", calib_id, 0)
         self._seq = 0
 
-    def publish(self, estimate: Estimate, tracking: Tracking, solve_ms: float, skipped: int) -> None:
-        """Publishes an estimate; the age of its exposure is taken now."""
-        speaker = self._speaker
+    def publish(self, estimate: Estimate, tracking: Tracking, effort: Effort) -> None:
+        """Publishes an estimate, after the topology of its mesh if that is new."""
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
-            model_id = estimates.model_id(self._identity.model, tracking.mesh)
-            identity = self._identity
-            self._identity = Identity(
-                identity.tracker, identity.model, model_id, identity.calib_id, tracking.mesh_version
-            )
-            header = speaker.header(tracking.made_ns, self._seq, keys.RIG_FRAME)
+            self._identity = estimates.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
+            header = self._speaker.header(tracking.made_ns, self._seq, keys.RIG_FRAME)
             self._topology.put(estimates.topology(header, tracking.mesh, self._identity).SerializeToString())
-        header = speaker.header(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
-        age_ms = (speaker.clock.monotonic() - estimate.t_host_ns) * 1e-6
-        effort = Effort(solve_ms, age_ms, skipped)
+        header = self._speaker.header(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
         self._state.put(estimates.state(header, estimate, self._identity, effort).SerializeToString())
         self._mesh.put(estimates.mesh(header, estimate, self._identity).SerializeToString())
         self._seq += 1
@@ -140,7 +143,8 @@ class LiveTracker:
         solve_ms = (self._clock() - begin_ns) * 1e-6
         skipped = self._sets.skipped - self._reported
         self._reported = self._sets.skipped
-        self._publisher.publish(estimate, self._tracking, solve_ms, skipped)
+        age_ms = (self._clock() - estimate.t_host_ns) * 1e-6
+        self._publisher.publish(estimate, self._tracking, Effort(solve_ms, age_ms, skipped, self._sets.dropped))
         self._report(estimate, solve_ms)
 
     def report(self) -> None:

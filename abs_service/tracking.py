@@ -148,6 +148,7 @@ def _initializing(observation: Observation, reason: str) -> Estimate:
         status=Status.INITIALIZING,
         reasons=(reason,),
         theta=np.zeros(0),
+        covariance=np.zeros((0, 0)),
         vertices=np.zeros((0, 3), np.float32),
         cost=float("nan"),
         deviation=float("nan"),

@@ -80,6 +80,7 @@ def encode_info(frame: Frame, header: Header) -> bytes:
         seq=frame.seq,
         epoch=frame.epoch,
         scale=frame.scale,
+        unit=frame.unit,
         geometry=_GEOMETRIES[frame.geometry],
         invalid=frame.invalid,
         t_device_ticks=frame.t_device_ticks,
@@ -94,6 +95,7 @@ def encode_info(frame: Frame, header: Header) -> bytes:
         modulation=frame.modulation,
         calib_id=frame.calib_id,
         undistorted=frame.undistorted,
+        aligned_to=frame.aligned_to,
         filters=frame.filters,
         incomplete=frame.incomplete,
         saturated=frame.saturated,
@@ -104,11 +106,7 @@ def encode_info(frame: Frame, header: Header) -> bytes:
 
 
 def decode(image: bytes, info: bytes) -> Frame:
-    """The frame of an image and its description; the pixels are not copied out of the parsed message.
-
-    Args:
-        image: serialized foxglove.RawImage.
-        info: serialized abs.v1.FrameInfo of that very image.
+    """The frame of a serialized foxglove.RawImage and of the abs.v1.FrameInfo that describes it; pixels are not copied.
 
     Raises:
         CodecError: the bytes are no such messages, contradict each other or themselves.
@@ -117,9 +115,7 @@ def decode(image: bytes, info: bytes) -> Frame:
     name = f"{about.sensor}/{about.stream}"
     if not about.sensor or not about.stream:
         raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
-    if picture.frame_id != about.sensor:
-        raise CodecError(f"{name}: the image is of sensor {picture.frame_id!r}, its info of {about.sensor!r}")
-    _check_numbers(name, about)
+    _check(name, picture, about)
     try:
         return Frame(
             sensor=about.sensor,
@@ -132,6 +128,7 @@ def decode(image: bytes, info: bytes) -> Frame:
             seq=about.seq,
             epoch=about.epoch,
             scale=about.scale,
+            unit=about.unit,
             geometry=_member(name, "geometry", _GEOMETRY_OF, about.geometry),
             invalid=about.invalid if about.HasField("invalid") else None,
             t_device_ticks=about.t_device_ticks,
@@ -145,6 +142,7 @@ def decode(image: bytes, info: bytes) -> Frame:
             modulation=about.modulation,
             calib_id=about.calib_id,
             undistorted=about.undistorted,
+            aligned_to=about.aligned_to,
             filters=tuple(about.filters),
             incomplete=about.incomplete,
             saturated=about.saturated,
@@ -226,7 +224,9 @@ def _member(name: str, field: str, members: Mapping[int, _Member], number: int) 
     return members[number]
 
 
-def _check_numbers(name: str, info: FrameInfo) -> None:
+def _check(name: str, image: RawImage, info: FrameInfo) -> None:
+    if image.frame_id != info.sensor:
+        raise CodecError(f"{name}: the image is of sensor {image.frame_id!r}, its info of {info.sensor!r}")
     if not (info.scale > 0 and math.isfinite(info.scale)):
         raise CodecError(f"{name}: scale must be positive and finite, not {info.scale}")
     if not (info.tick_hz >= 0 and math.isfinite(info.tick_hz)):

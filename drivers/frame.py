@@ -18,6 +18,8 @@ class Kind(StrEnum):
     IR = "ir"
     COLOR = "color"
     BAYER = "bayer"
+    PHASE = "phase"
+    DISPARITY = "disparity"
 
 
 class Geometry(StrEnum):
@@ -69,7 +71,9 @@ class Frame:
         t_arrival_ns: when the host had the frame, CLOCK_MONOTONIC [ns].
         seq: counts the device's exposures; depth and amplitude of one exposure share it; gaps are losses.
         epoch: grows by one with each reconnect or clock step; seq and ticks start anew.
-        scale: SI value (m for lengths, 1 otherwise) of one unit of `data`.
+        scale: value, in `unit`, of one step of `data`.
+        unit: what `data` times `scale` is measured in: "m" for lengths, "dn" for numbers that only the device knows the
+            meaning of; by default what fits the kind.
         geometry: which length a depth image holds.
         invalid: the value of `data` that means "no return"; NaN always does; None if every value is a measurement.
         t_device_ticks, tick_hz: the device's own stamp and its rate; rate 0 if the device has no clock.
@@ -80,6 +84,7 @@ class Frame:
         modulation: modulation or range profile of a time-of-flight sensor, "" if none.
         calib_id: hash of the camera model the device had in mind, "" if unknown.
         undistorted: whether the device removed the lens distortion.
+        aligned_to: sensor into whose view the device warped the image, "" if it is the sensor's own.
         filters: names of the filters that the device applied, in order.
         incomplete, saturated: flags of the device.
     """
@@ -94,6 +99,7 @@ class Frame:
     seq: int
     epoch: int = 0
     scale: float = 1.0
+    unit: str = ""
     geometry: Geometry = Geometry.NONE
     invalid: float | None = None
     t_device_ticks: int = 0
@@ -107,6 +113,7 @@ class Frame:
     modulation: str = ""
     calib_id: str = ""
     undistorted: bool = False
+    aligned_to: str = ""
     filters: tuple[str, ...] = ()
     incomplete: bool = False
     saturated: bool = False
@@ -123,6 +130,8 @@ class Frame:
             )
         if self.kind == Kind.DEPTH and self.geometry == Geometry.NONE:
             raise FrameError(f"{self.sensor}/{self.stream}: a depth frame must declare its geometry, z or radial")
+        if not self.unit:
+            object.__setattr__(self, "unit", "m" if self.kind == Kind.DEPTH else "dn")
         if self.data.flags.writeable:
             view = self.data.view()
             view.setflags(write=False)
@@ -134,7 +143,7 @@ class Frame:
         return self.sensor, self.stream
 
     def si(self) -> NDArray[np.float32]:
-        """The image in SI units as float32, NaN where there is no return."""
+        """The image in `unit` as float32, NaN where there is no return."""
         values = self.data.astype(np.float32) * np.float32(self.scale)
         if self.invalid is not None:
             values[self.data == self.invalid] = np.nan

@@ -30,6 +30,8 @@ class Estimate:
         status: how far to trust it.
         reasons: why it is not TRACKING, in plain words.
         theta: parameters (dim,) of the model; empty while INITIALIZING.
+        covariance: of theta (dim, dim), the inverse curvature of the cost where the search began; an approximation that
+            trusts the noise models and knows nothing of other minima.
         vertices: deformed mesh (n, 3) [m] in the rig's frame.
         cost: negative logarithm of likelihood times priors at theta, up to constants.
         deviation: step size of the search when it ended.
@@ -45,6 +47,7 @@ class Estimate:
     status: Status
     reasons: tuple[str, ...]
     theta: NDArray[np.float64]
+    covariance: NDArray[np.float64]
     vertices: NDArray[np.float32]
     cost: float
     deviation: float

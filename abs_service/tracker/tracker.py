@@ -54,7 +54,7 @@ class Tracker:
             evaluations += len(candidates)
         theta = self._better(start, start + metric @ self._optimizer.mean)
         self._motion.update(theta)
-        return self._estimate(observation, theta, generations, evaluations)
+        return self._estimate(observation, theta, metric @ metric.T, generations, evaluations)
 
     def _start(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the search begins, the prediction or a Newton step from it, and the metric of its coordinates."""
@@ -79,7 +79,12 @@ class Tracker:
         return self._objective.cost(surface) + self._stretch.cost(surface) + self._motion.cost(thetas)
 
     def _estimate(
-        self, observation: Observation, theta: NDArray[np.float64], generations: int, evaluations: int
+        self,
+        observation: Observation,
+        theta: NDArray[np.float64],
+        covariance: NDArray[np.float64],
+        generations: int,
+        evaluations: int,
     ) -> Estimate:
         surface = self.model.deform(theta[None])
         fits = tuple(self._objective.fits(surface))
@@ -91,6 +96,7 @@ class Tracker:
             status=verdict,
             reasons=reasons,
             theta=theta,
+            covariance=covariance,
             vertices=np.ascontiguousarray(surface.vertices[0].T),
             cost=float(self._cost(theta[None])[0]),
             deviation=self._optimizer.deviation,

@@ -1,5 +1,6 @@
 """What the recorder promises: everything, unchanged, readable by anyone."""
 
+import json
 import threading
 
 import pytest
@@ -53,8 +54,9 @@ def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_ever
         threading.Event().wait(0.005)
     rig.recorder.stop(5)
     for path in recordings(tmp_path):
-        topics = [m.channel.topic for m in read(path)[0]]
-        assert {"/config", "/tof/calibration", "/tof/model", "/tf"} <= set(topics)
+        messages, attachments, _ = read(path)
+        assert {"/config", "/tof/calibration", "/tof/model", "/tf"} <= {m.channel.topic for m in messages}
+        assert json.loads(attachments["calibration/tof.json"])["calib_id"] == camera.calib_id
     assert metadata(recordings(tmp_path)[0])["ended"] == "rotated"
     frames = [m.message.sequence for p in recordings(tmp_path) for m in read(p)[0] if m.channel.topic == f"/{DEPTH}"]
     assert sorted(frames) == list(range(1, seq + 1)), "rotation lost or doubled a frame"

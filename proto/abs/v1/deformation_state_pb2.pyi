@@ -9,7 +9,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class DeformationState(_message.Message):
-    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share")
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns")
     class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
@@ -23,7 +23,7 @@ class DeformationState(_message.Message):
     STATUS_DEGRADED: DeformationState.Status
     STATUS_LOST: DeformationState.Status
     class Sensor(_message.Message):
-        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing")
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
         SEQ_FIELD_NUMBER: _ClassVar[int]
         T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
@@ -31,6 +31,7 @@ class DeformationState(_message.Message):
         MEAN_LOG_LIKELIHOOD_FIELD_NUMBER: _ClassVar[int]
         NORMALIZED_RESIDUAL_FIELD_NUMBER: _ClassVar[int]
         MISSING_FIELD_NUMBER: _ClassVar[int]
+        DROPPED_FIELD_NUMBER: _ClassVar[int]
         sensor: str
         seq: int
         t_host_ns: int
@@ -38,7 +39,8 @@ class DeformationState(_message.Message):
         mean_log_likelihood: float
         normalized_residual: float
         missing: bool
-        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ...) -> None: ...
+        dropped: int
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]
@@ -57,6 +59,10 @@ class DeformationState(_message.Message):
     MESH_VERSION_FIELD_NUMBER: _ClassVar[int]
     SENSORS_FIELD_NUMBER: _ClassVar[int]
     INLIER_SHARE_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_FIELD_NUMBER: _ClassVar[int]
+    COVARIANCE_VALID_FIELD_NUMBER: _ClassVar[int]
+    SAMPLES_FIELD_NUMBER: _ClassVar[int]
+    CLOCK_SIGMA_NS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
     status: DeformationState.Status
@@ -75,4 +81,8 @@ class DeformationState(_message.Message):
     mesh_version: int
     sensors: _containers.RepeatedCompositeFieldContainer[DeformationState.Sensor]
     inlier_share: float
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ...) -> None: ...
+    covariance: _containers.RepeatedScalarFieldContainer[float]
+    covariance_valid: bool
+    samples: int
+    clock_sigma_ns: int
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ...) -> None: ...

@@ -9,7 +9,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class FrameInfo(_message.Message):
-    __slots__ = ("header", "sensor", "stream", "kind", "seq", "epoch", "scale", "geometry", "invalid", "t_device_ticks", "tick_hz", "clock_domain", "t_sigma_ns", "t_reference", "t_arrival_ns", "exposure_s", "gain", "temperature_c", "modulation", "calib_id", "undistorted", "filters", "incomplete", "saturated")
+    __slots__ = ("header", "sensor", "stream", "kind", "seq", "epoch", "scale", "geometry", "invalid", "t_device_ticks", "tick_hz", "clock_domain", "t_sigma_ns", "t_reference", "t_arrival_ns", "exposure_s", "gain", "temperature_c", "modulation", "calib_id", "undistorted", "filters", "incomplete", "saturated", "unit", "aligned_to")
     class Geometry(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         GEOMETRY_NONE: _ClassVar[FrameInfo.Geometry]
@@ -50,6 +50,8 @@ class FrameInfo(_message.Message):
     FILTERS_FIELD_NUMBER: _ClassVar[int]
     INCOMPLETE_FIELD_NUMBER: _ClassVar[int]
     SATURATED_FIELD_NUMBER: _ClassVar[int]
+    UNIT_FIELD_NUMBER: _ClassVar[int]
+    ALIGNED_TO_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     sensor: str
     stream: str
@@ -74,4 +76,6 @@ class FrameInfo(_message.Message):
     filters: _containers.RepeatedScalarFieldContainer[str]
     incomplete: bool
     saturated: bool
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., sensor: _Optional[str] = ..., stream: _Optional[str] = ..., kind: _Optional[str] = ..., seq: _Optional[int] = ..., epoch: _Optional[int] = ..., scale: _Optional[float] = ..., geometry: _Optional[_Union[FrameInfo.Geometry, str]] = ..., invalid: _Optional[float] = ..., t_device_ticks: _Optional[int] = ..., tick_hz: _Optional[float] = ..., clock_domain: _Optional[str] = ..., t_sigma_ns: _Optional[int] = ..., t_reference: _Optional[_Union[FrameInfo.Reference, str]] = ..., t_arrival_ns: _Optional[int] = ..., exposure_s: _Optional[float] = ..., gain: _Optional[float] = ..., temperature_c: _Optional[float] = ..., modulation: _Optional[str] = ..., calib_id: _Optional[str] = ..., undistorted: _Optional[bool] = ..., filters: _Optional[_Iterable[str]] = ..., incomplete: _Optional[bool] = ..., saturated: _Optional[bool] = ...) -> None: ...
+    unit: str
+    aligned_to: str
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., sensor: _Optional[str] = ..., stream: _Optional[str] = ..., kind: _Optional[str] = ..., seq: _Optional[int] = ..., epoch: _Optional[int] = ..., scale: _Optional[float] = ..., geometry: _Optional[_Union[FrameInfo.Geometry, str]] = ..., invalid: _Optional[float] = ..., t_device_ticks: _Optional[int] = ..., tick_hz: _Optional[float] = ..., clock_domain: _Optional[str] = ..., t_sigma_ns: _Optional[int] = ..., t_reference: _Optional[_Union[FrameInfo.Reference, str]] = ..., t_arrival_ns: _Optional[int] = ..., exposure_s: _Optional[float] = ..., gain: _Optional[float] = ..., temperature_c: _Optional[float] = ..., modulation: _Optional[str] = ..., calib_id: _Optional[str] = ..., undistorted: _Optional[bool] = ..., filters: _Optional[_Iterable[str]] = ..., incomplete: _Optional[bool] = ..., saturated: _Optional[bool] = ..., unit: _Optional[str] = ..., aligned_to: _Optional[str] = ...) -> None: ...

@@ -1,0 +1,69 @@
+"""What an estimate says on the wire."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from abs.v1.common_pb2 import Header
+
+from abs_service import estimates
+from abs_service.estimates import Effort, Identity
+from abs_service.observation import Source
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.terms.base import SensorFit
+
+ESTIMATE = Estimate(
+    seq=7,
+    t_host_ns=10**9,
+    status=Status.DEGRADED,
+    reasons=("no frame from color",),
+    theta=np.array([1.0, 2.0, 3.0]),
+    covariance=np.array([[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]]),
+    vertices=np.arange(6, dtype=np.float32).reshape(2, 3),
+    cost=12.5,
+    deviation=0.5,
+    generations=3,
+    evaluations=45,
+    inlier_share=0.9,
+    fits=(SensorFit("tof", 280, 270, 260, 1.5, 1.1),),
+    sources={"tof": Source(42, 10**9, 25_000)},
+    missing=("color",),
+)
+IDENTITY = Identity("sheet", "nurbs", "m", "c", 1)
+MESH = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32), np.full((3, 3), np.nan, np.float32), np.zeros((3, 2)))
+
+
+def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
+    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 2.0, 0, {}))
+    assert list(state.covariance) == pytest.approx([1.0, 0.1, 0.2, 2.0, 0.3, 3.0])
+    assert state.covariance_valid
+    assert state.log_likelihood == -12.5
+
+
+@pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])
+def test_the_covariance_of_what_is_not_tracked_says_nothing(status):
+    lost = replace(ESTIMATE, status=status)
+    assert not estimates.state(Header(), lost, IDENTITY, Effort(1.0, 2.0, 0, {})).covariance_valid
+
+
+def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
+    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 2.0, 3, {"tof": 4, "color": 5}))
+    tof, color = state.sensors
+    assert (tof.sensor, tof.seq, tof.samples, tof.dropped, tof.missing) == ("tof", 42, 270, 4, False)
+    assert (color.sensor, color.dropped, color.missing) == ("color", 5, True)
+    assert (state.samples, state.clock_sigma_ns, state.skipped) == (270, 25_000, 3)
+
+
+def test_theta_of_another_mesh_or_model_has_another_id():
+    first = estimates.with_mesh(IDENTITY, MESH, 1)
+    moved = estimates.with_mesh(IDENTITY, replace(MESH, vertices=MESH.vertices + 1e-6), 2)
+    rigid = estimates.with_mesh(replace(IDENTITY, model="rigid"), MESH, 1)
+    assert len({first.model_id, moved.model_id, rigid.model_id}) == 3
+    assert moved.mesh_version == 2
+
+
+def test_colors_travel_only_if_a_sensor_saw_some():
+    assert estimates.topology(Header(), MESH, IDENTITY).colors_u8 == b""
+    seen = replace(MESH, colors=np.array([[1, 2, 3], [4, 5, 6], [np.nan] * 3], np.float32))
+    assert estimates.topology(Header(), seen, IDENTITY).colors_u8 == bytes([1, 2, 3, 4, 5, 6, 0, 0, 0])
