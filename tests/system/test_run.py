@@ -1,0 +1,121 @@
+"""A rig that runs, ends and leaves a recording: what other programs receive, how fast it starts and how it ends."""
+
+import json
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from abs_service import config
+from tests.system.running import TRACKING, children, is_running, wait_until
+
+pytestmark = pytest.mark.slow
+
+TOPICS = {
+    *(f"/tof/{stream}/{part}" for stream in ("depth", "amplitude") for part in ("image", "info")),
+    *("/color/color/image", "/color/color/info", "/sim/truth", "/tf", "/config"),
+    *(f"/{sensor}/{part}" for sensor in ("tof", "color") for part in ("calibration", "model")),
+    *(f"/sheet/{part}" for part in ("state", "mesh", "topology")),
+    *(f"/health/{component}" for component in ("run", "capture", "track/sheet", "record")),
+}
+FOXGLOVE = {
+    "/tof/depth/image": "foxglove.RawImage",
+    "/color/color/image": "foxglove.RawImage",
+    "/tof/calibration": "foxglove.CameraCalibration",
+    "/tf": "foxglove.FrameTransforms",
+}
+
+
+def end(process, send):
+    """Asks a rig to end; returns how long it took [s]. Nothing is left over, and nothing is complained about."""
+    alive = children(process.pid)
+    assert alive.keys() == {"capture", "track", "record"}
+    begin_s = time.monotonic()
+    send()
+    assert process.wait(10) == 0
+    took_s = time.monotonic() - begin_s
+    assert not any(map(is_running, alive.values()))
+    complaints = process.stderr.read()
+    assert "Traceback" not in complaints
+    assert "FATAL" not in complaints
+    return took_s
+
+
+def read_whole(path):
+    """Every channel's schema, the decoded messages of each topic, and the attachments of a finished recording."""
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None, "no index"
+        assert summary.chunk_indexes
+        schemas = {
+            channel.topic: summary.schemas[channel.schema_id].name if channel.schema_id else ""
+            for channel in summary.channels.values()
+        }
+        messages: dict[str, list] = {}
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            messages.setdefault(channel.topic, []).append((message, decoded))
+        return schemas, messages, {attachment.name: attachment.data for attachment in reader.iter_attachments()}
+
+
+def test_a_subscriber_receives_nearly_all_estimates_for_half_a_minute_and_ctrl_c_leaves_a_complete_recording(
+    run, tmp_path
+):
+    process, ear = run
+    begin_ns = time.monotonic_ns()
+    wait_until(lambda: time.monotonic_ns() - begin_ns > 30_000_000_000, 40, "half a minute")
+    received = [(t_ns, state) for t_ns, state in ear.states() if state.header.t_host_ns > begin_ns]
+    numbers = [state.header.seq for _, state in received]
+    share = len(set(numbers)) / (numbers[-1] - numbers[0] + 1)
+    ages_ms = [(t_ns - state.header.t_host_ns) * 1e-6 for t_ns, state in received]
+    p50, p99 = np.percentile(ages_ms, [50, 99])
+    print(f"{len(received)} states in 30 s, {share:.1%} of those published; age p50 {p50:.0f} ms, p99 {p99:.0f} ms")
+    assert share >= 0.95
+    assert all(state.status == TRACKING for _, state in received)
+
+    # As a terminal does it: to the foreground process group.
+    took_s = end(process, lambda: os.killpg(process.pid, signal.SIGINT))
+    print(f"Ctrl-C took {took_s:.1f} s")
+    assert took_s < 5
+    (path,) = (tmp_path / "takes").iterdir()
+    schemas, messages, attachments = read_whole(path)
+    assert schemas.keys() == messages.keys() == TOPICS
+    assert all(schemas.values())
+    assert {topic: schemas[topic] for topic in FOXGLOVE} == FOXGLOVE
+    image, info = messages["/tof/depth/image"][-1][1], messages["/tof/depth/info"][-1][1]
+    assert (image.width, image.height, len(image.data)) == (176, 144, 2 * 176 * 144)
+    assert len(messages["/tof/depth/image"]) == len(messages["/tof/depth/info"])
+    assert info.header.rig == "demo"
+    recorded = [message.sequence for message, _ in messages["/sheet/state"]]
+    assert recorded == list(range(recorded[0], recorded[-1] + 1)), "an estimate is not recorded"
+    assert set(numbers) <= set(recorded)
+    rig_toml = attachments["rig.toml"].decode()
+    assert config.loads(rig_toml, "attachment", tmp_path) == config.load(tmp_path / "rig.toml")
+
+
+def test_sigterm_to_run_ends_everything_in_time_and_the_last_line_of_output_is_whole(run, tmp_path):
+    process, ear = run
+    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in ear.health("record")), 20, "a growing file")
+    took_s = end(process, lambda: process.send_signal(signal.SIGTERM))
+    print(f"SIGTERM took {took_s:.1f} s")
+    assert took_s < 5
+    assert [path.suffix for path in (tmp_path / "takes").iterdir()] == [".mcap"]
+    estimates = [json.loads(line) for line in (tmp_path / "output.jsonl").read_text().splitlines()]
+    errors_mm = [estimate["error_mm"] for estimate in estimates if estimate["error_mm"] is not None]
+    assert np.mean(errors_mm) < 5
+
+
+def test_the_first_estimate_after_the_start(rig_file, launch):
+    process = launch("run", rig_file, "--json", "--no-record", stdout=-1)
+    begin_s = time.monotonic()
+    for line in process.stdout:
+        if json.loads(line)["status"] == "TRACKING":
+            break
+    print(f"TRACKING {time.monotonic() - begin_s:.1f} s after the start")  # the first start on a machine takes longer
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=10)
+    assert process.returncode == 0
