@@ -143,17 +143,21 @@ def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], as_j
 
 @contextmanager
 def _writing(path: Path, toml: str) -> Iterator[McapFile]:
-    """A new MCAP file, called *.active until it is complete."""
+    """A new MCAP file, called *.active until it is complete; an error leaves none, an interruption what there is."""
     active = path.with_name(f"{path.name}.active")
     try:
         stream = active.open("wb")
     except OSError as error:
         raise ReplayOptionError(f"--out {path}: cannot be written: {error.strerror}") from None
-    with stream:
-        file = McapFile(stream)
-        file.attach("rig.toml", "text/toml", toml.encode(), 0)
-        yield file
-        file.finish()
+    try:
+        with stream:
+            file = McapFile(stream)
+            file.attach("rig.toml", "text/toml", toml.encode(), 0)
+            yield file
+            file.finish()
+    except Exception:
+        active.unlink()
+        raise
     os.replace(active, path)
 
 

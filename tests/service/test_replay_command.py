@@ -1,0 +1,205 @@
+"""`abs-service replay`: the same estimates each time, in a file that others can read, and clear words otherwise."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from abs.v1.common_pb2 import Header
+from abs.v1.sensor_model_pb2 import SensorModel
+from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
+
+from abs_service import cli, config
+from abs_service.exits import Exit
+from abs_service.replay import free_path
+from drivers import codec
+from drivers.device import Truth
+from drivers.mcap_file import McapFile
+from drivers.simulated.address import parse
+
+COUNT = 20
+SIMULATION = parse("simulated://sheet?seed=1").build()
+#: Enough generations to exercise the search, few enough to be quick.
+TOML = config.to_toml(config.load_default()).replace("generations = 20", "generations = 3")
+WALL_NS = 1_700_000_000_000_000_000
+FIRST = 30  # the sheet begins to move
+
+
+def write(path: Path, *, toml: str = TOML, finish: bool = True, sensors: tuple[str, ...] = ("tof", "color")) -> Path:
+    with path.open("wb") as stream:
+        file = McapFile(stream, chunk_size=400_000)
+        if toml:
+            file.attach("rig.toml", "text/toml", toml.encode(), WALL_NS)
+        for name in sensors:
+            camera = SIMULATION.heads[name].camera
+            model = SensorModel(sensor=name, width=camera.width, height=camera.height, fx=camera.fx, fy=camera.fy)
+            model.cx, model.cy = camera.cx, camera.cy
+            model.lens.extend(camera.lens.coefficients.tolist())
+            model.T_rs.extend(camera.T_rs.ravel().tolist())
+            file.write(f"/{name}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
+        for k in range(FIRST, FIRST + COUNT):
+            frames, truth = SIMULATION.expose(k)
+            write_truth(file, truth)
+            for frame in frames:
+                if frame.sensor in sensors:
+                    wall_ns, base = WALL_NS + frame.t_host_ns, f"/{frame.sensor}/{frame.stream}"
+                    header = Header(rig="demo", seq=frame.seq)
+                    file.write(
+                        f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq
+                    )
+                    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(frame, header), wall_ns, frame.seq)
+        file.finish() if finish else file.flush()
+    return path
+
+
+def write_truth(file: McapFile, truth: Truth) -> None:
+    payload = codec.encode_truth(truth, Header(rig="demo", seq=truth.seq))
+    file.write("/sim/truth", codec.TRUTH_SCHEMA, payload, WALL_NS + truth.t_host_ns, truth.seq)
+
+
+def decoded(path: Path):
+    with path.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        return list(reader.iter_decoded_messages()), {a.name: a.data for a in reader.iter_attachments()}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("recordings") / "x.mcap")
+
+
+@pytest.fixture(scope="module")
+def replayed(recording: Path) -> list[Path]:
+    """Replayed twice, without saying where to."""
+    for _ in range(2):
+        assert cli.main(["replay", str(recording)]) == Exit.OK
+    return [recording.with_name("x_replay.mcap"), recording.with_name("x_replay_2.mcap")]
+
+
+def thetas(path: Path) -> list[bytes]:
+    return [np.array(m.theta).tobytes() for _, channel, _, m in decoded(path)[0] if channel.topic == "/sheet/state"]
+
+
+def test_the_estimates_are_the_same_to_the_last_bit(replayed):
+    first, second = map(thetas, replayed)
+    assert len(first) == COUNT
+    assert first == second
+    assert len(set(first)) > 10  # it does not only repeat itself
+
+
+def test_every_topic_can_be_decoded_by_its_schema(replayed):
+    messages, attachments = decoded(replayed[0])
+    topics: dict[str, list] = {}
+    for schema, channel, message, content in messages:
+        assert schema is not None
+        assert schema.encoding == "protobuf"
+        assert content.DESCRIPTOR.full_name == schema.name
+        topics.setdefault(channel.topic, []).append((schema.name, message, content))
+    assert {topic: (entries[0][0], len(entries)) for topic, entries in topics.items()} == {
+        "/sheet/state": ("abs.v1.DeformationState", COUNT),
+        "/sheet/mesh": ("abs.v1.DeformedMesh", COUNT),
+        "/sheet/topology": ("abs.v1.MeshTopology", 1),
+    }
+    replayed_with = config.loads(attachments["rig.toml"].decode(), "rig.toml", Path("/"))
+    assert replayed_with.trackers["sheet"].optimizer.generations == 3
+    check_times(topics)
+    check_mesh(topics)
+
+
+def check_times(topics):
+    """Everything carries the time of the exposure, as if it had been recorded then."""
+    for k, (_, message, state) in enumerate(topics["/sheet/state"]):
+        t_ns = SIMULATION.time_ns(FIRST + k)
+        assert (message.log_time, message.sequence) == (WALL_NS + t_ns, k)
+        assert (state.header.t_host_ns, state.header.stamp.ToNanoseconds()) == (t_ns, WALL_NS + t_ns)
+        assert state.header.frame_id == "rig"
+        assert (state.tracker, state.model, state.mesh_version) == ("sheet", "nurbs", 1)
+
+
+def check_mesh(topics):
+    topology, state = topics["/sheet/topology"][0][2], topics["/sheet/state"][0][2]
+    rest = np.frombuffer(topology.rest_vertices_f32, "<f4").reshape(-1, 3)
+    faces = np.frombuffer(topology.faces_u32, "<u4")
+    assert faces.max() == len(rest) - 1
+    assert len(topology.colors_u8) == rest.size
+    assert topology.header.t_host_ns == SIMULATION.time_ns(FIRST)
+    for _, _, mesh in topics["/sheet/mesh"]:
+        assert len(mesh.vertices_f32) == len(topology.rest_vertices_f32)
+    assert len(state.model_id) == len(state.calib_id) == 16
+    assert {sensor.sensor for sensor in state.sensors} == {"tof", "color"}
+
+
+def test_one_json_object_per_estimate(recording, tmp_path, capsys):
+    assert cli.main(["replay", str(recording), "--json", "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    captured = capsys.readouterr()
+    lines = [json.loads(line) for line in captured.out.splitlines()]
+    assert len(lines) == COUNT
+    wanted = ["seq", "stamp", "status", "reasons", "theta", "error_mm", "surface_mm", "solve_ms", "age_ms"]
+    for k, line in enumerate(lines):
+        assert set(line) >= {*wanted, "generations", "evaluations"}
+        assert (line["tracker"], line["seq"], line["status"], line["reasons"]) == ("sheet", k, "TRACKING", [])
+        assert line["stamp"].startswith("2023-11-14T22:13:2")
+        assert len(line["theta"]) == 48
+        assert 0 < line["surface_mm"] <= line["error_mm"] < 3
+        assert line["solve_ms"] > 0
+        assert line["age_ms"] is None  # offline there is no such thing
+        assert line["generations"] == 3
+        assert line["evaluations"] % 3 == 0
+    assert "20 estimates" in captured.err
+    assert "vertex error mean" in captured.err
+
+
+def test_what_exists_is_not_overwritten(recording, tmp_path, capsys):
+    out = tmp_path / "out.mcap"
+    out.write_bytes(b"precious")
+    assert cli.main(["replay", str(recording), "--out", str(out)]) == Exit.USER
+    assert "exists already" in capsys.readouterr().err
+    assert out.read_bytes() == b"precious"
+
+
+def test_a_folder_that_is_not_there_is_named(recording, tmp_path, capsys):
+    assert cli.main(["replay", str(recording), "--out", str(tmp_path / "none" / "out.mcap")]) == Exit.USER
+    assert "cannot be written: No such file or directory" in capsys.readouterr().err
+
+
+def test_a_recording_without_configuration_needs_one(tmp_path, capsys):
+    bare = write(tmp_path / "bare.mcap", toml="")
+    assert cli.main(["replay", str(bare)]) == Exit.USER
+    assert "no configuration is in this recording; name one with --config" in capsys.readouterr().err
+    rig = tmp_path / "rig.toml"
+    rig.write_text(TOML)
+    assert cli.main(["replay", str(bare), "--config", str(rig), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    assert len(thetas(tmp_path / "out.mcap")) == COUNT
+
+
+def test_a_recording_that_breaks_off_is_tracked_up_to_there(recording, replayed, tmp_path, capsys):
+    whole = recording.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) * 2 // 3])
+    assert cli.main(["replay", str(cut), "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    assert "never finished" in capsys.readouterr().err
+    estimates = thetas(tmp_path / "out.mcap")
+    assert 5 < len(estimates) < COUNT
+    assert estimates[:5] == thetas(replayed[0])[:5]
+
+
+@pytest.mark.parametrize(
+    ("toml", "sensors", "message"),
+    [
+        (TOML, ("tof",), r'sensor "color" of tracker "sheet" has no camera model'),
+        (TOML.partition("[trackers")[0] + "[record]\n", ("tof", "color"), "trackers: there is none"),
+        ("version = 1\nname = 3\n", ("tof", "color"), "rig.toml"),
+    ],
+)
+def test_what_does_not_fit_is_named_and_leaves_no_file(tmp_path, capsys, toml, sensors, message):
+    path = write(tmp_path / "x.mcap", toml=toml, sensors=sensors)
+    assert cli.main(["replay", str(path)]) == Exit.USER
+    assert message in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["x.mcap"]
+
+
+def test_a_free_name_is_found(tmp_path):
+    assert free_path(tmp_path / "a.mcap") == tmp_path / "a_replay.mcap"
+    (tmp_path / "a_replay.mcap").touch()
+    assert free_path(tmp_path / "a.mcap") == tmp_path / "a_replay_2.mcap"
