@@ -1,60 +1,81 @@
-"""A live tracker loses nothing without saying so."""
+"""A live tracker takes the newest frame set, counts what it passed over, and announces its mesh before it uses it."""
 
-from itertools import count
+import dataclasses
 
 import numpy as np
 import pytest
-from abs.v1.health_pb2 import Health as HealthMessage
+from abs.v1.deformation_state_pb2 import DeformationState
+from abs.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from abs.v1.health_pb2 import Health as Message
 
 from abs_service import keys
 from abs_service.bus.contract import IMAGES
-from abs_service.bus.frames import DEPTH, FramePublisher, FrameSubscriber
+from abs_service.bus.frames import FrameSubscriber
 from abs_service.health import Health
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
-from abs_service.track import LiveTracker, NewestSets
+from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
+from abs_service.tracker.optimizers import cma
+from abs_service.tracking import Tracking, streams
 from drivers import codec
-from drivers.frame import Frame, Geometry, Kind
+from drivers.frame import Kind
 from tests.service.loopback import LoopbackBus
+from tests.tracker.driving import default_plan, rig_of, simulate
 
-STREAMS = [("tof", "depth"), ("color", "color")]
-PERIOD_NS = 33_000_000
-
-
-def depth(k):
-    t_ns = k * PERIOD_NS
-    return Frame(
-        "tof", "depth", Kind.DEPTH, np.ones((4, 4), "<u2"), "16UC1", t_ns, t_ns, k, 0, geometry=Geometry.RADIAL
-    )
-
-
-def color(k):
-    t_ns = k * PERIOD_NS
-    return Frame("color", "color", Kind.COLOR, np.ones((4, 4, 3), np.uint8), "rgb8", t_ns, t_ns, k, 0)
+SIMULATION = simulate("simulated://sheet?seed=1")
+RIG = rig_of(SIMULATION)
+MEMBERS = streams(RIG.sensors.values())
 
 
 class Bench:
-    """A live tracker whose tracker is never asked."""
+    """A live tracker on a loopback bus with a clock that only the test moves."""
 
-    def __init__(self):
+    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000):
+        self.now_ns = 0
         self.bus = LoopbackBus()
-        clock = WallClock()
-        self.speaker = Speaker("demo", clock)
-        self.frames = FrameSubscriber(self.bus, STREAMS)
-        self.sets = NewestSets(self.frames, Synchroniser(STREAMS[0], STREAMS, 10**7), lambda: 0)
+        self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
+        self.speaker = Speaker("demo", self.wall)
         self.health = Health(self.bus, "track/sheet", self.speaker)
-        ticks = count()
-        self.live = LiveTracker(None, self.sets, None, self.health, lambda: next(ticks), 20.0)  # type: ignore[arg-type]
+        frames = FrameSubscriber(self.bus, MEMBERS)
+        self.sets = NewestSets(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
+        self.live = LiveTracker(
+            Tracking(RIG, default_plan(optimizer=cma.Settings(generations=2))),
+            self.sets,
+            EstimatePublisher(self.bus, self.speaker, "sheet", "nurbs", RIG.calib_id),
+            self.health,
+            self.clock,
+            budget_ms,
+        )
+        self.tick_ns = 0
 
-    def publish(self, *frames):
-        with FramePublisher(self.bus, self.speaker, "sim") as publisher:
-            for frame in frames:
-                publisher.on_frame(frame)
+    def clock(self):
+        """Time passes whenever the tracker looks at it."""
+        self.now_ns += self.tick_ns
+        return self.now_ns
 
-    def published_health(self):
+    def expose(self, k, change=lambda frame: frame, kinds=tuple(Kind)):
+        """Publishes exposure k, which has just been taken."""
+        self.now_ns = max(self.now_ns, SIMULATION.time_ns(k))
+        for taken in SIMULATION.expose(k)[0]:
+            if taken.kind in kinds:
+                frame = dataclasses.replace(change(taken), t_arrival_ns=self.now_ns)
+                header = self.speaker.header(frame.t_host_ns, frame.seq)
+                publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
+                publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
+
+    def sent(self, topic, message):
+        return [message.FromString(sample.payload) for sample in self.bus.sent if sample.topic == topic]
+
+    @property
+    def states(self):
+        return self.sent("sheet/state", DeformationState)
+
+    @property
+    def said(self):
+        """The last health."""
         self.live.report()
         self.health.publish()
-        return HealthMessage.FromString(self.bus.sent[-1].payload)
+        return self.sent("health/track/sheet", Message)[-1]
 
 
 @pytest.fixture
@@ -62,24 +83,119 @@ def bench():
     return Bench()
 
 
-def test_the_newest_set_is_taken_and_older_ones_are_counted(bench):
-    bench.publish(depth(1), color(1), depth(2), color(2), depth(3), color(3))
-    assert bench.sets.take().stamp_ns == 3 * PERIOD_NS
-    assert bench.published_health().counters["skipped"] == 2
-
-
-def test_what_never_became_a_set_is_in_the_health_even_if_nothing_comes_any_more(bench):
-    for k in range(1, DEPTH + 3):  # two more than may wait
-        bench.publish(depth(k))
-    bench.publish(color(9), color(9))
-    assert bench.sets.take() is not None
-    topic = keys.image("tof", "depth")
-    image = codec.encode_image(depth(20), 0)
-    bench.bus.publisher(topic, codec.IMAGE_SCHEMA, IMAGES).put(image, b"no description")
-    assert bench.sets.take() is None
+def test_an_exposure_becomes_an_estimate(bench):
+    bench.expose(0)
+    bench.now_ns += 7_000_000
     bench.live.turn()
-    health = bench.published_health()
-    assert health.counters[f"dropped.{topic}"] == 2
-    assert health.counters[f"malformed.{topic}"] == 1
-    assert health.counters["unused.color/color.duplicate"] == 1
-    assert health.labels["malformed"] == bench.frames.last_error != ""
+    (state,) = bench.states
+    assert state.status == DeformationState.STATUS_TRACKING
+    assert (state.header.t_host_ns, state.header.seq, state.header.rig) == (0, 0, "demo")
+    assert state.age_ms == pytest.approx(7)
+    assert (state.skipped, state.generations, len(state.theta)) == (0, 2, 48)
+    said = bench.said
+    assert said.level == Message.LEVEL_OK
+    assert (said.labels["phase"], said.counters["estimates"]) == ("tracking", 1)
+
+
+def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
+    for k in range(2):
+        bench.expose(k)
+        bench.live.turn()
+    topics = [sample.topic for sample in bench.bus.sent if sample.topic.startswith("sheet/")]
+    assert topics == ["sheet/topology", "sheet/state", "sheet/mesh", "sheet/state", "sheet/mesh"]
+    (topology,) = bench.sent("sheet/topology", MeshTopology)
+    assert {state.mesh_version for state in bench.states} == {topology.mesh_version}
+    meshes = bench.sent("sheet/mesh", DeformedMesh)
+    assert all(len(mesh.vertices_f32) == len(topology.rest_vertices_f32) for mesh in meshes)
+    assert [mesh.header.t_host_ns for mesh in meshes] == [state.header.t_host_ns for state in bench.states]
+    # Whoever comes later asks.
+    assert [MeshTopology.FromString(s.payload) for s in bench.bus.ask("sheet/topology", 0.0)] == [topology]
+
+
+def test_the_newest_set_wins_and_the_others_are_counted(bench):
+    for k in range(3):
+        bench.expose(k)
+    bench.live.turn()
+    bench.expose(3)
+    bench.live.turn()
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(2), SIMULATION.time_ns(3)]
+    assert [state.skipped for state in bench.states] == [2, 0]
+    assert bench.said.counters["skipped"] == 2
+
+
+def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
+    for k in range(10):
+        bench.expose(k)
+    bench.live.turn()
+    assert bench.states[0].header.t_host_ns == SIMULATION.time_ns(9)
+    counters = bench.said.counters
+    dropped = [number for name, number in counters.items() if name.startswith("dropped.")]
+    assert len(dropped) == 3
+    assert counters["skipped"] + dropped[0] == 9
+
+
+def test_without_frames_nothing_is_said(bench):
+    bench.live.turn()
+    assert bench.bus.sent == []
+
+
+def test_a_set_that_waits_for_nothing_any_more_is_taken_at_its_deadline(bench):
+    bench.expose(0)
+    bench.live.turn()
+    bench.expose(1, kinds=(Kind.DEPTH, Kind.AMPLITUDE))
+    bench.live.turn()
+    assert len(bench.states) == 1
+    bench.now_ns += 200_000_000
+    bench.live.turn()
+    state = bench.states[1]
+    assert state.status == DeformationState.STATUS_DEGRADED
+    assert list(state.reasons) == ["no frame from color"]
+    assert [(sensor.sensor, sensor.missing) for sensor in state.sensors] == [("tof", False), ("color", True)]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert said.message == "DEGRADED: no frame from color"
+
+
+def test_until_there_is_an_object_it_says_so_and_sends_no_topology(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, data=np.zeros_like(frame.data)))
+    bench.live.turn()
+    assert bench.states[0].status == DeformationState.STATUS_INITIALIZING
+    assert "no connected surface" in bench.states[0].reasons[0]
+    assert bench.states[0].mesh_version == 0
+    assert bench.sent("sheet/topology", MeshTopology) == []
+    assert bench.said.labels["phase"] == "initializing"
+
+
+def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, data=frame.data[:100]))
+    bench.live.turn()
+    said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert "pixels, but the camera model of sensors." in said.message
+    assert said.counters["rejected"] == 1
+    assert bench.states == []
+    # In a new epoch the sensor may have another size.
+    bench.expose(1, lambda frame: dataclasses.replace(frame, epoch=1))
+    bench.live.turn()
+    assert len(bench.states) == 1
+    assert bench.said.level == Message.LEVEL_OK
+
+
+def test_malformed_messages_are_counted_and_explained(bench):
+    bench.bus.publisher("tof/depth/image", codec.IMAGE_SCHEMA, IMAGES).put(b"\xff", b"\xff")
+    bench.live.turn()
+    bench.expose(0)
+    bench.live.turn()
+    said = bench.said
+    assert said.counters["malformed.tof/depth/image"] == 1
+    assert "are no foxglove.RawImage" in said.labels["malformed"]
+    assert len(bench.states) == 1
+
+
+def test_the_budget_bounds_the_search():
+    bench = Bench(budget_ms=5)
+    bench.tick_ns = 10_000_000  # every look at the clock takes 10 ms
+    bench.expose(0)
+    bench.live.turn()
+    assert bench.states[0].generations == 1
+    assert bench.states[0].solve_ms >= 10
