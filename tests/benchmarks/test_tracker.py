@@ -1,0 +1,153 @@
+"""What an estimate costs: kernels per vertex and candidate beside a C++ yardstick, set-up and whole frames.
+
+Compare minima of one run with each other; machines, and hours on one machine, differ. The yardstick is a fused,
+hand-vectorised kernel for degree 2 and one knot span (deform, project, compare), kept outside the repository.
+"""
+
+import importlib.util
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abs_service.observation import Observation, Observer
+from abs_service.tracker.curvature import search_metric, vertex_jacobian
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.nurbs import Settings
+from abs_service.tracker.objectives.likelihood import Settings as Likelihood
+from abs_service.tracker.optimizers.cma import Settings as Cma
+from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.synthesis import SparseSynthesis
+from abs_service.tracking import Tracking
+from calib.noise.base import render_texture
+from calib.rig import Rig
+from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+from tests.tracker.scenes import sheet
+
+POPULATION, VERTICES = 32, 1024
+SIMULATION = simulate("simulated://sheet?seed=1")
+RIG = rig_of(SIMULATION)
+MESH = sheet(32, 32)
+
+
+@pytest.fixture(scope="module")
+def observation() -> Observation:
+    return Observer(RIG).observe(frame_set(SIMULATION.expose(0)[0], 0))
+
+
+def model_and_thetas(shape: tuple[int, int], mesh: Mesh = MESH):
+    model = Settings(control_points=shape, degree=2).build(mesh)
+    return model, model.rest + np.random.default_rng(1).normal(0, 2e-3, (POPULATION, len(model.rest)))
+
+
+def per_vertex(benchmark, population: int = POPULATION, vertices: int = VERTICES) -> None:
+    """Adds the number to compare; there is none where benchmarks are only run as tests."""
+    if benchmark.stats is not None:
+        benchmark.extra_info["ns_per_vertex_and_candidate"] = benchmark.stats.stats.min / population / vertices * 1e9
+
+
+def single_term(sensor: str, mesh: Mesh):
+    return Likelihood().build(Rig("r", {sensor: RIG.sensors[sensor]}), mesh)
+
+
+def test_yardstick(benchmark):
+    beside = Path(__file__).parents[3] / "shared" / "bench"
+    path = Path(os.environ.get("ABS_SHARED_BENCH", beside)) / "run_yardstick.py"
+    if not path.is_file():
+        pytest.skip(f"no {path}; name its folder with ABS_SHARED_BENCH")
+    specification = importlib.util.spec_from_file_location("run_yardstick", path)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    repeats = 1 if benchmark.disabled else 300
+    nanoseconds = module.yardstick_ns(VERTICES, POPULATION, repeats=repeats)
+    benchmark.extra_info["ns_per_vertex_and_candidate"] = nanoseconds
+    benchmark.pedantic(lambda: module.yardstick_ns(VERTICES, POPULATION, repeats=1), rounds=3)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (4, 4), (6, 6), (12, 12)], ids=lambda shape: f"{shape[0]}x{shape[1]}")
+def test_deform(benchmark, shape):
+    model, thetas = model_and_thetas(shape)
+    assert benchmark(model.deform, thetas).vertices.shape == (POPULATION, 3, VERTICES)
+    per_vertex(benchmark)
+
+
+def test_synthesize(benchmark):
+    model, thetas = model_and_thetas((4, 4))
+    surface = model.deform(thetas)
+    synthesis = SparseSynthesis(RIG.sensors["tof"].camera)
+    assert (benchmark(synthesis.synthesize, surface).pixel > 0).all()
+    per_vertex(benchmark)
+
+
+@pytest.mark.parametrize("sensor", ["tof", "color"])
+def test_term_with_its_synthesis(benchmark, observation, sensor):
+    model, thetas = model_and_thetas((4, 4))
+    objective = single_term(sensor, model.mesh)
+    objective.observe(observation)
+    surface = model.deform(thetas)
+    assert np.isfinite(benchmark(objective.cost, surface)).all()
+    per_vertex(benchmark)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (4, 4)], ids=lambda shape: f"{shape[0]}x{shape[1]}")
+def test_what_the_yardstick_does(benchmark, observation, shape):
+    """Deform, synthesise, depth term."""
+    model, thetas = model_and_thetas(shape)
+    objective = single_term("tof", model.mesh)
+    objective.observe(observation)
+    assert np.isfinite(benchmark(lambda: objective.cost(model.deform(thetas)))).all()
+    per_vertex(benchmark)
+
+
+def test_stretch_prior(benchmark):
+    model, thetas = model_and_thetas((4, 4))
+    prior, surface = StretchPrior(model.mesh, 0.02), model.deform(thetas)
+    assert np.isfinite(benchmark(prior.cost, surface)).all()
+    per_vertex(benchmark)
+
+
+def test_per_frame_render_texture(benchmark, observation):
+    tof, image = RIG.sensors["tof"], observation.images["tof"]
+    assert benchmark(render_texture, tof.noise, image.distance, image.amplitude, 1.6).shape == (146, 178, 8)
+
+
+def test_per_frame_linearize(benchmark, observation):
+    model, thetas = model_and_thetas((4, 4), sheet(17, 18))
+    objective = Likelihood().build(RIG, model.mesh)
+    objective.observe(observation)
+    surface, jacobian = model.deform(thetas[:1]), vertex_jacobian(model, thetas[0])
+    assert benchmark(objective.linearize, surface, jacobian).jacobian.shape[1] == 48
+
+
+def test_per_frame_vertex_jacobian(benchmark):
+    model, thetas = model_and_thetas((4, 4), sheet(17, 18))
+    assert benchmark(vertex_jacobian, model, thetas[0]).shape == (306, 3, 48)
+
+
+def test_per_frame_search_metric(benchmark):
+    jacobian = np.random.default_rng(1).normal(size=(2000, 48))
+    assert benchmark(search_metric, jacobian).shape == (48, 48)
+
+
+def test_per_generation_cma_ask_and_tell(benchmark):
+    search = Cma().build(48, np.random.default_rng(1))
+
+    def generation():
+        candidates = search.ask()
+        search.tell(candidates, np.sum(candidates**2, axis=1))
+
+    benchmark.pedantic(generation, rounds=1 if benchmark.disabled else 60)
+
+
+def test_whole_frame_of_300_vertices(benchmark):
+    """From a frame set to an estimate with the default plan: 4 × 4 control points, 20 generations."""
+    tracking = Tracking(RIG, default_plan())
+    exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(30, 50)]
+    tracking.track(exposures[0], lambda: True)
+    following = iter(exposures[1:])
+    benchmark.pedantic(
+        lambda: tracking.track(next(following), lambda: True), rounds=1 if benchmark.disabled else len(exposures) - 1
+    )
