@@ -11,6 +11,7 @@ import errno
 import os
 import shutil
 import sys
+import tempfile
 import threading
 
 from abs_service import config
@@ -68,6 +69,10 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
         table.directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise DirectoryError(f'record.directory = "{table.directory}": cannot be made: {error.strerror}') from None
+    try:
+        tempfile.TemporaryFile(dir=table.directory).close()  # permissions do not tell of read-only file systems
+    except OSError as error:
+        raise DirectoryError(f'record.directory = "{table.directory}": cannot be written: {error.strerror}') from None
     return RecorderSettings(
         directory=table.directory,
         name=rig.name,

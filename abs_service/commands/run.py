@@ -91,7 +91,7 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
             for name, device in devices.items()
         }
     changes = {
-        "name": keys.check_name(arguments.rig or rig.name),
+        "name": keys.check_name(rig.name if arguments.rig is None else arguments.rig),
         "devices": devices,
         "record": rig.record.model_copy(update=record),
     }
