@@ -1,0 +1,75 @@
+"""A recording of `run`, tracked again: offline always the same, live at its own pace."""
+
+import json
+import signal
+import time
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+
+from tests.system.running import Ear, abs_service, wait_until
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def recording(run, tmp_path):
+    """About four seconds of the demo rig, and what the live tracker found."""
+    process, ear = run
+    enough = len(ear.states()) + 60
+    wait_until(lambda: len(ear.states()) > enough, 30, "two more seconds")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
+    (path,) = (tmp_path / "takes").iterdir()
+    return path, estimates_of((tmp_path / "output.jsonl").read_text())
+
+
+def estimates_of(output):
+    return [json.loads(line) for line in output.splitlines()]
+
+
+def mean_error_mm(estimates):
+    return float(np.mean([estimate["error_mm"] for estimate in estimates if estimate["error_mm"] is not None]))
+
+
+def payloads(path, topic):
+    """What a file holds of a topic but the time that the search took, which differs from run to run."""
+    with path.open("rb") as stream:
+        return [(message.log_time, message.data) for _, _, message in make_reader(stream).iter_messages(topics=topic)]
+
+
+def count(path, topic):
+    return len(payloads(path, topic))
+
+
+def test_offline_twice_gives_the_same_bits_and_live_gives_the_pace_and_an_end(recording, tmp_path):
+    path, live = recording
+    first, second = (
+        abs_service("replay", path, "--json", "--out", tmp_path / name) for name in ("first.mcap", "second.mcap")
+    )
+    assert (first.returncode, second.returncode) == (0, 0), first.stderr + second.stderr
+    offline = estimates_of(first.stdout)
+    assert len(offline) == count(path, "/tof/depth/image"), "a frame set was dropped"
+    assert {estimate["status"] for estimate in offline[1:]} == {"TRACKING"}  # a recording may begin amid an exposure
+    assert [one["theta"] for one in offline] == [other["theta"] for other in estimates_of(second.stdout)]
+    assert payloads(tmp_path / "first.mcap", "/sheet/mesh") == payloads(tmp_path / "second.mcap", "/sheet/mesh")
+    print(f"error offline {mean_error_mm(offline):.2f} mm, live {mean_error_mm(live):.2f} mm")
+    assert mean_error_mm(offline) < 1.5 * mean_error_mm(live)
+
+
+def test_at_speed_1_the_estimates_come_at_the_pace_of_the_recording_until_it_ends(recording, endpoint, launch):
+    path, live = recording
+    process = launch("replay", path, "--speed", "1", "--json", stdout=-1)
+    begin_s = time.monotonic()
+    with Ear(endpoint, "sheet/state") as ear:
+        out, complaints = process.communicate(timeout=60)
+        assert process.returncode == 0, complaints
+        print(f"replay at speed 1 took {time.monotonic() - begin_s:.1f} s, start included")
+        stamps_ns = np.array([state.header.t_host_ns for _, state in ear.states()])
+    estimates = estimates_of(out)
+    rate_hz = (len(stamps_ns) - 1) / np.ptp(stamps_ns) * 1e9
+    print(f"{len(estimates)} estimates at {rate_hz:.1f} Hz, error {mean_error_mm(estimates):.2f} mm")
+    assert 24 < rate_hz < 31
+    assert mean_error_mm(estimates) < 1.5 * mean_error_mm(live)
+    assert "Traceback" not in complaints

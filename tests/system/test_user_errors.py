@@ -1,0 +1,72 @@
+"""What a user gets wrong is said in one message, with exit code 2 and without a traceback."""
+
+import socket
+
+import pytest
+
+from tests.system.running import abs_service
+
+pytestmark = pytest.mark.slow  # each test starts an interpreter
+
+
+def refused(*arguments):
+    """The message of a command that is refused."""
+    done = abs_service(*arguments, timeout_s=60)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stderr.count("error: ") == 1
+    return done.stderr.partition("error: ")[2]
+
+
+@pytest.mark.parametrize("command", ["run", "check", "capture", "track", "record"])
+def test_a_file_that_is_not_there(command, tmp_path):
+    assert refused(command, tmp_path / "no.toml") == f"{tmp_path}/no.toml: cannot be read: No such file or directory\n"
+
+
+def test_a_file_that_is_no_toml(rig_file):
+    rig_file.write_text("version = \n")
+    message = refused("run", rig_file)
+    assert message.startswith(f"{rig_file}: not TOML: ")
+    assert "line 1" in message
+
+
+def test_an_unknown_key(rig_file):
+    rig_file.write_text(rig_file.read_text().replace("vertices = 300", "vertexes = 300"))
+    message = refused("run", rig_file)
+    assert "trackers.sheet.mesh.vertexes" in message
+    assert "vertices" in message
+
+
+def test_a_port_in_use(rig_file, endpoint):
+    with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
+        message = refused("run", rig_file)
+    assert message.startswith(f'bus.endpoint = "{endpoint}": the address is in use')
+
+
+def test_a_folder_that_cannot_be_written(rig_file, tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    message = refused("run", rig_file, "--out", tmp_path / "taken" / "below")
+    assert f'"{tmp_path}/taken/below": cannot be made' in message
+
+
+def test_a_folder_that_takes_no_files(rig_file):
+    # Not even from root, for whom permissions are no obstacle.
+    assert refused("run", rig_file, "--out", "/proc").startswith('record.directory = "/proc": cannot be written: ')
+
+
+@pytest.mark.parametrize("name", ["a/b", "", "*", "a b$"])
+def test_a_name_that_cannot_be_on_the_wire(name, rig_file):
+    assert repr(name) in refused("run", rig_file, "--rig", name).replace('"', "'")
+
+
+def test_a_device_address_that_no_device_can_have(rig_file):
+    rig_file.write_text(rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1"))
+    assert "simulated://sheet?sed=1: unknown key 'sed'" in refused("run", rig_file)
+
+
+class TestReplay:
+    def test_of_nothing(self, tmp_path):
+        assert refused("replay", tmp_path / "no.mcap") == f"{tmp_path}/no.mcap: No such file or directory\n"
+
+    def test_of_something_else(self, rig_file):
+        assert refused("replay", rig_file).startswith(f"{rig_file}: this is no MCAP file")
