@@ -184,30 +184,44 @@ def _deform(
     """
     n = offset.size
     along = np.empty((6, n), np.float32)
+    u0, u1, u2 = along[0], along[1], along[2]
+    w0, w1, w2 = along[3], along[4], along[5]
     for k in range(control.shape[0]):
-        position, normal = vertices[k], normals[k]
-        position[:] = 0
+        p0, p1, p2 = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+        n0, n1, n2 = normals[k, 0], normals[k, 1], normals[k, 2]
+        vertices[k] = 0
         along[:] = 0
+        # Unsigned counters, and few arrays in each loop: else the compiler gives up proving that it may vectorise.
         for s in range(span_control.shape[0]):
+            begin, end = np.uintp(span_start[s]), np.uintp(span_start[s + 1])
             for q in range(span_control.shape[1]):
-                x, y, z = control[k, span_control[s, q]]
-                for v in range(span_start[s], span_start[s + 1]):
-                    r, r_u, r_w = basis[0, q, v], basis[1, q, v], basis[2, q, v]
-                    position[0, v] += r * x
-                    position[1, v] += r * y
-                    position[2, v] += r * z
-                    along[0, v] += r_u * x
-                    along[1, v] += r_u * y
-                    along[2, v] += r_u * z
-                    along[3, v] += r_w * x
-                    along[4, v] += r_w * y
-                    along[5, v] += r_w * z
+                i = span_control[s, q]
+                x, y, z = control[k, i, 0], control[k, i, 1], control[k, i, 2]
+                r, r_u, r_w = basis[0, q], basis[1, q], basis[2, q]
+                for v in range(begin, end):
+                    p0[v] += r[v] * x
+                    p1[v] += r[v] * y
+                    p2[v] += r[v] * z
+                for v in range(begin, end):
+                    u0[v] += r_u[v] * x
+                    u1[v] += r_u[v] * y
+                    u2[v] += r_u[v] * z
+                for v in range(begin, end):
+                    w0[v] += r_w[v] * x
+                    w1[v] += r_w[v] * y
+                    w2[v] += r_w[v] * z
         for v in range(n):
-            nx = along[1, v] * along[5, v] - along[2, v] * along[4, v]
-            ny = along[2, v] * along[3, v] - along[0, v] * along[5, v]
-            nz = along[0, v] * along[4, v] - along[1, v] * along[3, v]
-            inverse = np.float32(1) / np.sqrt(nx * nx + ny * ny + nz * nz + np.float32(1e-20))
-            normal[0, v], normal[1, v], normal[2, v] = nx * inverse, ny * inverse, nz * inverse
-            position[0, v] += normal[0, v] * offset[v]
-            position[1, v] += normal[1, v] * offset[v]
-            position[2, v] += normal[2, v] * offset[v]
+            n0[v] = u1[v] * w2[v] - u2[v] * w1[v]
+        for v in range(n):
+            n1[v] = u2[v] * w0[v] - u0[v] * w2[v]
+        for v in range(n):
+            n2[v] = u0[v] * w1[v] - u1[v] * w0[v]
+        for v in range(n):
+            inverse = np.float32(1) / np.sqrt(n0[v] * n0[v] + n1[v] * n1[v] + n2[v] * n2[v] + np.float32(1e-20))
+            n0[v] *= inverse
+            n1[v] *= inverse
+            n2[v] *= inverse
+        for v in range(n):
+            p0[v] += n0[v] * offset[v]
+            p1[v] += n1[v] * offset[v]
+            p2[v] += n2[v] * offset[v]
