@@ -1,0 +1,107 @@
+"""Makes `recordings/sample.mcap` and writes down what the tracker finds in it.
+
+    .venv/bin/python -m tests.golden.sample
+
+The sample is free to share (CC0): the simulator's view of a sheet that begins to move, without a clock, so that
+everybody who runs this gets the same images. `sample.json` holds Θ of every exposure. Make both anew only when the
+simulator or the tracker was meant to change, and say why in the commit.
+"""
+
+import json
+from pathlib import Path
+
+from abs_service import announcements, config, keys, plugins
+from abs_service.commands import plans
+from abs_service.config import ServiceConfig
+from abs_service.stamps import Speaker, WallClock
+from abs_service.synchroniser import Synchroniser
+from abs_service.tracking import Tracking, streams
+from drivers import codec
+from drivers.device import Truth
+from drivers.frame import Frame
+from drivers.mcap_file import Compression, McapFile
+from drivers.replay import Recording
+from drivers.simulated.address import parse
+from drivers.simulated.simulation import Simulation
+
+SAMPLE = Path(__file__).parents[2] / "recordings" / "sample.mcap"
+GOLDEN = Path(__file__).with_name("sample.json")
+DEVICE = "simulated://sheet?seed=7&rate=15&tof=88x72&color=128x96"
+#: From the last moments of rest until it moves at half its speed.
+EXPOSURES = range(14, 29)
+#: Wall-clock time at which the simulation starts [ns]: 2025-01-01 00:00:00 UTC.
+START_NS = 1_735_689_600_000_000_000
+
+
+def rig() -> ServiceConfig:
+    """The demo rig with smaller images."""
+    demo = config.load_default()
+    device = demo.devices["sim"].model_copy(update={"uri": DEVICE})
+    record = demo.record.model_copy(update={"directory": Path("recordings")})
+    return demo.model_copy(update={"name": "sample", "devices": {"sim": device}, "record": record})
+
+
+def write(path: Path, settings: ServiceConfig) -> None:
+    """Writes the recording."""
+    simulation = parse(DEVICE).build()
+    speaker = Speaker(settings.name, WallClock(monotonic=lambda: 0, wall=lambda: START_NS), boot_id="sample")
+    toml = config.to_toml(settings)
+    with path.open("wb") as stream:
+        file = McapFile(stream, Compression.ZSTD)
+        file.attach("rig.toml", "text/toml", toml.encode(), START_NS)
+        _write_announcements(file, settings, simulation, speaker)
+        for k in EXPOSURES:
+            frames, truth = simulation.expose(k)
+            _write_truth(file, truth, speaker)
+            for frame in frames:
+                _write_frame(file, frame, speaker)
+        file.finish()
+
+
+def track(path: Path) -> list[list[float]]:
+    """Θ of every exposure of a recording."""
+    recording = Recording(path)
+    settings = config.loads(recording.config, str(path), path.parent)
+    tracker_rig = plans.rig(settings, "sheet", recording.cameras)
+    tracking = Tracking(tracker_rig, plans.plan(settings, "sheet"))
+    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
+    synchroniser = Synchroniser(settings.reference("sheet"), streams(tracker_rig.sensors.values()), tolerance_ns)
+    sets = [found for frame in recording.frames() if isinstance(frame, Frame) for found in synchroniser.add(frame)]
+    return [tracking.track(frames, lambda: True).theta.tolist() for frames in [*sets, *synchroniser.flush()]]
+
+
+def _write_announcements(file: McapFile, settings: ServiceConfig, simulation: Simulation, speaker: Speaker) -> None:
+    header = speaker.header(0, 0)
+    cameras = {name: head.camera for name, head in simulation.heads.items()}
+    messages = {
+        keys.CONFIG: announcements.config(header, config.to_toml(settings)),
+        keys.TRANSFORMS: announcements.transforms(cameras, START_NS),
+    }
+    for name, camera in cameras.items():
+        noise = settings.sensors[name].noise
+        assert noise is not None
+        messages[keys.model(name)] = announcements.sensor_model(header, name, camera, plugins.table(noise))
+        messages[keys.calibration(name)] = announcements.calibration(name, camera, START_NS)
+    for topic, message in messages.items():
+        payload = message.SerializeToString(deterministic=True)
+        file.write(f"/{topic}", message.DESCRIPTOR.full_name, payload, START_NS, 0)
+
+
+def _write_frame(file: McapFile, frame: Frame, speaker: Speaker) -> None:
+    topic, wall_ns = keys.image(frame.sensor, frame.stream), speaker.clock.wall(frame.t_host_ns)
+    info = codec.encode_info(frame, speaker.header(frame.t_host_ns, frame.seq, frame.sensor))
+    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
+
+
+def _write_truth(file: McapFile, truth: Truth, speaker: Speaker) -> None:
+    payload = codec.encode_truth(truth, speaker.header(truth.t_host_ns, truth.seq))
+    wall_ns = speaker.clock.wall(truth.t_host_ns)
+    file.write(f"/{keys.truth('sim')}", codec.TRUTH_SCHEMA, payload, wall_ns, truth.seq)
+
+
+if __name__ == "__main__":
+    write(SAMPLE, rig())
+    thetas = [[round(value, 7) for value in theta] for theta in track(SAMPLE)]
+    GOLDEN.write_text(json.dumps({"theta": thetas}).replace("], [", "],\n[") + "\n", encoding="utf-8")
+    print(f"{SAMPLE.name}: {SAMPLE.stat().st_size / 1e3:.0f} kB, {len(thetas)} estimates")
