@@ -49,6 +49,8 @@ def newest_image_ns(path) -> int:
 def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_second(run, tmp_path):
     process, ear = run
     wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in ear.health("record")), 20, "a growing file")
+    late = len(ear.frames(DEPTH)) + 22  # the file was flushed just now; most of a second later there is most to lose
+    wait_until(lambda: len(ear.frames(DEPTH)) > late, 10, "more images")
     kill(children(process.pid)["record"])
     killed_s = time.time()
     (cut,) = (tmp_path / "takes").glob("*.mcap.active")
