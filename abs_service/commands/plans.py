@@ -8,6 +8,7 @@ from abs_service.tracking import Plan
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.color import GaussianColor
+from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.rig import Rig, Sensor
 
 
@@ -69,12 +70,22 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
     """The sensors of one tracker with their cameras and noise models.
 
     Raises:
-        PlanError: a sensor has no camera or no noise model.
+        PlanError: a sensor has no camera or no noise model, or the two are of different size.
         NoiseError: a noise model cannot be made.
     """
     sensors: dict[str, Sensor] = {}
     for name, noise in noises(config, tracker).items():
         if name not in cameras:
             raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no camera model')
+        _check_size(name, noise, cameras[name])
         sensors[name] = Sensor(name, cameras[name], noise)
     return Rig(config.name, sensors)
+
+
+def _check_size(sensor: str, noise: DepthNoise | GaussianColor, camera: Camera) -> None:
+    if isinstance(noise, PixelPolynomial) and noise.sigma.shape[2:] != (camera.height, camera.width):
+        height, width = noise.sigma.shape[2:]
+        raise PlanError(
+            f"sensors.{sensor}.noise.file: its maps are for {width} × {height} pixels, "
+            f"the camera has {camera.width} × {camera.height}"
+        )

@@ -1,6 +1,6 @@
 """The picture of the live table in the README, taken from a real run of the demo rig.
 
-  python -m tests.evaluation.table docs/images/table.svg
+python -m tests.evaluation.table docs/images/table.svg
 """
 
 import argparse
@@ -45,7 +45,7 @@ def main() -> None:
     display = _LastTable()
     options = argparse.ArgumentParser()
     run.add_arguments(options)
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "_display", lambda **_: display):
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "_display", return_value=display):
         run.run(options.parse_args(["--duration", str(DURATION_S), "--out", folder]))
     display.save(picture)
 

@@ -1,0 +1,34 @@
+"""From the configuration to what a tracker is made of: mistakes that only show when cameras are known."""
+
+import re
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from abs_service import config
+from abs_service.commands import plans
+from calib.camera import Camera
+
+TOF = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
+COLOR = Camera(320, 240, 340.0, 340.0, 159.5, 119.5)
+
+
+def test_a_tracker_that_does_not_exist_is_answered_with_those_that_do():
+    with pytest.raises(plans.PlanError, match=r'no tracker "sheeet".*sheet'):
+        plans.plan(config.load_default(), "sheeet")
+
+
+def test_a_sensor_without_a_camera_is_named():
+    with pytest.raises(plans.PlanError, match=r'"color" of tracker "sheet" has no camera'):
+        plans.rig(config.load_default(), "sheet", {"tof": TOF})
+
+
+def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_path):
+    maps = {"sigma": np.full((1, 1, 240, 320), 0.005), "mu": np.zeros((1, 1, 240, 320))}
+    np.savez(tmp_path / "maps.npz", **maps, distances=np.array([0.1, 5.0]), amplitudes=np.array([0.0, 1e4]))
+    demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    noise = '[sensors.tof.noise]\ntype = "pixel_polynomial"\nfile = "maps.npz"\n'
+    toml = re.sub(r"\[sensors\.tof\.noise\].*?(?=\[sensors\.color\])", noise, demo, flags=re.DOTALL)
+    with pytest.raises(plans.PlanError, match=r"sensors.tof.noise.file.* 320 × 240 .* 176 × 144"):
+        plans.rig(config.loads(toml, "maps.toml", tmp_path), "sheet", {"tof": TOF, "color": COLOR})
