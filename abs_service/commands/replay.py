@@ -33,6 +33,10 @@ from drivers.mcap_file import McapFile
 from drivers.replay import Recording
 
 
+#: Time that the processes of a live replay have to get ready before its first frame [s].
+START_S = 6.0
+
+
 class ReplayOptionError(Exception):
     """Options that do not fit the recording."""
 
@@ -163,7 +167,7 @@ def _writing(path: Path, toml: str) -> Iterator[McapFile]:
 
 def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
     """Plays the recording as the only device of the rig, through `run`."""
-    recording_uri = f"replay://{quote(str(arguments.recording.resolve()))}?speed={arguments.speed:g}"
+    recording_uri = f"replay://{quote(str(arguments.recording.resolve()))}?speed={arguments.speed:g}&delay={START_S:g}"
     with run_command.file(_played(settings, recording_uri)) as path:
         options = ["--json"] if arguments.json else []
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]

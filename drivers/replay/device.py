@@ -27,6 +27,7 @@ class ReplayDevice:
         loop: whether to begin anew at the end, in a new epoch.
         clock: CLOCK_MONOTONIC [ns].
         wait: how to pass time; tests pass their own.
+        delay_s: time before the first frame [s].
 
     Raises:
         RecordingError: a stream without frames, or a sensor without a camera model.
@@ -40,6 +41,7 @@ class ReplayDevice:
         loop: bool,
         clock: Callable[[], int],
         wait: Wait = threading.Event.wait,
+        delay_s: float = 0.0,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="replay", serial=recording.path.name)
         self.streams: tuple[StreamInfo, ...] = _streams(recording, speed)
@@ -49,6 +51,7 @@ class ReplayDevice:
         self._loop = loop
         self._clock = clock
         self._wait = wait
+        self._delay_s = delay_s
         self._counters = {"frames": 0, "unpaired": 0}
         self._next_epoch = 0
         self._stop = threading.Event()
@@ -78,6 +81,8 @@ class ReplayDevice:
         self.stop()
 
     def _run(self, sink: Sink, stop: threading.Event) -> None:
+        sink.on_state(DeviceState.OPENING, f"begins {self._delay_s:g} s after it was started")
+        self._wait(stop, self._delay_s)
         sink.on_state(DeviceState.STREAMING, f"replaying {self._recording.path}")
         try:
             while self._play(sink, stop) and self._loop:

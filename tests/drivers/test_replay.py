@@ -290,6 +290,19 @@ def test_a_replay_keeps_its_pace_and_looks_like_now(tmp_path: Path, speed: float
     assert {(s.width, s.height) for s in device.streams} == {(32, 24)}
 
 
+def test_a_replay_can_give_those_who_watch_time_to_get_ready(tmp_path: Path) -> None:
+    time, sink = Time(), Sink()
+    recording = Recording(write(tmp_path / "a.mcap", recorded(2)))
+    device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait, delay_s=6.0)
+    device.start(sink)
+    assert sink.done.wait(30)
+    device.close()
+    assert sink.items[0].t_host_ns == 77_000_000_000 + 6_000_000_000
+    assert [state for state, _ in sink.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
+    with pytest.raises(AddressError, match=r"delay = '-1' must be a number from 0 to 3600"):
+        open_device(f"replay://{recording.path}?delay=-1", time.clock)
+
+
 def test_every_round_of_a_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
     items = [item if isinstance(item, Truth) else dataclasses.replace(item, epoch=7_000_000) for item in recorded(2)]
     time, sink = Time(), Sink(enough=20)
@@ -335,7 +348,7 @@ def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("speed=0", r"speed = '0' must be a number from 0\.01 to 100"),
         ("speed=fast", r"speed = 'fast' must be"),
         ("loop=yes", r"loop = 'yes' must be 0 or 1"),
-        ("pace=1", r"unknown key 'pace'; allowed are \['loop', 'speed'\]"),
+        ("pace=1", r"unknown key 'pace'; allowed are \['delay', 'loop', 'speed'\]"),
     ],
 )
 def test_addresses_are_strict(query: str, complaint: str) -> None:
