@@ -32,7 +32,6 @@ from abs_service.tracking import Tracking, streams
 from drivers.mcap_file import McapFile
 from drivers.replay import Recording
 
-
 #: Time that the processes of a live replay have to get ready before its first frame [s].
 START_S = 6.0
 
