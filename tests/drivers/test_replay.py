@@ -1,81 +1,28 @@
-"""A recording gives back what was recorded, in order, whatever happened to the file; a replay keeps its pace."""
+"""A recording gives back what was recorded, in order, whatever happened to the file."""
 
 import dataclasses
-import threading
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
-from abs.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from calib.camera import Camera
 from drivers import codec
-from drivers.device import AddressError, DeviceState, Truth
+from drivers.device import Truth
 from drivers.frame import Frame
-from drivers.mcap_file import Compression, McapFile
-from drivers.opening import open_device
-from drivers.replay import Recording, RecordingError, ReplayDevice
-from drivers.replay.contents import survey
-from drivers.simulated.address import parse
-
-SIMULATION = parse("simulated://sheet?tof=32x24&color=32x24&sensors=tof,color").build()
-CAMERAS = {name: head.camera for name, head in SIMULATION.heads.items()}
-WALL_NS = 1_700_000_000_000_000_000
-BOOT_NS = 3_000_000_000
-
-
-def recorded(count: int) -> list[Frame | Truth]:
-    items: list[Frame | Truth] = []
-    for k in range(count):
-        frames, truth = SIMULATION.expose(k)
-        items += [dataclasses.replace(item, t_host_ns=item.t_host_ns + BOOT_NS) for item in (truth, *frames)]
-    return items
-
-
-def write_item(file: McapFile, item: Frame | Truth) -> None:
-    wall_ns = item.t_host_ns + WALL_NS
-    header = Header(rig="demo", seq=item.seq)
-    if isinstance(item, Truth):
-        file.write("/sim/truth", codec.TRUTH_SCHEMA, codec.encode_truth(item, header), wall_ns, item.seq)
-        return
-    base = f"/{item.sensor}/{item.stream}"
-    file.write(f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(item, wall_ns), wall_ns, item.seq)
-    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(item, header), wall_ns, item.seq)
-
-
-def write_model(file: McapFile, sensor: str, camera: Camera, **changes: object) -> None:
-    model = SensorModel(
-        sensor=sensor,
-        width=camera.width,
-        height=camera.height,
-        fx=camera.fx,
-        fy=camera.fy,
-        cx=camera.cx,
-        cy=camera.cy,
-        lens=camera.lens.coefficients.tolist(),
-        T_rs=camera.T_rs.ravel().tolist(),
-        noise="gaussian_polynomial",
-    )
-    for name, value in changes.items():
-        setattr(model, name, value)
-    file.write(f"/{sensor}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
-
-
-def write(
-    path: Path, items: Iterable[Frame | Truth], *, finish: bool = True, sensors: tuple[str, ...] = ("tof", "color")
-) -> Path:
-    with path.open("wb") as stream:
-        file = McapFile(stream, Compression.LZ4, chunk_size=20_000)
-        file.attach("rig.toml", "text/toml", b'name = "demo"\n', WALL_NS)
-        for sensor in sensors:
-            write_model(file, sensor, CAMERAS[sensor])
-        for item in items:
-            write_item(file, item)
-        file.finish() if finish else file.flush()
-    return path
+from drivers.mcap_file import McapFile
+from drivers.replay import Recording, RecordingError
+from tests.drivers.recordings import (
+    BOOT_NS,
+    CAMERAS,
+    WALL_NS,
+    damage,
+    recorded,
+    write,
+    write_item,
+    write_model,
+)
 
 
 def assert_same(left: Iterable[Frame | Truth], right: Iterable[Frame | Truth]) -> None:
@@ -139,13 +86,6 @@ def test_a_truncated_file_gives_what_is_there(tmp_path: Path, share: float) -> N
     assert sum(recording.counts.values()) >= sum(isinstance(item, Frame) for item in found)
     assert recording.unpaired <= 1
     assert {(item.seq, type(item)) for item in found} <= {(item.seq, type(item)) for item in items}
-
-
-def damage(path: Path) -> None:
-    whole = bytearray(path.read_bytes())
-    inside = survey(path).chunks[5].offset + 1000
-    whole[inside : inside + 50] = bytes(50)
-    path.write_bytes(whole)
 
 
 def test_a_damaged_chunk_is_named(tmp_path: Path) -> None:
@@ -227,137 +167,3 @@ def test_errors_name_the_file_and_what_is_wrong(tmp_path: Path, make, complaint:
     make(path)
     with pytest.raises(RecordingError, match=rf"broken\.mcap: .*{complaint}|broken\.mcap: {complaint}"):
         list(Recording(path).frames())
-
-
-class Sink:
-    """Keeps what it gets, and tells when the replay ended or enough has come."""
-
-    def __init__(self, enough: int = 1 << 30) -> None:
-        self.items: list[Frame | Truth] = []
-        self.states: list[tuple[DeviceState, str]] = []
-        self.done = threading.Event()
-        self.enough = enough
-
-    def on_frame(self, frame: Frame) -> None:
-        self.items.append(frame)
-        if len(self.items) >= self.enough:
-            self.done.set()
-
-    def on_truth(self, truth: Truth) -> None:
-        self.items.append(truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        self.states.append((state, reason))
-        if state in {DeviceState.CLOSED, DeviceState.FAILED}:
-            self.done.set()
-
-
-class Time:
-    """A clock that moves only when someone waits."""
-
-    def __init__(self) -> None:
-        self.now_ns = 77_000_000_000
-
-    def clock(self) -> int:
-        return self.now_ns
-
-    def wait(self, stop: threading.Event, seconds: float) -> bool:
-        self.now_ns += round(seconds * 1e9)
-        return stop.is_set()
-
-
-@pytest.mark.parametrize("speed", [1.0, 2.0])
-def test_a_replay_keeps_its_pace_and_looks_like_now(tmp_path: Path, speed: float) -> None:
-    items = recorded(6)
-    time, sink = Time(), Sink()
-    device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), speed, False, time.clock, time.wait)
-    device.start(sink)
-    assert sink.done.wait(30)
-    device.stop()
-    assert [item.seq for item in sink.items] == [item.seq for item in items]
-    for original, item in zip(items, sink.items):
-        assert item.t_host_ns == 77_000_000_000 + round((original.t_host_ns - BOOT_NS) / speed)
-        if isinstance(item, Frame):
-            assert 0 <= item.t_arrival_ns - item.t_host_ns < 10
-            assert item.epoch == 0
-    assert device.counters == {"frames": 18, "unpaired": 0}
-    assert sink.states[-1] == (DeviceState.CLOSED, "the recording ended")
-    assert [(s.sensor, s.stream) for s in device.streams] == [
-        ("tof", "depth"),
-        ("tof", "amplitude"),
-        ("color", "color"),
-    ]
-    assert {(s.width, s.height) for s in device.streams} == {(32, 24)}
-
-
-def test_a_replay_can_give_those_who_watch_time_to_get_ready(tmp_path: Path) -> None:
-    time, sink = Time(), Sink()
-    recording = Recording(write(tmp_path / "a.mcap", recorded(2)))
-    device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait, delay_s=6.0)
-    device.start(sink)
-    assert sink.done.wait(30)
-    device.close()
-    assert sink.items[0].t_host_ns == 77_000_000_000 + 6_000_000_000
-    assert [state for state, _ in sink.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
-    with pytest.raises(AddressError, match=r"delay = '-1' must be a number from 0 to 3600"):
-        open_device(f"replay://{recording.path}?delay=-1", time.clock)
-
-
-def test_every_round_of_a_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
-    items = [item if isinstance(item, Truth) else dataclasses.replace(item, epoch=7_000_000) for item in recorded(2)]
-    time, sink = Time(), Sink(enough=20)
-    device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), 1.0, True, time.clock, time.wait)
-    device.start(sink)
-    assert sink.done.wait(30)
-    device.stop()
-    assert sink.states[-1] == (DeviceState.CLOSED, "stopped")
-    epochs = [item.epoch for item in sink.items if isinstance(item, Frame)]
-    assert epochs[:13] == [0] * 6 + [1] * 6 + [2]
-    again = Sink(enough=1)
-    device.start(again)
-    assert again.done.wait(30)
-    device.close()
-    first = next(item for item in again.items if isinstance(item, Frame))
-    assert first.epoch > epochs[-1]
-
-
-def test_a_replay_of_a_damaged_file_fails_with_the_reason(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mcap", recorded(20))
-    device = open_device(f"replay://{path}?speed=100", Time().clock)
-    damage(path)
-    sink = Sink()
-    device.start(sink)
-    assert sink.done.wait(30)
-    device.close()
-    state, reason = sink.states[-1]
-    assert state == DeviceState.FAILED
-    assert "is damaged" in reason
-
-
-def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write(tmp_path / "Some file.mcap", recorded(2))
-    monkeypatch.chdir(tmp_path)
-    device = open_device("replay://Some%20file.mcap?loop=1", Time().clock)
-    assert device.cameras["color"].calib_id == CAMERAS["color"].calib_id
-    assert device.info.serial == "Some file.mcap"
-
-
-@pytest.mark.parametrize(
-    ("query", "complaint"),
-    [
-        ("speed=0", r"speed = '0' must be a number from 0\.01 to 100"),
-        ("speed=fast", r"speed = 'fast' must be"),
-        ("loop=yes", r"loop = 'yes' must be 0 or 1"),
-        ("pace=1", r"unknown key 'pace'; allowed are \['delay', 'loop', 'speed'\]"),
-    ],
-)
-def test_addresses_are_strict(query: str, complaint: str) -> None:
-    with pytest.raises(AddressError, match=complaint):
-        open_device(f"replay://a.mcap?{query}", Time().clock)
-
-
-def test_a_sensor_without_a_model_cannot_be_replayed(tmp_path: Path) -> None:
-    path = write(tmp_path / "a.mcap", recorded(2), sensors=("tof",))
-    assert Recording(path).cameras.keys() == {"tof"}
-    with pytest.raises(AddressError, match=r"topic /color/model .* is missing"):
-        open_device(f"replay://{path}", Time().clock)
