@@ -1,4 +1,4 @@
-"""Prints every estimate of a running rig: sequence number, status, how old it is on arrival, and Θ.
+"""Prints every estimate of a running rig: number, status, age when published and on arrival, and the beginning of Θ.
 
   python examples/subscribe.py [--endpoint tcp/127.0.0.1:7447] [--topic abs/demo/sheet/state] [--count N]
 
@@ -9,6 +9,8 @@ clock, so it is right on the host of the cameras; elsewhere compare `header.stam
 import argparse
 import json
 import time
+from contextlib import suppress
+from itertools import islice
 
 import zenoh
 from abs.v1.deformation_state_pb2 import DeformationState
@@ -16,21 +18,20 @@ from abs.v1.deformation_state_pb2 import DeformationState
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="bus.endpoint of the rig")
 parser.add_argument("--topic", default="abs/demo/sheet/state", help="abs/RIG/TRACKER/state")
-parser.add_argument("--count", type=int, default=0, help="end after so many estimates (default: with Ctrl-C)")
+parser.add_argument("--count", type=int, help="end after so many estimates (default: with Ctrl-C)")
 arguments = parser.parse_args()
 
-config = zenoh.Config()
-config.insert_json5("mode", '"client"')
-config.insert_json5("connect/endpoints", json.dumps([arguments.endpoint]))
-
-received = 0
-with zenoh.open(config) as session, session.declare_subscriber(arguments.topic) as states:
-    for sample in states:
+config = zenoh.Config.from_json5(json.dumps({"mode": "client", "connect": {"endpoints": [arguments.endpoint]}}))
+try:
+    session = zenoh.open(config)
+except zenoh.ZError as error:
+    raise SystemExit(f"nothing answers at {arguments.endpoint}: is abs-service running?") from error
+newest = zenoh.handlers.RingChannel(30)  # a reader slower than the tracker loses the oldest, and is never a second late
+with suppress(KeyboardInterrupt), session, session.declare_subscriber(arguments.topic, newest) as states:
+    for sample in islice(states, arguments.count):
         state = DeformationState.FromString(sample.payload.to_bytes())
         age_ms = (time.monotonic_ns() - state.header.t_host_ns) * 1e-6
         status = DeformationState.Status.Name(state.status).removeprefix("STATUS_")
         theta = " ".join(f"{value:+.3f}" for value in state.theta[:6])
-        print(f"{state.header.seq:6d} {status:12} {age_ms:6.1f} ms  Θ[{len(state.theta)}] = {theta} …", flush=True)
-        received += 1
-        if received == arguments.count:
-            break
+        ages = f"published {state.age_ms:5.1f} ms, here {age_ms:5.1f} ms"
+        print(f"{state.header.seq:6d} {status:12} {ages}  Θ[{len(state.theta)}] = {theta} …", flush=True)
