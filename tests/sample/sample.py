@@ -1,6 +1,6 @@
 """Makes `recordings/sample.mcap` and writes down what the tracker finds in it.
 
-    .venv/bin/python -m tests.golden.sample
+    .venv/bin/python -m tests.sample.sample
 
 The sample is free to share (CC0): the simulator's view of a sheet that begins to move, without a clock, so that
 everybody who runs this gets the same images. `sample.json` holds Θ of every exposure. Make both anew only when the

@@ -7,7 +7,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from tests.golden.sample import EXPOSURES, GOLDEN, SAMPLE
+from tests.sample.sample import EXPOSURES, GOLDEN, SAMPLE
 from tests.system.running import abs_service
 
 #: Rounding differs between machines and turns the search elsewhere; another seed of it moves Θ by 2 mm [mm].
