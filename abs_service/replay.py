@@ -1,6 +1,7 @@
 """A recording through the trackers: every frame set, no clock, the same Θ each time."""
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -123,12 +124,9 @@ def replay(recording: Recording, trackers: Mapping[str, OfflineTracker]) -> Iter
 
 def free_path(recording: Path) -> Path:
     """A file beside the recording that does not exist yet: `x_replay.mcap`, `x_replay_2.mcap`, …."""
-    for number in range(1, 10_000):
-        suffix = "_replay" if number == 1 else f"_replay_{number}"
-        path = recording.with_name(f"{recording.stem}{suffix}.mcap")
-        if not path.exists():
-            return path
-    raise FileExistsError(recording)
+    suffixes = chain(["_replay"], (f"_replay_{number}" for number in count(2)))
+    paths = (recording.with_name(f"{recording.stem}{suffix}.mcap") for suffix in suffixes)
+    return next(path for path in paths if not path.exists())
 
 
 def _always() -> bool:

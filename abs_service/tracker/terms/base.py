@@ -59,7 +59,7 @@ class SensorFit:
         visible: vertices that face the sensor and lie inside its image.
         samples: of these, how many met a measurement.
         inliers: of these, how many the measurement's own noise explains.
-        mean_log_likelihood: mean over all vertices, −inf for an objective that is no likelihood.
+        mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if that is what the objective sums.
         normalized_residual: root mean square of the inliers' residuals over their deviations; near 1 if the noise
             model is right.
     """
