@@ -1,7 +1,7 @@
 """One tracker from its first frame set on: finds the object, makes the mesh and the model, then tracks."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -9,13 +9,14 @@ import numpy as np
 from abs_service.observation import Observation, Observer
 from abs_service.tracker import priors, status
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.initialization import initial_mesh
+from abs_service.tracker.initialization import sight, vertex_colors
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.priors import MotionPrior, StretchPrior
-from abs_service.tracker.regions.base import Region, RegionError
+from abs_service.tracker.regions.base import Region
+from abs_service.tracker.sighting import Sighting, SightingError
 from abs_service.tracker.tracker import Tracker
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
@@ -25,8 +26,8 @@ from drivers.frame import FrameSet, Kind
 class ModelSettings(Protocol):
     """`Settings` of a module of `abs_service.tracker.models`."""
 
-    def build(self, mesh: Mesh) -> DeformationModel:
-        """The model of a mesh."""
+    def build(self, sighting: Sighting) -> DeformationModel:
+        """The model of an object as it is first seen."""
         ...
 
 
@@ -109,20 +110,20 @@ class Tracking:
         if self._tracker is None:
             try:
                 self._tracker = self._begin(observation)
-            except (RegionError, ModelError) as error:
+            except (SightingError, ModelError) as error:
                 return _initializing(observation, str(error))
         return self._tracker.track(observation, in_time)
 
     def _begin(self, observation: Observation) -> Tracker:
         plan = self._plan
-        mesh = initial_mesh(observation, self._rig, plan.reference, self._region, plan.vertices)
-        model = plan.model.build(mesh)
-        self.mesh, self.made_ns = model.mesh, observation.t_host_ns
+        model = plan.model.build(sight(observation, self._rig, plan.reference, self._region, plan.vertices))
+        mesh = replace(model.mesh, colors=vertex_colors(model.mesh.vertices, observation.images, self._rig))
+        self.mesh, self.made_ns = mesh, observation.t_host_ns
         self.mesh_version += 1
         return Tracker(
             model,
-            plan.objective.build(self._rig, model.mesh),
-            StretchPrior(model.mesh, plan.priors.stretch),
+            plan.objective.build(self._rig, mesh),
+            StretchPrior(mesh, plan.priors.stretch),
             MotionPrior(model.rest, model.scales, plan.priors),
             plan.optimizer.build(len(model.rest), np.random.default_rng(plan.seed)),
             plan.status,

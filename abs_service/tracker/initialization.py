@@ -1,84 +1,34 @@
-"""The initial mesh: a grid laid over the object in the first depth image."""
+"""The object in the first frames: which pixels show it, and which colours its vertices have."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import ColorImage, DepthImage, Observation
-from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.regions.base import Region, RegionError
-from calib import pose
+from abs_service.tracker.regions.base import Region
+from abs_service.tracker.sighting import Sighting, SightingError
 from calib.camera import Camera
 from calib.noise.base import without_offset
 from calib.noise.color import GaussianColor
 from calib.rig import Rig
 
-#: A mesh with fewer vertices carries no deformation.
-LEAST_VERTICES = 25
 
-#: Share of a grid point's neighbourhood that must show the object for it to become a vertex.
-LEAST_COVER = 0.75
-
-#: Distances around a grid point that differ by more from their median belong to another surface [m].
-LARGEST_RELIEF_M = 0.03
-
-#: A triangle with a side longer than this many typical sides spans a jump between two surfaces.
-LONGEST_SIDE = 5.0
-
-
-def initial_mesh(observation: Observation, rig: Rig, reference: str, region: Region, vertices: int) -> Mesh:
-    """Makes a triangle mesh of about `vertices` vertices over the object that the reference sensor sees.
+def sight(observation: Observation, rig: Rig, reference: str, region: Region, vertices: int) -> Sighting:
+    """The object that the region selects in the reference sensor's depth image, for a mesh of about `vertices`.
 
     Raises:
-        RegionError: the reference sensor sees no object, or too little of it.
+        SightingError: the reference sensor sees no object.
     """
     image = observation.images.get(reference)
     if not isinstance(image, DepthImage):
-        raise RegionError(f"no depth image from {reference} yet")
+        raise SightingError(f"no depth image from {reference} yet")
     camera, noise = rig.sensors[reference].camera, rig.sensors[reference].noise
     if isinstance(noise, GaussianColor):
-        raise RegionError(f"sensor {reference} delivers depth, but its noise model is one of colours")
+        raise SightingError(f"sensor {reference} delivers depth, but its noise model is one of colours")
     distance = without_offset(noise, image.distance, image.amplitude)
     inside = region.select(camera.unproject(distance), distance)
-    mesh = grid_mesh(np.where(inside, distance, np.nan), camera, vertices)
-    return replace(mesh, colors=vertex_colors(mesh.vertices, observation.images, rig))
-
-
-def grid_mesh(distance: NDArray[np.float32], camera: Camera, vertices: int) -> Mesh:
-    """Lays a square grid over the object in the image, along the sides of the smallest rectangle around it.
-
-    What one camera sees is one distance per direction, so the grid never folds, whatever the object's shape. Every
-    vertex is a plane fitted to the distances around it, so it is less noisy than a pixel; where the object is not,
-    there is no vertex, so the mesh has its outline.
-
-    Args:
-        distance: radial distances (height, width) [m], NaN outside the object.
-        camera: the camera that measured them.
-        vertices: about how many vertices the mesh is to have.
-
-    Returns:
-        The mesh without colours; its chart is the grid.
-    """
-    valid = np.isfinite(distance)
-    spacing = float(np.sqrt(np.count_nonzero(valid) / vertices))
-    grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
-    rows, columns = grid.shape[:2]
-    pixels = grid.reshape(-1, 2)
-    at_grid = _local_planes(pixels, distance, 0.75 * spacing)
-    place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
-    positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
-    faces = _without_jumps(positions, _triangles(place))
-    chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
-    used = np.unique(faces)
-    if len(used) < LEAST_VERTICES:
-        raise RegionError(f"the object is too small in the depth image: {len(used)} vertices, {LEAST_VERTICES} needed")
-    position_of = np.full(rows * columns, -1, np.int32)
-    position_of[used] = np.arange(len(used), dtype=np.int32)
-    unknown = np.full((len(used), 3), np.nan, np.float32)
-    return Mesh(positions[used], position_of[faces], unknown, chart[used])
+    return Sighting(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices)
 
 
 def vertex_colors(
@@ -102,60 +52,3 @@ def _colors_in(image: ColorImage, camera: Camera, positions: NDArray[np.float64]
     column, row = pixel[inside].astype(int).T
     colors[inside] = image.rgb[row, column]
     return colors
-
-
-def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
-    """Pixel coordinates (rows, columns, 2) of a grid over the smallest rectangle around pixels (k, 2)."""
-    center, size, angle = cv2.minAreaRect(pixels)
-    if size[0] < size[1]:
-        size, angle = size[::-1], angle + 90
-    angle = np.deg2rad((angle + 90) % 180 - 90)  # the long side points right, so that the grid is not mirrored
-    right = np.array([np.cos(angle), np.sin(angle)])
-    down = np.array([-np.sin(angle), np.cos(angle)])
-    columns, rows = (np.ceil(np.asarray(size) / spacing).astype(int) + 1).tolist()
-    across = (np.arange(columns) - (columns - 1) / 2) * spacing
-    along = (np.arange(rows) - (rows - 1) / 2) * spacing
-    return np.asarray(center) + across[None, :, None] * right + along[:, None, None] * down
-
-
-def _local_planes(pixels: NDArray[np.float64], distance: NDArray[np.float32], radius: float) -> NDArray[np.float64]:
-    """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each; NaN where the object is not."""
-    height, width = distance.shape
-    reach = int(np.ceil(radius))
-    steps = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
-    result = np.full(len(pixels), np.nan)
-    for g, pixel in enumerate(pixels):
-        around = np.floor(pixel + 0.5).astype(int) + steps
-        around = around[np.linalg.norm(around - pixel, axis=1) <= max(radius, 1.0)]
-        inside = np.all((around >= 0) & (around < (width, height)), axis=1)
-        values = np.full(len(around), np.nan)
-        values[inside] = distance[around[inside, 1], around[inside, 0]]
-        near = np.abs(values - np.nanmedian(values)) < LARGEST_RELIEF_M if np.isfinite(values).any() else inside & False
-        if np.count_nonzero(near) < max(LEAST_COVER * len(around), 3):
-            continue
-        plane = np.column_stack([np.ones(np.count_nonzero(near)), around[near] - pixel])
-        result[g] = np.linalg.lstsq(plane, values[near], rcond=None)[0][0]
-    return result
-
-
-def _triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles (m, 3) of a grid of vertex indices (rows, columns), −1 where there is none; seen from the camera.
-
-    A cell with four vertices gives two triangles, one with three gives one.
-    """
-    corners = np.stack([place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]], axis=-1).reshape(-1, 4)
-    whole = np.all(corners >= 0, axis=1)
-    faces = []
-    for triangle, opposite in (([0, 1, 2], 3), ([0, 2, 3], 1), ([0, 1, 3], 2), ([1, 2, 3], 0)):
-        wanted = whole if opposite in (1, 3) else np.zeros_like(whole)
-        keep = (wanted | (corners[:, opposite] < 0)) & np.all(corners[:, triangle] >= 0, axis=1)
-        faces.append(corners[keep][:, triangle])
-    return np.concatenate(faces)
-
-
-def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles (m, 3) that do not span a jump in distance."""
-    if not len(faces):
-        return faces
-    sides = np.linalg.norm(positions[faces] - positions[np.roll(faces, 1, axis=1)], axis=2)
-    return faces[sides.max(axis=1) < LONGEST_SIDE * np.median(sides)]

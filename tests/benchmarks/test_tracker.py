@@ -38,7 +38,7 @@ def observation() -> Observation:
 
 
 def model_and_thetas(shape: tuple[int, int], mesh: Mesh = MESH):
-    model = Settings(control_points=shape, degree=2).build(mesh)
+    model = Settings(control_points=shape, degree=2).of_mesh(mesh)
     return model, model.rest + np.random.default_rng(1).normal(0, 2e-3, (POPULATION, len(model.rest)))
 
 

@@ -249,7 +249,7 @@ def test_costs_do_not_depend_on_the_rest_of_the_population():
 
 def test_deformation_of_a_population_is_eq_8():
     mesh = sheet(5, 6)
-    model = NurbsSettings(control_points=(5, 4), degree=2).build(mesh)
+    model = NurbsSettings(control_points=(5, 4), degree=2).of_mesh(mesh)
     thetas = model.rest + np.random.default_rng(2).normal(0, 5e-3, (2, len(model.rest)))
     rigid = pose.from_rotation_vector([0.1, 0.2, -0.1], [0.05, 0, 0.1])
     thetas[1] = pose.transform(rigid, model.rest.reshape(-1, 3)).ravel()

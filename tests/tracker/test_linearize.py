@@ -29,7 +29,7 @@ BOUNDS = Bounds(0.05, 1.6, 4.6)
 
 
 def test_the_jacobian_of_the_vertices_is_that_of_the_model():
-    model = Settings(control_points=(4, 4)).build(sheet())
+    model = Settings(control_points=(4, 4)).of_mesh(sheet())
     jacobian = vertex_jacobian(model, model.rest)
     generator = np.random.default_rng(1)
     step = generator.normal(0, 1e-4, len(model.rest))
@@ -127,7 +127,7 @@ def test_only_inliers_with_a_measurement_are_linearized():
 
 
 def test_stretch_rows_are_derivatives_of_the_stretch_cost():
-    model = Settings(control_points=(4, 4)).build(sheet(5, 6))
+    model = Settings(control_points=(4, 4)).of_mesh(sheet(5, 6))
     prior = StretchPrior(model.mesh, 0.02)
     theta = model.rest + np.random.default_rng(2).normal(0, 3e-3, len(model.rest))
     linear = prior.linearize(model.deform(theta[None]), vertex_jacobian(model, theta))

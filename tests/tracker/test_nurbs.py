@@ -14,7 +14,7 @@ from tests.tracker.scenes import flat, sheet, wave
 
 MESH = sheet()
 MODELS = {
-    (shape, degree): Settings(control_points=shape, degree=degree).build(MESH)
+    (shape, degree): Settings(control_points=shape, degree=degree).of_mesh(MESH)
     for shape, degree in [((4, 4), 2), ((3, 3), 1), ((5, 4), 3), ((6, 6), 2), ((12, 12), 4)]
 }
 CASES = pytest.mark.parametrize("case", MODELS, ids=str)
@@ -129,7 +129,7 @@ def test_normals_are_on_the_side_of_the_mesh_s(mirrored):
     """However the chart lies on the mesh; a chart that is mirrored does not turn the surface inside out."""
     mesh = sheet()
     chart = mesh.chart * (-1, 1) if mirrored else mesh.chart
-    model = Settings().build(Mesh(mesh.vertices, mesh.faces, mesh.colors, chart))
+    model = Settings().of_mesh(Mesh(mesh.vertices, mesh.faces, mesh.colors, chart))
     normals = model.deform(model.rest[None]).normals[0].T
     assert np.all(np.einsum("ni,ni->n", normals, model.mesh.normals) > 0.98)
 
@@ -149,11 +149,11 @@ def test_parameters_are_lengths_of_which_there_are_three_per_control_point():
 def test_too_few_control_points_for_the_degree_are_named(shape, degree):
     message = rf"control_points = \[{shape[0]}, {shape[1]}\] is too few for degree = {degree}: .* at least {degree + 1}"
     with pytest.raises(ModelError, match=message):
-        Settings(control_points=shape, degree=degree).build(MESH)
+        Settings(control_points=shape, degree=degree).of_mesh(MESH)
 
 
 def test_a_mesh_that_the_surface_cannot_follow_is_refused():
     """A step of 10 cm is no smooth surface of 3 × 3 control points; its normals there leave the vertices behind."""
     mesh = sheet(height=lambda x, y: flat(x, y) + 0.3 * (np.sin(60 * x) > 0))
     with pytest.raises(ModelError, match="away from the normal of its closest surface point"):
-        Settings(control_points=(3, 3)).build(mesh)
+        Settings(control_points=(3, 3)).of_mesh(mesh)

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.rigid import Rigid, Settings
+from abs_service.tracker.models.rigid import Rigid
 from tests.tracker.scenes import sheet
 
 MESH = sheet()
-MODEL = Settings().build(MESH)
+MODEL = Rigid(MESH)
 thetas = st.tuples(*[st.floats(-2, 2)] * 6).map(np.array)
 
 

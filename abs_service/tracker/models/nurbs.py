@@ -7,9 +7,11 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import spline
 from abs_service.tracker.models.base import ModelError, Surface
+from abs_service.tracker.sighting import Sighting
 from calib.jit import kernel
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
@@ -35,7 +37,15 @@ class Settings:
     margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
     smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
 
-    def build(self, mesh: Mesh) -> "Nurbs":
+    def build(self, sighting: Sighting) -> "Nurbs":
+        """The surface of an object of any smooth shape.
+
+        Raises:
+            ModelError, SightingError: the object is too small, or no such surface can carry it.
+        """
+        return self.of_mesh(grid_mesh(sighting))
+
+    def of_mesh(self, mesh: Mesh) -> "Nurbs":
         """Fits the rest surface to the mesh by least squares and binds every vertex to it.
 
         Raises:

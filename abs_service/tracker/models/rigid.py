@@ -6,17 +6,23 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
+from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.sighting import Sighting
 
 
 @dataclass(frozen=True)
 class Settings:
     """A rigid model has no keys."""
 
-    def build(self, mesh: Mesh) -> "Rigid":
-        """The rigid model of a mesh."""
-        return Rigid(mesh)
+    def build(self, sighting: Sighting) -> "Rigid":
+        """The rigid model of an object of any shape.
+
+        Raises:
+            SightingError: the object is too small.
+        """
+        return Rigid(grid_mesh(sighting))
 
 
 class Rigid:

@@ -6,10 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-class RegionError(ValueError):
-    """A region that selects nothing, or that does not fit the sensor's image."""
-
-
 class Region(Protocol):
     """Says which pixels of the first depth image show the object."""
 
@@ -21,6 +17,6 @@ class Region(Protocol):
             distance: radial distances (height, width) [m], NaN without return.
 
         Raises:
-            RegionError: there is no object.
+            SightingError: there is no object.
         """
         ...

@@ -8,7 +8,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.regions.base import RegionError
+from abs_service.tracker.sighting import SightingError
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Settings:
         sizes = np.bincount(labels.ravel(), minlength=count)
         candidates = [label for label in range(1, count) if sizes[label] >= self.least_pixels]
         if not candidates:
-            raise RegionError(f"no connected surface of at least least_pixels = {self.least_pixels} pixels in sight")
+            raise SightingError(f"no connected surface of at least least_pixels = {self.least_pixels} pixels in sight")
         nearest = min(candidates, key=lambda label: float(np.median(distance[labels == label])))
         return labels == nearest
 
