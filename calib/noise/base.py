@@ -5,13 +5,18 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from calib.jit import kernel
+
 #: Texels describe the density for |measured − mean offset − synthesised| up to this [m]; beyond, they keep their edge
 #: value.
 WINDOW_M = 0.05
 
+#: No surface is nearer than this [m]; keeps the window's near end in front of the camera.
+LEAST_DISTANCE_M = 1e-3
+
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 
-#: Rows and columns of the pixels that measured.
+#: Rows and columns of the pixels that measured, each (n,).
 Pixels = tuple[NDArray[np.integer], NDArray[np.integer]]
 
 
@@ -20,7 +25,10 @@ class NoiseError(ValueError):
 
 
 class DepthNoise(Protocol):
-    """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a."""
+    """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a.
+
+    Arrays x may be (n,), one distance for each of n pixels, or (…, n), several; a is (n,).
+    """
 
     @property
     def uses_amplitude(self) -> bool:
@@ -28,11 +36,11 @@ class DepthNoise(Protocol):
         ...
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """Mean offset μ_p(x, a) of a measurement from the real distance [m]."""
+        """Mean offset μ_p(x, a) of a measurement from the real distance [m], in the shape of x."""
         ...
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """Standard deviation σ_p(x, a) of a measurement [m], always positive."""
+        """Standard deviation σ_p(x, a) of a measurement [m], always positive, in the shape of x."""
         ...
 
 
@@ -56,9 +64,9 @@ def without_offset(
     model: DepthNoise, distance: NDArray[np.floating], amplitude: NDArray[np.floating]
 ) -> NDArray[np.float32]:
     """A depth image (height, width) [m] without the mean offset that each distance has if it is right."""
-    x, a = distance.astype(np.float64), amplitude.astype(np.float64)
-    pixels = np.indices(distance.shape)
-    return (x - model.mean(x, a, (pixels[0], pixels[1]))).astype(np.float32)
+    x, a = distance.astype(np.float64).ravel(), amplitude.astype(np.float64).ravel()
+    rows, columns = np.indices(distance.shape)
+    return (x - model.mean(x, a, (rows.ravel(), columns.ravel()))).reshape(distance.shape).astype(np.float32)
 
 
 def render_texture(
@@ -84,27 +92,64 @@ def render_texture(
     height, width = distance.shape
     texture = np.zeros((height + 2, width + 2, 8), np.float32)
     texture[..., 6] = uniform
-    valid = np.isfinite(distance) & (distance > 0)  # some devices report infinity for what is out of range
-    if model.uses_amplitude:
-        valid &= np.isfinite(amplitude)
-    rows, columns = np.nonzero(valid)
-    p = (rows, columns)
-    measured, a = distance[p].astype(np.float64), amplitude[p].astype(np.float64)
+    pixels, returns = np.empty((2, distance.size), np.int64), np.empty((2, distance.size))
+    n = _returns(
+        np.ascontiguousarray(distance, np.float32),
+        np.ascontiguousarray(amplitude, np.float32),
+        model.uses_amplitude,
+        pixels,
+        returns,
+    )
+    p, (measured, a) = (pixels[0, :n], pixels[1, :n]), returns[:, :n]
     offset = model.mean(measured, a, p)  # may be larger than the window, which has to lie where the surface is
     center = measured - offset
-    nodes = [np.maximum(center - t, 1e-3) for t in (-WINDOW_M, 0.0, WINDOW_M)]
-    deviation = [model.deviation(x, a, p) for x in nodes]
-    texels = np.empty((measured.size, 8), np.float32)
-    texels[:, 0] = center
-    texels[:, 1], texels[:, 2], _ = _parabola(*(model.mean(x, a, p) - offset for x in nodes))
-    texels[:, 3], texels[:, 4], texels[:, 5] = _parabola(*(1 / sigma for sigma in deviation))
-    texels[:, 6], texels[:, 7], _ = _parabola(*(np.log(sigma) + LOG_SQRT_2PI for sigma in deviation))
-    texture[rows + 1, columns + 1] = texels
+    nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), LEAST_DISTANCE_M)
+    _write_texels(*p, center, model.mean(nodes, a, p) - offset, model.deviation(nodes, a, p), texture)
     return texture
 
 
-def _parabola(
-    below: NDArray[np.float64], middle: NDArray[np.float64], above: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Coefficients (value, slope, curvature) in t of the parabola through the values at t = −WINDOW_M, 0, WINDOW_M."""
-    return middle, (above - below) / (2 * WINDOW_M), (above - 2 * middle + below) / (2 * WINDOW_M**2)
+@kernel
+def _returns(
+    distance: NDArray[np.float32],
+    amplitude: NDArray[np.float32],
+    uses_amplitude: bool,
+    pixels: NDArray[np.int64],
+    returns: NDArray[np.float64],
+) -> int:
+    """Lists the pixels (2, n) that can be judged with what they measured (2, n), and tells how many there are.
+
+    Some devices report infinity, and some a negative distance, for what is out of range.
+    """
+    n = 0
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            x, a = distance[row, column], amplitude[row, column]
+            if x > 0 and np.isfinite(x) and (np.isfinite(a) or not uses_amplitude):
+                pixels[0, n], pixels[1, n] = row, column
+                returns[0, n], returns[1, n] = x, a
+                n += 1
+    return n
+
+
+@kernel
+def _write_texels(
+    rows: NDArray[np.int64],
+    columns: NDArray[np.int64],
+    center: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    texture: NDArray[np.float32],
+) -> None:
+    """Coefficients in t from the values (3, n) at t = −WINDOW_M, 0, WINDOW_M; texels have single precision only."""
+    slope, curvature = 1 / (2 * WINDOW_M), 1 / (2 * WINDOW_M**2)
+    for k in range(center.size):
+        texel = texture[rows[k] + 1, columns[k] + 1]
+        below, middle, above = 1 / deviation[0, k], 1 / deviation[1, k], 1 / deviation[2, k]
+        texel[0] = center[k]
+        texel[1] = mean[1, k]
+        texel[2] = (mean[2, k] - mean[0, k]) * slope
+        texel[3] = middle
+        texel[4] = (above - below) * slope
+        texel[5] = (above - 2 * middle + below) * curvature
+        texel[6] = np.log(np.float32(deviation[1, k])) + np.float32(LOG_SQRT_2PI)
+        texel[7] = np.log(np.float32(deviation[2, k] * below)) * slope

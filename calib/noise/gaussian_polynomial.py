@@ -5,12 +5,12 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
-from numpy.polynomial.polynomial import polyval, polyval2d
 from numpy.typing import NDArray
 
-from calib.noise.base import NoiseError, Pixels
-
-Table = tuple[tuple[float, ...], ...]
+from calib.noise import fitting
+from calib.noise.base import Pixels
+from calib.noise.polynomial import EVERYWHERE, Polynomials, Span, Table, check_span, check_table
+from calib.noise.samples import Samples
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,15 @@ class GaussianPolynomial:
 
     sigma: Table
     mu: Table = ((0.0,),)
-    distances: tuple[float, float] = (0.0, 100.0)
-    amplitudes: tuple[float, float] = (0.0, 65535.0)
+    distances: Span = (0.0, 100.0)
+    amplitudes: Span = (0.0, 65535.0)
     least_sigma: Annotated[float, Gt(0)] = 1e-4
 
     def __post_init__(self) -> None:
-        for key, table in (("sigma", self.sigma), ("mu", self.mu)):
-            if not table or not table[0] or len({len(row) for row in table}) != 1:
-                raise NoiseError(f"{key} must be a table of rows of equal length, {key}[i][j] for xⁱ aʲ, not {table}")
-        for key, (low, high) in (("distances", self.distances), ("amplitudes", self.amplitudes)):
-            if not low < high:
-                raise NoiseError(f"{key} must be [lowest, highest] with lowest < highest, not {[low, high]}")
+        check_table("sigma", self.sigma)
+        check_table("mu", self.mu)
+        check_span("distances", self.distances)
+        check_span("amplitudes", self.amplitudes)
 
     @property
     def uses_amplitude(self) -> bool:
@@ -53,20 +51,31 @@ class GaussianPolynomial:
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Mean offset μ(x, a) [m], the same for every pixel."""
-        return self._polynomial(self.mu, x, a)
+        return self._polynomials.mean(x, a, EVERYWHERE)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ(x, a) [m], the same for every pixel."""
-        return np.maximum(self._polynomial(self.sigma, x, a), self.least_sigma)
+        return self._polynomials.deviation(x, a, EVERYWHERE)
 
-    def _polynomial(self, table: Table, x: NDArray[np.float64], a: NDArray[np.float64]) -> NDArray[np.float64]:
-        coefficients = np.asarray(table)
-        if coefficients.size == 1:
-            return np.full(np.shape(x), coefficients[0, 0])
-        if coefficients.shape[1] == 1:  # an amplitude that nothing depends on may be missing (NaN)
-            return np.asarray(polyval(np.clip(x, *self.distances), coefficients[:, 0]), np.float64)
-        x, a = np.clip(x, *self.distances), np.clip(a, *self.amplitudes)
-        return np.asarray(polyval2d(x, a, coefficients), np.float64)
+    @property
+    def _polynomials(self) -> Polynomials:
+        sigma, mu = np.array(self.sigma)[..., None], np.array(self.mu)[..., None]
+        return Polynomials(sigma, mu, self.distances, self.amplitudes, self.least_sigma)
 
 
 Settings = GaussianPolynomial
+
+
+def fit(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tuple[int, int]) -> GaussianPolynomial:
+    """The model of greatest likelihood; its domain is where the samples lie.
+
+    Args:
+        samples: measurements.
+        sigma_degrees, mu_degrees: highest powers of the distance and of the amplitude.
+
+    Raises:
+        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude.
+    """
+    law = fitting.polynomials(samples, sigma_degrees, mu_degrees)
+    sigma, mu = fitting.table(law.sigma[..., 0]), fitting.table(law.mu[..., 0])
+    return GaussianPolynomial(sigma, mu, law.distances, law.amplitudes, law.least_sigma)

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
+from calib.noise import fitting, maps, shrinkage
 from calib.noise.base import NoiseError, Pixels
+from calib.noise.polynomial import Polynomials
+from calib.noise.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,43 +22,59 @@ class PixelPolynomial:
         least_sigma: lower bound of the deviation [m].
     """
 
-    sigma: NDArray[np.float64]
-    mu: NDArray[np.float64]
-    distances: NDArray[np.float64]
-    amplitudes: NDArray[np.float64]
+    sigma: NDArray[np.floating]
+    mu: NDArray[np.floating]
+    distances: NDArray[np.floating]
+    amplitudes: NDArray[np.floating]
     least_sigma: float = 1e-4
 
     @property
     def uses_amplitude(self) -> bool:
         """Whether a power of the amplitude occurs."""
-        return self.sigma.shape[1] > 1 or self.mu.shape[1] > 1
+        return self._polynomials.use_amplitude
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the images that it is for."""
+        height, width = self.sigma.shape[2:]
+        return height, width
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Mean offset μ_p(x, a) [m]."""
-        return self._polynomial(self.mu, x, a, p)
+        return self._polynomials.mean(x, a, self._place(p))
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ_p(x, a) [m]."""
-        return np.maximum(self._polynomial(self.sigma, x, a, p), self.least_sigma)
+        return self._polynomials.deviation(x, a, self._place(p))
 
-    def _polynomial(
-        self, coefficients: NDArray[np.float64], x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels
-    ) -> NDArray[np.float64]:
-        x, a = np.clip(x, *self.distances), np.clip(a, *self.amplitudes)
-        if coefficients.shape[1] == 1:  # an amplitude that nothing depends on may be missing (NaN)
-            a = np.zeros_like(x)
-        value = np.zeros_like(x)
-        for row in coefficients[::-1]:
-            inner = np.zeros_like(x)
-            for plane in row[::-1]:
-                inner = inner * a + plane[p]
-            value = value * x + inner
-        return value
+    def save(self, file: Path) -> None:
+        """Writes the .npz that `Settings` reads."""
+        np.savez_compressed(
+            file,
+            sigma=self.sigma,
+            mu=self.mu,
+            distances=self.distances,
+            amplitudes=self.amplitudes,
+            least_sigma=self.least_sigma,
+        )
+
+    @property
+    def _polynomials(self) -> Polynomials:
+        sigma, mu = (part.reshape(*part.shape[:2], -1) for part in (self.sigma, self.mu))
+        return Polynomials(sigma, mu, tuple(self.distances), tuple(self.amplitudes), self.least_sigma)
+
+    def _place(self, p: Pixels) -> NDArray[np.integer]:
+        return p[0] * self.sigma.shape[3] + p[1]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """TOML keys: `file`, an .npz with the arrays sigma, mu (i, j, height, width), distances (2,), amplitudes (2,)."""
+    """TOML keys.
+
+    Attributes:
+        file: an .npz with the arrays sigma, mu (i, j, height, width), distances (2,), amplitudes (2,) and, if it is not
+            1e-4, least_sigma ().
+    """
 
     file: Path
 
@@ -67,18 +84,40 @@ class Settings:
         Raises:
             NoiseError: the file or one of its arrays is missing or has the wrong shape.
         """
-        try:
-            with self.file.open("rb") as stream, NpzFile(stream) as archive:
-                arrays = dict(archive)
-        except (OSError, ValueError, BadZipFile) as error:
-            raise NoiseError(f"file = {str(self.file)!r} cannot be read as .npz: {error}") from error
-        missing = {"sigma", "mu", "distances", "amplitudes"} - set(arrays)
-        if missing:
-            raise NoiseError(f"file = {str(self.file)!r} lacks the array(s) {sorted(missing)}")
+        arrays = maps.load(self.file, {"sigma", "mu"})
         sigma, mu = arrays["sigma"], arrays["mu"]
         if sigma.ndim != 4 or mu.ndim != 4 or sigma.shape[2:] != mu.shape[2:]:
             raise NoiseError(f"sigma and mu in {str(self.file)!r} must be (i, j, height, width) of one image size")
-        for key in ("distances", "amplitudes"):
-            if arrays[key].shape != (2,) or not arrays[key][0] < arrays[key][1]:
-                raise NoiseError(f"{key} in {str(self.file)!r} must be [lowest, highest], not {arrays[key].tolist()}")
-        return PixelPolynomial(sigma, mu, arrays["distances"], arrays["amplitudes"])
+        return PixelPolynomial(sigma, mu, arrays["distances"], arrays["amplitudes"], float(arrays["least_sigma"]))
+
+
+def fit(
+    samples: Samples,
+    labels: NDArray[np.integer],
+    sigma_degrees: tuple[int, int],
+    mu_degrees: tuple[int, int],
+    own_degree: int = 1,
+) -> PixelPolynomial:
+    """The image's polynomials, and how each region differs from them, and each pixel from its region.
+
+    What the samples of a region or of a pixel do not tell is that of the image or of the region: 15 sequences are
+    plenty for an image and few for a pixel.
+
+    Args:
+        samples: measurements.
+        labels: region (height, width) of every pixel, 0 and up; such as `region_polynomial.blocks`.
+        sigma_degrees, mu_degrees: the image's highest powers of the distance and of the amplitude.
+        own_degree: highest power of the distance in a region's or a pixel's own mean offset. Their own deviation is a
+            factor.
+
+    Raises:
+        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude.
+    """
+    image = fitting.polynomials(samples, sigma_degrees, mu_degrees)
+    samples = samples.returns(with_amplitude=image.use_amplitude)
+    parents = np.zeros(int(labels.max()) + 1, np.int64)
+    regions = shrinkage.refine(image, parents, samples, labels[samples.pixels], own_degree)
+    place = samples.row * labels.shape[1] + samples.column
+    law = shrinkage.refine(regions, labels.ravel(), samples, place, own_degree)
+    sigma, mu = (part.reshape(*part.shape[:2], *labels.shape) for part in (law.sigma, law.mu))
+    return PixelPolynomial(sigma, mu, np.array(law.distances), np.array(law.amplitudes), law.least_sigma)

@@ -1,60 +1,22 @@
-"""Every noise model is a density, is sampled as it says, is sensible outside its domain, and names bad parameters."""
-
-import zipfile
+"""Every noise model says what its formula says, is sensible outside its domain, and names bad parameters."""
 
 import numpy as np
 import pytest
 from annotated_types import Ge, Gt
 
-from calib.noise import color, gaussian_polynomial, pixel_polynomial, structured_light
-from calib.noise.base import NoiseError, log_density, sample
+from calib.noise import color, constant, gaussian_polynomial, structured_light, tof_amplitude
+from calib.noise.base import NoiseError, log_density
+from calib.noise.constant import Constant
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.pixel_polynomial import PixelPolynomial
+from calib.noise.region_polynomial import RegionPolynomial
 from calib.noise.structured_light import StructuredLight
+from calib.noise.tof_amplitude import TofAmplitude
+from tests.calib.noise_models import DISTANCES, GLOBAL, MODELS, SIGMA, TOF, pixel_maps, region_tables
 
-SIGMA = ((2e-3, -1e-7), (5e-4, 0.0), (1e-4, 0.0))
-MU = ((0.01, 1e-6), (-2e-3, 0.0))
-DOMAIN = ((0.5, 3.0), (100.0, 10_000.0))
-EDGES = (np.array(DOMAIN[0]), np.array(DOMAIN[1]))
-GLOBAL = GaussianPolynomial(SIGMA, MU, *DOMAIN)
-
-
-def constant_maps(height: int = 4, width: int = 5) -> PixelPolynomial:
-    """The model `GLOBAL` with equal coefficients for every pixel."""
-    sigma, mu = (np.tile(np.array(table)[:, :, None, None], (1, 1, height, width)) for table in (SIGMA, MU))
-    return PixelPolynomial(sigma, mu, *EDGES)
-
-
-MODELS = {
-    "gaussian_polynomial": GLOBAL,
-    "pixel_polynomial": constant_maps(),
-    "structured_light": StructuredLight(floor=5e-4),
-}
 X, A = np.array([0.6, 1.0, 2.5]), np.array([200.0, 3000.0, 9000.0])
 P = (np.array([0, 3, 2]), np.array([4, 1, 0]))
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_the_density_integrates_to_one(name):
-    model = MODELS[name]
-    for i in range(len(X)):
-        x, a, p = X[i : i + 1], A[i : i + 1], (P[0][i : i + 1], P[1][i : i + 1])
-        center, spread = (x + model.mean(x, a, p))[0], model.deviation(x, a, p)[0]
-        measured = np.linspace(center - 8 * spread, center + 8 * spread, 2001)
-        density = np.exp(log_density(model, measured, np.full(2001, x[0]), np.full(2001, a[0]), p))
-        assert np.trapezoid(density, measured) == pytest.approx(1, abs=1e-9)
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_samples_have_the_model_s_mean_and_deviation(name):
-    model, n = MODELS[name], 40_000
-    for i in range(len(X)):
-        x, a = np.full(n, X[i]), np.full(n, A[i])
-        p = (np.full(n, P[0][i]), np.full(n, P[1][i]))
-        drawn = sample(model, np.random.default_rng(i), x, a, p)
-        sigma = model.deviation(x, a, p)[0]
-        assert drawn.mean() == pytest.approx(X[i] + model.mean(x, a, p)[0], abs=4 * sigma / np.sqrt(n))
-        assert drawn.std() == pytest.approx(sigma, rel=4 / np.sqrt(2 * n))
+PLAIN = [color, constant, gaussian_polynomial, structured_light, tof_amplitude]
 
 
 def test_the_polynomial_is_the_sum_of_its_powers():
@@ -63,21 +25,52 @@ def test_the_polynomial_is_the_sum_of_its_powers():
     np.testing.assert_allclose(GLOBAL.mean(X, A, P), [0.01 + 1e-6 * a - 2e-3 * x for x, a in zip(X, A)], rtol=1e-12)
 
 
-def test_equal_maps_are_the_whole_image_model():
-    np.testing.assert_allclose(constant_maps().deviation(X, A, P), GLOBAL.deviation(X, A, P), rtol=1e-12)
-    np.testing.assert_allclose(constant_maps().mean(X, A, P), GLOBAL.mean(X, A, P), rtol=1e-12)
+def test_time_of_flight_errs_inversely_to_the_amplitude():
+    np.testing.assert_allclose(TOF.deviation(X, A, P), [1.5e-3 + 5e-4 * x + 9 / a for x, a in zip(X, A)], rtol=1e-12)
+    np.testing.assert_allclose(TOF.mean(X, A, P), [0.01 - 2e-3 * x - 6 / a for x, a in zip(X, A)], rtol=1e-12)
+
+
+def test_a_constant_is_the_same_everywhere():
+    np.testing.assert_array_equal(Constant(3e-3, 0.01).deviation(X, A, P), np.full(3, 3e-3))
+    np.testing.assert_array_equal(Constant(3e-3, 0.01).mean(X, A, P), np.full(3, 0.01))
+
+
+@pytest.mark.parametrize("make", [pixel_maps, region_tables])
+def test_equal_coefficients_everywhere_are_the_whole_image_model(make):
+    np.testing.assert_allclose(make().deviation(X, A, P), GLOBAL.deviation(X, A, P), rtol=1e-12)
+    np.testing.assert_allclose(make().mean(X, A, P), GLOBAL.mean(X, A, P), rtol=1e-12)
 
 
 def test_every_pixel_has_its_own_coefficients():
-    maps = constant_maps()
+    maps = pixel_maps()
     maps.mu[0, 0, 3, 1] += 0.5
     np.testing.assert_allclose(maps.mean(X, A, P) - GLOBAL.mean(X, A, P), [0, 0.5, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["gaussian_polynomial", "pixel_polynomial"])
+def test_every_region_has_its_own_coefficients():
+    tables = region_tables(side=2)  # three by two regions; the three pixels lie in the third, the fourth and the fourth
+    assert tables.labels[P].tolist() == [2, 3, 3]
+    tables.sigma[0, 0, 3] += 0.5
+    np.testing.assert_allclose(tables.deviation(X, A, P) - GLOBAL.deviation(X, A, P), [0, 0.5, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [pixel_maps, region_tables])
+def test_a_pixel_outside_the_maps_is_an_error_and_not_another_pixel_s_noise(make):
+    with pytest.raises(IndexError):
+        make().mean(X, A, (np.array([0, 0, 4]), np.array([0, 0, 4])))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_several_distances_of_a_pixel_are_answered_at_once(name):
+    model, several = MODELS[name], np.stack([X, X + 0.1, X - 0.05])
+    for law in (model.mean, model.deviation):
+        np.testing.assert_array_equal(law(several, A, P), np.stack([law(x, A, P) for x in several]))
+
+
+@pytest.mark.parametrize("name", ["gaussian_polynomial", "pixel_polynomial", "region_polynomial", "tof_amplitude"])
 def test_outside_the_calibrated_domain_the_edge_s_value_holds(name):
     model = MODELS[name]
-    for outside, edge in (((0.1, 0.0), (0.5, 100.0)), ((50.0, 1e6), (3.0, 10_000.0))):
+    for outside, edge in (((0.1, 0.0), (0.5, 100.0)), ((50.0, 1e6), (3.0, 10_000.0)), ((1.0, -5.0), (1.0, 100.0))):
         (x, a), (x_edge, a_edge) = ((np.full(3, value) for value in pair) for pair in (outside, edge))
         np.testing.assert_array_equal(model.deviation(x, a, P), model.deviation(x_edge, a_edge, P))
         np.testing.assert_array_equal(model.mean(x, a, P), model.mean(x_edge, a_edge, P))
@@ -86,21 +79,38 @@ def test_outside_the_calibrated_domain_the_edge_s_value_holds(name):
 def test_the_deviation_is_never_below_its_bound():
     steep = GaussianPolynomial(((1e-2,), (-1e-2,)), least_sigma=2e-3)
     np.testing.assert_allclose(steep.deviation(np.array([0.5, 0.9, 5.0]), A, P), [5e-3, 2e-3, 2e-3])
-    maps = PixelPolynomial(np.full((1, 1, 4, 5), -1.0), np.zeros((1, 1, 4, 5)), *EDGES, 3e-3)
-    np.testing.assert_array_equal(maps.deviation(X, A, P), 3e-3)
+    falling = TofAmplitude((1e-2, -1e-2), 0.0, least_sigma=2e-3)
+    np.testing.assert_allclose(falling.deviation(np.array([0.5, 0.9, 5.0]), A, P), [5e-3, 2e-3, 2e-3])
+    domain = np.array(DISTANCES), np.array([0.0, 1.0])
+    below, none = np.full((1, 1, 4, 5), -1.0), np.zeros((1, 1, 4, 5))
+    np.testing.assert_array_equal(PixelPolynomial(below, none, *domain, 3e-3).deviation(X, A, P), 3e-3)
+    regions = RegionPolynomial(np.zeros((4, 5), int), below[..., 0, :1], none[..., 0, :1], *domain, 3e-3)
+    np.testing.assert_array_equal(regions.deviation(X, A, P), 3e-3)
 
 
-@pytest.mark.parametrize("model", [GaussianPolynomial(((1e-3,), (1e-3,))), StructuredLight()])
+@pytest.mark.parametrize(
+    "model",
+    [
+        Constant(1e-3),
+        GaussianPolynomial(((1e-3,), (1e-3,))),
+        StructuredLight(),
+        TofAmplitude((1e-3, 1e-3), 0.0),
+        pixel_maps(((1e-3,), (1e-3,)), ((0.0,),)),
+        region_tables(((1e-3,), (1e-3,)), ((0.0,),)),
+    ],
+    ids=lambda model: type(model).__name__,
+)
 def test_an_amplitude_that_nothing_depends_on_may_be_missing(model):
     assert not model.uses_amplitude
     missing = np.full(3, np.nan)
     assert np.isfinite(log_density(model, X, X, missing, P)).all()
 
 
-def test_maps_without_powers_of_the_amplitude_do_not_need_it():
-    maps = PixelPolynomial(np.full((2, 1, 4, 5), 1e-3), np.zeros((1, 1, 4, 5)), *EDGES)
-    assert not maps.uses_amplitude
-    np.testing.assert_allclose(maps.deviation(X, np.full(3, np.nan), P), 1e-3 * (1 + X))
+@pytest.mark.parametrize("name", ["gaussian_polynomial", "pixel_polynomial", "region_polynomial", "tof_amplitude"])
+def test_a_missing_amplitude_that_something_depends_on_gives_no_number(name):
+    model = MODELS[name]
+    assert model.uses_amplitude
+    assert np.isnan(log_density(model, X, X, np.array([np.nan, 3000.0, np.nan]), P)).tolist() == [True, False, True]
 
 
 #: Distances (middles of the bins) and median deviations over time of a PrimeSense-type sensor's pixels [m], from 120
@@ -125,87 +135,51 @@ def test_the_floor_of_structured_light_adds_its_variance():
 
 
 @pytest.mark.parametrize(
-    ("parameters", "message"),
+    ("model", "parameters", "message"),
     [
-        ({"sigma": ()}, "sigma must be a table"),
-        ({"sigma": ((),)}, "sigma must be a table"),
-        ({"sigma": ((1e-3, 0.0), (1e-3,))}, "sigma must be a table of rows of equal length"),
-        ({"sigma": SIGMA, "mu": ((0.0,), (0.0, 1.0))}, "mu must be a table of rows of equal length"),
-        ({"sigma": SIGMA, "distances": (3.0, 0.5)}, r"distances must be .* not \[3.0, 0.5\]"),
-        ({"sigma": SIGMA, "amplitudes": (1.0, 1.0)}, r"amplitudes must be .* not \[1.0, 1.0\]"),
+        (GaussianPolynomial, {"sigma": ()}, "sigma must be a table"),
+        (GaussianPolynomial, {"sigma": ((),)}, "sigma must be a table"),
+        (GaussianPolynomial, {"sigma": ((1e-3, 0.0), (1e-3,))}, "sigma must be a table of rows of equal length"),
+        (GaussianPolynomial, {"sigma": SIGMA, "mu": ((0.0,), (0.0, 1.0))}, "mu must be a table of rows of equal"),
+        (GaussianPolynomial, {"sigma": SIGMA, "distances": (3.0, 0.5)}, r"distances must be .* not \[3.0, 0.5\]"),
+        (GaussianPolynomial, {"sigma": SIGMA, "amplitudes": (1.0, 1.0)}, r"amplitudes must be .* not \[1.0, 1.0\]"),
+        (TofAmplitude, {"sigma": ()}, r"sigma must be a list of numbers, sigma\[i\]"),
+        (TofAmplitude, {"mu": ()}, "mu must be a list of numbers"),
+        (TofAmplitude, {"distances": (3.0, 0.5)}, r"distances must be .* not \[3.0, 0.5\]"),
+        (TofAmplitude, {"amplitudes": (0.0, 9.0)}, r"amplitudes must begin above 0, .* not \[0.0, 9.0\]"),
     ],
 )
-def test_bad_polynomials_are_named(parameters, message):
+def test_bad_parameters_are_named(model, parameters, message):
+    needed = {"sigma": (1e-3,), "sigma_amplitude": 1.0} if model is TofAmplitude else {}
     with pytest.raises(NoiseError, match=message):
-        GaussianPolynomial(**parameters)
+        model(**needed | parameters)
 
 
-def saved(folder, **changes):
-    maps = constant_maps()
-    arrays = {"sigma": maps.sigma, "mu": maps.mu, "distances": maps.distances, "amplitudes": maps.amplitudes} | changes
-    path = folder / "maps.npz"
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, array in arrays.items():
-            if array is not None:
-                with archive.open(f"{name}.npy", "w") as stream:
-                    np.save(stream, array)
-    return path
-
-
-def test_maps_come_from_a_file(tmp_path):
-    model = pixel_polynomial.Settings(saved(tmp_path)).build()
-    np.testing.assert_array_equal(model.deviation(X, A, P), constant_maps().deviation(X, A, P))
-
-
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"mu": None, "distances": None}, r"lacks the array\(s\) \['distances', 'mu'\]"),
-        ({"sigma": np.ones((2, 2))}, r"\(i, j, height, width\)"),
-        ({"mu": np.ones((1, 1, 9, 9))}, r"of one image size"),
-        ({"distances": np.ones(3)}, r"distances .* \[lowest, highest\]"),
-        ({"amplitudes": np.array([5.0, 1.0])}, r"amplitudes .* \[lowest, highest\]"),
-        ({"mu": np.array([None, {}])}, "cannot be read as .npz"),
-    ],
-)
-def test_bad_maps_are_named(tmp_path, changes, message):
-    with pytest.raises(NoiseError, match=message):
-        pixel_polynomial.Settings(saved(tmp_path, **changes)).build()
-
-
-@pytest.mark.parametrize("content", [None, b"", b"no archive", b"PK\x03\x04 cut off"])
-def test_a_file_that_holds_no_maps_is_named(tmp_path, content):
-    path = tmp_path / "maps.npz"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(NoiseError, match=r"maps\.npz.* cannot be read as \.npz"):
-        pixel_polynomial.Settings(path).build()
-
-
-def test_a_single_array_is_no_archive_of_maps(tmp_path):
-    path = tmp_path / "maps.npy"
-    np.save(path, np.ones(3))
-    with pytest.raises(NoiseError, match=r"maps\.npy.* cannot be read as \.npz"):
-        pixel_polynomial.Settings(path).build()
-
-
-@pytest.mark.parametrize("module", [color, gaussian_polynomial, structured_light])
+@pytest.mark.parametrize("module", PLAIN)
 def test_settings_of_a_model_without_files_are_the_model(module):
-    settings = module.Settings(sigma=((1e-3,),)) if module is gaussian_polynomial else module.Settings()
+    needed = {
+        constant: {"sigma": 1e-3},
+        gaussian_polynomial: {"sigma": ((1e-3,),)},
+        tof_amplitude: {"sigma": (1e-3,), "sigma_amplitude": 9.0},
+    }
+    settings = module.Settings(**needed.get(module, {}))
     assert settings.build() is settings
 
 
 def test_ranges_of_numbers_are_declared():
     bounds = {
-        (module.__name__, name): annotation.__metadata__
-        for module in (color, gaussian_polynomial, structured_light)
+        (module.__name__.rpartition(".")[2], name): annotation.__metadata__
+        for module in PLAIN
         for name, annotation in module.Settings.__annotations__.items()
         if hasattr(annotation, "__metadata__")
     }
     assert bounds == {
-        ("calib.noise.color", "sigma"): (Gt(0),),
-        ("calib.noise.gaussian_polynomial", "least_sigma"): (Gt(0),),
-        ("calib.noise.structured_light", "noise"): (Gt(0),),
-        ("calib.noise.structured_light", "step"): (Ge(0),),
-        ("calib.noise.structured_light", "floor"): (Ge(0),),
+        ("color", "sigma"): (Gt(0),),
+        ("constant", "sigma"): (Gt(0),),
+        ("gaussian_polynomial", "least_sigma"): (Gt(0),),
+        ("structured_light", "noise"): (Gt(0),),
+        ("structured_light", "step"): (Ge(0),),
+        ("structured_light", "floor"): (Ge(0),),
+        ("tof_amplitude", "sigma_amplitude"): (Ge(0),),
+        ("tof_amplitude", "least_sigma"): (Gt(0),),
     }

@@ -3,28 +3,24 @@
 import numpy as np
 import pytest
 
-from calib.noise.base import WINDOW_M, log_density, render_texture, without_offset
+from calib.noise.base import log_density, render_texture, without_offset
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
+from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
+from tests.calib.texels import negative_log_density
 
 #: The simulated time-of-flight head's law, the same with a mean offset that depends on both, and a Kinect's.
 TOF = GaussianPolynomial(SIGMA_POLYNOMIAL, amplitudes=(400.0, 10_000.0))
 BIASED = GaussianPolynomial(SIGMA_POLYNOMIAL, ((0.10, 2e-6), (-0.02, 0.0)), amplitudes=(400.0, 10_000.0))
-MODELS = {"tof": TOF, "biased": BIASED, "structured_light": StructuredLight()}
+LAW = TofAmplitude((0.0015, 0.0005), 9.0)
+MODELS = {"tof": TOF, "biased": BIASED, "structured_light": StructuredLight(), "law": LAW}
 UNIFORM = 1.6
 
 
-def negative_log_density(texels, t):
-    """What the kernel computes from texels (n, 8) at t = y − x (m,), y the first number of a texel: (n, m)."""
-    _, m0, m1, s0, s1, s2, n0, n1 = texels.astype(np.float64).T[:, :, None]
-    t = np.asarray(t)
-    inside = np.clip(t, -WINDOW_M, WINDOW_M)
-    e = (t - m0 - m1 * inside) * (s0 + inside * (s1 + inside * s2))
-    return 0.5 * e**2 + n0 + n1 * inside
-
-
-@pytest.mark.parametrize(("name", "allowed"), [("tof", 1e-5), ("biased", 2e-4), ("structured_light", 1e-3)])
+@pytest.mark.parametrize(
+    ("name", "allowed"), [("tof", 1e-5), ("law", 3e-3), ("biased", 2e-4), ("structured_light", 1e-3)]
+)
 @pytest.mark.parametrize("distance", [0.7, 1.0, 1.6, 3.0])
 def test_it_is_eq_18_within_three_deviations(name, allowed, distance):
     """In units of the log-density itself, whose difference between 0 and 3 deviations is 4.5."""

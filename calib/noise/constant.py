@@ -1,0 +1,57 @@
+"""One deviation and one mean offset for every distance: what there is before anything was measured."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Gt
+from numpy.typing import NDArray
+
+from calib.noise import fitting
+from calib.noise.base import Pixels
+from calib.noise.samples import Samples
+
+
+@dataclass(frozen=True)
+class Constant:
+    """μ = offset and σ = sigma.
+
+    Attributes:
+        sigma: standard deviation of a distance [m].
+        offset: mean offset of a distance [m].
+    """
+
+    sigma: Annotated[float, Gt(0)]
+    offset: float = 0.0
+
+    @property
+    def uses_amplitude(self) -> bool:
+        """Nothing depends on it."""
+        return False
+
+    def build(self) -> "Constant":
+        """The model itself: its TOML keys are its fields."""
+        return self
+
+    def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
+        """The mean offset [m]."""
+        return np.full(np.shape(x), self.offset)
+
+    def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
+        """The standard deviation [m]."""
+        return np.full(np.shape(x), self.sigma)
+
+
+Settings = Constant
+
+
+def fit(samples: Samples) -> Constant:
+    """The constant of greatest likelihood.
+
+    Raises:
+        NoiseError: no sample has a distance.
+    """
+    residual = fitting.thinned(samples.returns(with_amplitude=False)).residual
+    one = np.ones((len(residual), 1))
+    law = fitting.maximize(residual, one, one)
+    return Constant(float(law.spread[0]), float(law.mean[0]))

@@ -1,0 +1,159 @@
+"""Polynomials in distance and amplitude with coefficients of one image, of regions or of pixels (eq. 18)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+from calib.noise.base import NoiseError
+
+#: Coefficients [i][j] of xⁱ aʲ, as a rig file has them.
+Table = tuple[tuple[float, ...], ...]
+
+#: Lowest and highest value of a calibrated domain.
+Span = tuple[float, float]
+
+#: The place of a sample where one polynomial is for the whole image.
+EVERYWHERE = np.zeros(1, np.int64)
+
+#: Samples whose intermediate results stay in the processor's fastest memory.
+_BLOCK = 256
+
+
+def check_table(key: str, table: Table) -> None:
+    """Complains unless a table has rows of equal length.
+
+    Raises:
+        NoiseError: names the key.
+    """
+    if not table or not table[0] or len({len(row) for row in table}) != 1:
+        raise NoiseError(f"{key} must be a table of rows of equal length, {key}[i][j] for xⁱ aʲ, not {table}")
+
+
+def check_span(key: str, span: Span) -> None:
+    """Complains unless a domain has a lowest and a higher highest value.
+
+    Raises:
+        NoiseError: names the key.
+    """
+    low, high = span
+    if not low < high:
+        raise NoiseError(f"{key} must be [lowest, highest] with lowest < highest, not {[low, high]}")
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomials:
+    """μ and σ as polynomials in distance x and amplitude a, with coefficients of their own for every place.
+
+    A place is the whole image, a region or a pixel. Outside the domain the polynomials keep their value at its edge.
+
+    Attributes:
+        sigma: coefficients of the deviation [m], (i, j, places): [i, j] belongs to xⁱ aʲ.
+        mu: coefficients of the mean offset [m], likewise.
+        distances, amplitudes: calibrated domain.
+        least_sigma: lower bound of the deviation [m].
+    """
+
+    sigma: NDArray[np.floating]
+    mu: NDArray[np.floating]
+    distances: Span
+    amplitudes: Span
+    least_sigma: float
+
+    @property
+    def use_amplitude(self) -> bool:
+        """Whether a power of the amplitude occurs."""
+        return self.sigma.shape[1] > 1 or self.mu.shape[1] > 1
+
+    def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], place: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Mean offset μ(x, a) [m] at places (n,) or (1,)."""
+        return evaluate(self.mu, place, x, a, self.distances, self.amplitudes)
+
+    def deviation(
+        self, x: NDArray[np.float64], a: NDArray[np.float64], place: NDArray[np.integer]
+    ) -> NDArray[np.float64]:
+        """Standard deviation σ(x, a) [m] at places (n,) or (1,)."""
+        return np.maximum(evaluate(self.sigma, place, x, a, self.distances, self.amplitudes), self.least_sigma)
+
+
+def evaluate(
+    coefficients: NDArray[np.floating],
+    place: NDArray[np.integer],
+    x: NDArray[np.float64],
+    a: NDArray[np.float64],
+    distances: Span,
+    amplitudes: Span,
+) -> NDArray[np.float64]:
+    """Σ coefficients[i, j, place] xⁱ aʲ; outside the domain x and a are moved to its edge, NaN stays NaN.
+
+    The powers of the amplitude are summed once for all of a sample's distances. Where there is none but the zeroth,
+    the amplitude is not looked at and may be NaN.
+
+    Args:
+        coefficients: (i, j, places).
+        place: which coefficients each sample has, (n,) or (1,) for all; instead of n there may be several axes.
+        x: distances (…, n) [m].
+        a: amplitudes, like `place`.
+        distances, amplitudes: the domain.
+
+    Returns:
+        Values (…, n).
+
+    Raises:
+        IndexError: a place that has no coefficients; the compiled loop would not notice.
+    """
+    if place.size and not 0 <= place.min() <= place.max() < coefficients.shape[2]:
+        raise IndexError(f"places {place.min()} to {place.max()} of {coefficients.shape[2]}")
+    x, a = np.ascontiguousarray(x, np.float64), np.asarray(a, np.float64)
+    outer = x.ndim - max(a.ndim, place.ndim)
+    one = x.shape[outer:]
+    out = np.empty((math.prod(x.shape[:outer]), math.prod(one)))
+    _evaluate(
+        np.ascontiguousarray(coefficients, np.float64),
+        np.broadcast_to(place, one).astype(np.int64).ravel(),
+        x.reshape(out.shape),
+        np.ascontiguousarray(np.broadcast_to(a, one)).ravel(),
+        np.array([*distances, *amplitudes], np.float64),
+        out,
+    )
+    return out.reshape(x.shape)
+
+
+@kernel
+def _evaluate(
+    coefficients: NDArray[np.float64],
+    place: NDArray[np.int64],
+    x: NDArray[np.float64],
+    a: NDArray[np.float64],
+    domain: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    """Horner's scheme, first in the amplitude and then in the distance, block by block so that its loops vectorise."""
+    nearest, farthest, faintest, brightest = domain
+    rows, columns, _ = coefficients.shape
+    sums = np.empty((rows, _BLOCK))
+    for first in range(0, x.shape[1], _BLOCK):
+        last = min(first + _BLOCK, x.shape[1])
+        at, amplitude = place[first:last], a[first:last]
+        for i in range(rows):
+            partial = sums[i]
+            for k in range(last - first):
+                partial[k] = coefficients[i, columns - 1, at[k]]
+            for j in range(columns - 2, -1, -1):
+                plane = coefficients[i, j]
+                for k in range(last - first):
+                    v = amplitude[k]
+                    inside = faintest if v < faintest else (brightest if v > brightest else v)
+                    partial[k] = partial[k] * inside + plane[at[k]]
+        for node in range(x.shape[0]):
+            distance, value = x[node, first:last], out[node, first:last]
+            for k in range(last - first):
+                value[k] = sums[rows - 1, k]
+            for i in range(rows - 2, -1, -1):
+                partial = sums[i]
+                for k in range(last - first):
+                    v = distance[k]
+                    inside = nearest if v < nearest else (farthest if v > farthest else v)
+                    value[k] = value[k] * inside + partial[k]

@@ -1,0 +1,130 @@
+"""Mean and deviation as polynomials in distance and amplitude (eq. 18), one pair for every region of the image."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.noise import fitting, maps, shrinkage
+from calib.noise.base import NoiseError, Pixels
+from calib.noise.polynomial import Polynomials
+from calib.noise.samples import Samples
+
+
+@dataclass(frozen=True, eq=False)
+class RegionPolynomial:
+    """μ_r(x, a) = Σ mu[i, j, r] xⁱ aʲ, likewise σ_r, for the region r that the pixel lies in.
+
+    Attributes:
+        labels: region (height, width) of every pixel, 0 to regions − 1.
+        sigma, mu: coefficients (i, j, regions) [m].
+        distances, amplitudes: calibrated domain, shape (2,); the polynomials keep their edge value outside.
+        least_sigma: lower bound of the deviation [m].
+    """
+
+    labels: NDArray[np.integer]
+    sigma: NDArray[np.floating]
+    mu: NDArray[np.floating]
+    distances: NDArray[np.floating]
+    amplitudes: NDArray[np.floating]
+    least_sigma: float = 1e-4
+
+    @property
+    def uses_amplitude(self) -> bool:
+        """Whether a power of the amplitude occurs."""
+        return self._polynomials.use_amplitude
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the images that it is for."""
+        height, width = self.labels.shape
+        return height, width
+
+    def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
+        """Mean offset μ_r(x, a) [m]."""
+        return self._polynomials.mean(x, a, self.labels[p])
+
+    def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
+        """Standard deviation σ_r(x, a) [m]."""
+        return self._polynomials.deviation(x, a, self.labels[p])
+
+    def save(self, file: Path) -> None:
+        """Writes the .npz that `Settings` reads."""
+        np.savez_compressed(
+            file,
+            labels=self.labels,
+            sigma=self.sigma,
+            mu=self.mu,
+            distances=self.distances,
+            amplitudes=self.amplitudes,
+            least_sigma=self.least_sigma,
+        )
+
+    @property
+    def _polynomials(self) -> Polynomials:
+        return Polynomials(self.sigma, self.mu, tuple(self.distances), tuple(self.amplitudes), self.least_sigma)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys.
+
+    Attributes:
+        file: an .npz with the arrays labels (height, width), sigma, mu (i, j, regions), distances (2,), amplitudes (2,)
+            and, if it is not 1e-4, least_sigma ().
+    """
+
+    file: Path
+
+    def build(self) -> RegionPolynomial:
+        """Loads the map and the tables.
+
+        Raises:
+            NoiseError: the file or one of its arrays is missing or has the wrong shape, or a region has no table.
+        """
+        arrays = maps.load(self.file, {"labels", "sigma", "mu"})
+        labels, sigma, mu = arrays["labels"], arrays["sigma"], arrays["mu"]
+        if sigma.ndim != 3 or mu.ndim != 3 or sigma.shape[2] != mu.shape[2]:
+            raise NoiseError(f"sigma and mu in {str(self.file)!r} must be (i, j, regions) of as many regions")
+        if labels.ndim != 2 or not np.issubdtype(labels.dtype, np.integer):
+            raise NoiseError(f"labels in {str(self.file)!r} must be whole numbers (height, width)")
+        if labels.min() < 0 or labels.max() >= sigma.shape[2]:
+            raise NoiseError(
+                f"labels in {str(self.file)!r} must be 0 to {sigma.shape[2] - 1}, the regions that sigma and mu have, "
+                f"not {labels.min()} to {labels.max()}"
+            )
+        least = float(arrays["least_sigma"])
+        return RegionPolynomial(labels.astype(np.int64), sigma, mu, arrays["distances"], arrays["amplitudes"], least)
+
+
+def blocks(height: int, width: int, side: int) -> NDArray[np.int64]:
+    """Labels (height, width) of square regions of `side` pixels, row by row."""
+    rows, columns = np.indices((height, width)) // side
+    return rows * (columns.max() + 1) + columns
+
+
+def fit(
+    samples: Samples,
+    labels: NDArray[np.integer],
+    sigma_degrees: tuple[int, int],
+    mu_degrees: tuple[int, int],
+    own_degree: int = 1,
+) -> RegionPolynomial:
+    """The image's polynomials, and how each region differs from them as far as its samples tell.
+
+    Args:
+        samples: measurements.
+        labels: region (height, width) of every pixel, 0 and up; such as `blocks`.
+        sigma_degrees, mu_degrees: the image's highest powers of the distance and of the amplitude.
+        own_degree: highest power of the distance in a region's own mean offset. Its own deviation is a factor.
+
+    Raises:
+        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude.
+    """
+    image = fitting.polynomials(samples, sigma_degrees, mu_degrees)
+    samples = samples.returns(with_amplitude=image.use_amplitude)
+    parents = np.zeros(int(labels.max()) + 1, np.int64)
+    law = shrinkage.refine(image, parents, samples, labels[samples.pixels], own_degree)
+    domain = np.array(law.distances), np.array(law.amplitudes)
+    return RegionPolynomial(labels, law.sigma, law.mu, *domain, law.least_sigma)
