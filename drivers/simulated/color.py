@@ -7,10 +7,10 @@ from scipy.special import ndtri
 from calib.camera import Camera
 from calib.jit import kernel
 from drivers.frame import Frame, Kind
+from drivers.simulated.body import Appearance
 from drivers.simulated.exposure import Exposure, stream_of
-from drivers.simulated.motion import Placement
-from drivers.simulated.scene import Scene
-from drivers.simulated.view import Sight, View
+from drivers.simulated.scene import Moment, Scene
+from drivers.simulated.view import View
 
 #: Standard deviation of a pixel's channel, in levels of 256.
 SIGMA = 2.5
@@ -29,12 +29,11 @@ class Picture:
         self._view = View(scene, camera)
         self._wall = _levels(self._view.wall)
 
-    def take(self, placement: Placement) -> NDArray[np.float32]:
+    def take(self, moment: Moment) -> NDArray[np.float32]:
         """Levels at one moment; a pixel at a rim holds the mean of what it sees."""
-        sight = self._view.look(placement)
-        share = sight.share[..., None]
         levels = self._wall.copy()
-        levels[sight.region] += share * (_levels(sight) - levels[sight.region])
+        for sight in self._view.look(moment):
+            levels[sight.region] += sight.share[..., None] * (_levels(sight) - levels[sight.region])
         return levels
 
 
@@ -49,7 +48,7 @@ class Color:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the colour image of one exposure."""
-        levels = self._picture.take(exposure.placement)
+        levels = self._picture.take(exposure.moment)
         return [exposure.frame(self.streams[0], self.camera, _digitize(levels, self._sigma, exposure.generator))]
 
 
@@ -64,11 +63,11 @@ class Bayer:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the mosaic of one exposure."""
-        levels = _mosaic(self._picture.take(exposure.placement))
+        levels = _mosaic(self._picture.take(exposure.moment))
         return [exposure.frame(self.streams[0], self.camera, _digitize(levels, self._sigma, exposure.generator))]
 
 
-def _levels(sight: Sight) -> NDArray[np.float32]:
+def _levels(sight: Appearance) -> NDArray[np.float32]:
     """Colours (height, width, 3) in levels of 256; 0 where the sight is empty."""
     brightness = 255 * (1 - SHADING * (1 - np.nan_to_num(sight.cosine)))
     return (sight.albedo[..., :3] * brightness[..., None]).astype(np.float32, copy=False)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from drivers.device import StreamInfo
 from drivers.frame import Frame, Geometry, Kind
-from drivers.simulated.motion import Placement
+from drivers.simulated.scene import Moment
 
 #: Rate of the simulated device's own clock [1/s].
 TICK_HZ = 1e9
@@ -21,7 +21,7 @@ class Exposure:
 
     Attributes:
         seq: number of the exposure.
-        placement: of the surface at this moment.
+        moment: what is where.
         generator: source of this head's noise in this exposure.
         t_ns: time since the first exposure [ns].
         jitter_ns: what the stamp errs by [ns].
@@ -29,7 +29,7 @@ class Exposure:
     """
 
     seq: int
-    placement: Placement
+    moment: Moment
     generator: np.random.Generator
     t_ns: int
     jitter_ns: int = 0

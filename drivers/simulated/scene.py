@@ -1,82 +1,61 @@
-"""The scenes there are: a sheet that bends, a flat board, each before a textured wall."""
+"""A scene: surfaces to track, what may hide them, and the wall behind everything."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulated.motion import Motion, Placement
-from drivers.simulated.surface import surface_points
-from drivers.simulated.texture import Texture, checkerboard, smooth_pattern
+from calib import pose
+from drivers.simulated.body import Body, Surface, SurfaceBody, Thing
+from drivers.simulated.texture import Texture
 
-#: Distance of the sheet at rest, and of the wall behind it, along the rig's z axis [m].
+#: Distance of a surface at rest, and of the wall behind it, along the rig's z axis [m].
 REST_Z, WALL_Z = 1.0, 1.6
 
-#: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
-_WALL = (4.0, 3.0)
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """What is where at one moment.
+
+    Attributes:
+        surfaces: what is to be tracked.
+        occluders: what is in front of it.
+    """
+
+    surfaces: tuple[SurfaceBody, ...]
+    occluders: tuple[Body, ...] = ()
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies; whatever hides another comes after it."""
+        return (*self.surfaces, *self.occluders)
+
+    def hidden(self, points_r: NDArray[np.float64], eye_r: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which of some rig points (rows, columns, 3) [m] a body keeps from an eye at `eye_r` (3,) [m].
+
+        A point on a surface is hidden by the surface's other parts as by everything else. Whether it lies in an image
+        is another question.
+        """
+        hidden = np.zeros(points_r.shape[:-1], np.bool_)
+        for body in self.bodies:
+            hidden |= body.shadowed(points_r, eye_r, pose.identity())
+        return hidden
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A moving rectangle and the wall z = `WALL_Z` behind it.
+    """Things that move before the wall z = `WALL_Z`.
 
     Attributes:
-        width, height: of the rectangle [m].
-        motion: of the rectangle.
-        texture: of the rectangle.
+        surfaces: what is to be tracked; none ever hides another.
         wall: texture of the wall, centred on the rig's z axis.
+        occluders: what is always in front of the surfaces.
     """
 
-    width: float
-    height: float
-    motion: Motion
-    texture: Texture
+    surfaces: tuple[Surface, ...]
     wall: Texture
+    occluders: tuple[Thing, ...] = ()
 
-    def grid(self, placement: Placement, rows: int, columns: int) -> NDArray[np.float64]:
-        """Rig coordinates (rows, columns, 3) [m] of a regular grid of material points that reaches the rims."""
-        a = np.linspace(-self.width / 2, self.width / 2, columns)
-        b = np.linspace(-self.height / 2, self.height / 2, rows)
-        return surface_points(placement, *np.meshgrid(a, b))
-
-
-def sheet(seed: int, bend: float, speed: float) -> Scene:
-    """A sheet of 0.30 × 0.20 m that bends by up to `bend` [rad] while it moves and turns."""
-    width, height = 0.30, 0.20
-    motion = Motion(
-        seed=seed,
-        rest=(0.0, 0.0, REST_Z),
-        translation=(0.04, 0.03, 0.05),
-        rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)),
-        bend=bend,
-        width=width,
-        height=height,
-        turn=np.deg2rad(35),
-        shift=0.02,
-        speed=speed,
-    )
-    pattern = smooth_pattern(seed, width, height, (0.025, 0.01, 0.004), 800.0, color=(0.1, 0.95), infrared=(0.35, 0.9))
-    return Scene(width, height, motion, pattern, _wall(seed))
-
-
-def board(seed: int, bend: float, speed: float) -> Scene:
-    """A rigid checker board of 0.30 × 0.20 m, squares of 50 mm, that moves and turns; nothing bends it."""
-    width, height = 0.30, 0.20
-    motion = Motion(
-        seed=seed,
-        rest=(0.0, 0.0, REST_Z),
-        translation=(0.06, 0.05, 0.08),
-        rotation=(np.deg2rad(20), np.deg2rad(20), np.deg2rad(15)),
-        bend=0.0,
-        width=width,
-        height=height,
-        turn=0.0,
-        shift=0.0,
-        speed=speed,
-    )
-    return Scene(width, height, motion, checkerboard(width, height, 0.05), _wall(seed))
-
-
-def _wall(seed: int) -> Texture:
-    """Paler than the sheet, and so dark in places that a time-of-flight sensor gets no return."""
-    return smooth_pattern(seed + 1, *_WALL, (0.2, 0.05), 100.0, color=(0.3, 0.6), infrared=(0.12, 0.7))
+    def at(self, t: float) -> Moment:
+        """Where everything is at time `t` [s] after the start."""
+        return Moment(tuple(surface.at(t) for surface in self.surfaces), tuple(thing.at(t) for thing in self.occluders))

@@ -39,12 +39,12 @@ class Simulation:
     def expose(self, k: int) -> tuple[list[Frame], Truth]:
         """The frames of all heads and the truth at exposure `k`; times count from exposure 0."""
         t_ns = self.time_ns(k)
-        placement = self.scene.motion.at(t_ns * 1e-9)
+        moment = self.scene.at(t_ns * 1e-9)
         frames: list[Frame] = []
         for name, head in self.heads.items():
             seeds = np.random.SeedSequence([self.seed, k, zlib.crc32(name.encode())])
             generator = np.random.Generator(np.random.SFC64(seeds))
             jitter = round(self.jitter_ns * generator.standard_normal())
-            frames += head.expose(Exposure(k, placement, generator, t_ns, jitter, self.jitter_ns))
-        points_r = self.scene.grid(placement, *self.truth_size).astype(np.float32)
+            frames += head.expose(Exposure(k, moment, generator, t_ns, jitter, self.jitter_ns))
+        points_r = moment.surfaces[0].grid(*self.truth_size).astype(np.float32)
         return frames, Truth(k, t_ns, points_r)

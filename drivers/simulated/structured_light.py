@@ -31,8 +31,8 @@ class StructuredLightNoise:
 class StructuredLight:
     """Stream `depth` (z in mm, 16UC1, 0 without return).
 
-    There is no return where the sheet's rim crosses a pixel, where the sheet keeps the projector's light away (its
-    shadow lies beside it), and from surfaces that are nearly seen edge-on. The wall always returns.
+    There is no return where a rim crosses a pixel, where a body keeps the projector's light away (its shadow lies
+    beside it), and from surfaces that are nearly seen edge-on. The wall always returns.
 
     Attributes:
         PROJECTOR_S: position of the projector in the sensor frame [m]; its distance is the baseline of a Kinect v1.
@@ -55,14 +55,18 @@ class StructuredLight:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes the depth of one exposure."""
-        sight = self._view.look(exposure.placement)
+        sights = self._view.look(exposure.moment)
         distance = self._view.wall.distance.copy()
-        distance[sight.region] = np.where(sight.share == 1, sight.distance, distance[sight.region])
-        lost = np.isnan(distance)
-        lost[sight.region] |= (sight.share > 0) & (sight.share < 1)
-        lost[sight.region] |= (sight.share == 1) & (sight.cosine < self.noise.least_cosine)
-        beside = self._beside(sight.region)
-        lost[beside] |= self._view.shadow(exposure.placement, distance[beside], beside, self.PROJECTOR_S)
+        lost = np.zeros(distance.shape, np.bool_)
+        for sight in sights:
+            full = sight.share == 1
+            distance[sight.region] = np.where(full, sight.distance, distance[sight.region])
+            flat = sight.cosine < self.noise.least_cosine
+            lost[sight.region] = np.where(full, flat, lost[sight.region] | (sight.share > 0))
+        lost |= np.isnan(distance)
+        for body, sight in zip(exposure.moment.bodies, sights):
+            beside = self._beside(sight.region)
+            lost[beside] |= self._view.shadow(body, distance[beside], beside, self.PROJECTOR_S)
         depth = np.where(lost, 0, self._digitize(distance * self._view.rays[..., 2], exposure.generator))
         millimetres = np.clip(np.rint(depth * 1000), 0, 65535).astype("<u2")
         return [exposure.frame(self.streams[0], self.camera, millimetres, scale=0.001, geometry=Geometry.Z, invalid=0)]
@@ -73,9 +77,9 @@ class StructuredLight:
         return 1 / (steps * self.noise.step)
 
     def _beside(self, region: tuple[slice, slice]) -> tuple[slice, slice]:
-        """The region and as many columns to its left as the shadow on anything behind the sheet can be wide.
+        """The region and as many columns to its left as the shadow on anything behind a body can be wide.
 
-        A point at infinity behind a sheet at half a metre is the worst case.
+        A point at infinity behind a body at half a metre is the worst case.
         """
         rows, columns = region
         width = int(np.ceil(self.PROJECTOR_S[0] * self.camera.fx / 0.5))

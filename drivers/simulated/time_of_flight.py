@@ -62,7 +62,7 @@ class TimeOfFlight:
     """Streams `depth` (radial, 16UC1 in steps of `RANGE_M` / `LEVELS`) and `amplitude` (16UC1).
 
     The amplitude is `WHITE` · reflectivity · cosine of incidence / distance². A pixel at a rim mixes what it sees of
-    sheet and wall by their amplitudes, which puts its distance between the two ("flying pixel").
+    a body and what is behind it by their amplitudes, which puts its distance between the two ("flying pixel").
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class TimeOfFlight:
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes depth and amplitude of one exposure."""
-        distance, amplitude = self.ideal(self._view.look(exposure.placement))
+        distance, amplitude = self.ideal(self._view.look(exposure.moment))
         normal = exposure.generator.standard_normal((2, *distance.shape), np.float32)
         with np.errstate(divide="ignore", invalid="ignore"):
             measured = distance + self.noise.mu(amplitude) + self.noise.sigma(distance, amplitude) * normal[0]
@@ -94,16 +94,17 @@ class TimeOfFlight:
             exposure.frame(self.streams[1], self.camera, levels),
         ]
 
-    def ideal(self, sight: Sight) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def ideal(self, sights: tuple[Sight, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance [m] and amplitude (height, width) before any noise; mixed at the rims, NaN where nothing is seen."""
         distance, amplitude = self._view.wall.distance.copy(), self._wall_amplitude.copy()
-        sheet = sight.share * _amplitude(sight)
-        wall = (1 - sight.share) * amplitude[sight.region]
-        some = sight.share > 0
-        with np.errstate(invalid="ignore", divide="ignore"):
-            mixed = (sheet * sight.distance + wall * distance[sight.region]) / (sheet + wall)
-        distance[sight.region] = np.where(some, mixed, distance[sight.region])
-        amplitude[sight.region] = np.where(some, sheet + wall, amplitude[sight.region])
+        for sight in sights:
+            body = sight.share * _amplitude(sight)
+            behind = (1 - sight.share) * amplitude[sight.region]
+            some = sight.share > 0
+            with np.errstate(invalid="ignore", divide="ignore"):
+                mixed = (body * sight.distance + behind * distance[sight.region]) / (body + behind)
+            distance[sight.region] = np.where(some, mixed, distance[sight.region])
+            amplitude[sight.region] = np.where(some, body + behind, amplitude[sight.region])
         return distance, amplitude
 
 

@@ -1,38 +1,27 @@
-"""What one camera sees of a scene: the wall once for all, the sheet anew for every exposure."""
+"""What one camera sees of a scene: the wall once for all, the bodies before it anew for every exposure."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import pose
 from calib.camera import Camera
-from drivers.simulated.motion import Placement
-from drivers.simulated.raycast import cast, shadowed, soften_edges
-from drivers.simulated.scene import WALL_Z, Scene
+from drivers.simulated.body import Appearance, Body
+from drivers.simulated.scene import WALL_Z, Moment, Scene
 
-#: The sheet is found in the image by a grid of this many points per side; the margin [px] covers what lies between.
-_OUTLINE_POINTS = 13
+#: What a body's outline may miss of it [px].
 _MARGIN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """What a region of an image sees, noise-free; every array covers the region (height, width).
+class Sight(Appearance):
+    """What a region of an image sees of one body.
 
     Attributes:
-        region: rows and columns of the image; outside there is the wall alone.
-        share: part of each pixel that the sheet fills, 0 to 1.
-        distance: radial distance of the sheet [m], NaN where the share is 0; so for the other two.
-        cosine: of the angle of incidence on the sheet.
-        albedo: red, green, blue and infra-red reflectivity of the sheet, (height, width, 4); 0 where the share is 0.
+        region: rows and columns of the image; outside there is nothing of the body.
     """
 
     region: tuple[slice, slice]
-    share: NDArray[np.float32]
-    distance: NDArray[np.float32]
-    cosine: NDArray[np.float32]
-    albedo: NDArray[np.float32]
 
 
 class View:
@@ -40,61 +29,58 @@ class View:
 
     Attributes:
         rays: unit direction of every pixel in the sensor frame, (height, width, 3).
-        wall: what the camera would see without the sheet: a `Sight` of the whole image, its `share` 1.
+        wall: what the camera would see without any body: a `Sight` of the whole image, its `share` 1.
     """
 
     def __init__(self, scene: Scene, camera: Camera) -> None:
-        self._scene = scene
         self._camera = camera
         self.rays = np.ascontiguousarray(camera.rays())
-        self.wall = self._look_at_wall()
+        self.wall = self._look_at_wall(scene)
 
-    def look(self, placement: Placement) -> Sight:
-        """What the camera sees of the sheet."""
-        region = self._region(placement)
-        rays = np.ascontiguousarray(self.rays[region])
-        T_bs, shape = self._into_bend(placement), self._shape(placement)
-        sight, share = cast(rays, T_bs, shape)
-        soften_edges(rays, T_bs, shape, sight, share)
-        distance, a, b, cosine = sight
-        return Sight(region, share, distance, cosine, self._scene.texture.at(a, b))
+    def look(self, moment: Moment) -> tuple[Sight, ...]:
+        """What the camera sees of each body; whatever hides another comes after it."""
+        return tuple(self._look_at(body) for body in moment.bodies)
 
     def shadow(
         self,
-        placement: Placement,
+        body: Body,
         distance: NDArray[np.float32],
         region: tuple[slice, slice],
         light_s: tuple[float, float, float],
     ) -> NDArray[np.bool_]:
-        """Where in a region (height, width) the sheet keeps a light from what the pixels see.
+        """Where in a region (height, width) a body keeps a light from what the pixels see.
 
         Args:
-            placement: of the sheet.
+            body: what may be in between.
             distance: radial distance that the pixels of the region see [m].
             region: rows and columns of the image.
             light_s: position of the light in the sensor frame [m].
         """
-        T_bs = self._into_bend(placement)
-        points_b = pose.transform(T_bs, self.rays[region] * distance[..., None].astype(np.float64))
-        return shadowed(points_b, pose.transform(T_bs, np.asarray(light_s)), self._shape(placement))
+        points_s = self.rays[region] * distance[..., None].astype(np.float64)
+        return body.shadowed(points_s, np.asarray(light_s), self._camera.T_rs)
 
-    def _look_at_wall(self) -> Sight:
+    def _look_at(self, body: Body) -> Sight:
+        region = self._region(body)
+        seen = body.cast(np.ascontiguousarray(self.rays[region]), self._camera.T_rs)
+        return Sight(seen.share, seen.distance, seen.cosine, seen.albedo, region)
+
+    def _look_at_wall(self, scene: Scene) -> Sight:
         directions_r = self.rays @ self._camera.T_rs[:3, :3].T
         with np.errstate(divide="ignore"):
             distance = (WALL_Z - self._camera.center[2]) / directions_r[..., 2]
         distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
         points_r = (self._camera.center + directions_r * distance[..., None]).astype(np.float32)
         return Sight(
-            region=(slice(0, self._camera.height), slice(0, self._camera.width)),
             share=np.ones_like(distance, np.float32),
             distance=distance.astype(np.float32),
             cosine=np.abs(directions_r[..., 2]).astype(np.float32),
-            albedo=self._scene.wall.at(points_r[..., 0], points_r[..., 1]),
+            albedo=scene.wall.at(points_r[..., 0], points_r[..., 1]),
+            region=(slice(0, self._camera.height), slice(0, self._camera.width)),
         )
 
-    def _region(self, placement: Placement) -> tuple[slice, slice]:
-        """Rows and columns that contain the sheet, empty when it is out of sight."""
-        pixels = self._camera.project(self._scene.grid(placement, _OUTLINE_POINTS, _OUTLINE_POINTS)).reshape(-1, 2)
+    def _region(self, body: Body) -> tuple[slice, slice]:
+        """Rows and columns that contain a body, empty when it is out of sight."""
+        pixels = self._camera.project(body.outline()).reshape(-1, 2)
         pixels = pixels[np.isfinite(pixels).all(axis=1)]
         if not pixels.size:
             return slice(0, 0), slice(0, 0)
@@ -102,18 +88,3 @@ class View:
         low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, size).astype(int)
         high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN + 1, 0, size).astype(int)
         return slice(low[1], high[1]), slice(low[0], high[0])
-
-    def _into_bend(self, placement: Placement) -> NDArray[np.float64]:
-        return np.ascontiguousarray(pose.inverse(placement.T_rb) @ self._camera.T_rs)
-
-    def _shape(self, placement: Placement) -> NDArray[np.float64]:
-        return np.array(
-            [
-                placement.curvature,
-                np.cos(placement.direction),
-                np.sin(placement.direction),
-                placement.offset,
-                self._scene.width / 2,
-                self._scene.height / 2,
-            ]
-        )

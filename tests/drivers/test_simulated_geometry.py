@@ -9,9 +9,12 @@ from scipy.optimize import root_scalar
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
-from drivers.simulated import scene
+from drivers.simulated import scenes
 from drivers.simulated.motion import Placement
 from drivers.simulated.raycast import cast, lookup, shadowed
+from drivers.simulated.rectangle import PlacedRectangle, Rectangle
+from drivers.simulated.scene import REST_Z, WALL_Z, Moment, Scene
+from drivers.simulated.scenes import Choices
 from drivers.simulated.surface import surface_points
 from drivers.simulated.view import View
 
@@ -28,9 +31,18 @@ PLACEMENTS = st.builds(
     st.floats(-4, 4),
     st.floats(-0.03, 0.03),
 )
-SHEET = scene.sheet(seed=1, bend=np.deg2rad(60), speed=1.0)
-BOARD = scene.board(seed=1, bend=0.0, speed=1.0)
+SHEET, BOARD = scenes.sheet(Choices()), scenes.board(Choices())
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
+
+
+def rectangle(world: Scene) -> Rectangle:
+    (surface,) = world.surfaces
+    assert isinstance(surface, Rectangle)
+    return surface
+
+
+def moment(placement: Placement) -> Moment:
+    return Moment((PlacedRectangle(0.3, 0.2, rectangle(SHEET).texture, placement),))
 
 
 def shape_of(placement: Placement) -> np.ndarray:
@@ -107,7 +119,7 @@ def test_the_nearest_of_two_intersections_is_seen() -> None:
 def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
     """The shares of all pixels add up to the projected area of the flat sheet."""
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5, lens)
-    sight = View(SHEET, camera).look(Placement(pose.from_rotation_vector((0, 0, 0.3), (0, 0, 1))))
+    (sight,) = View(SHEET, camera).look(moment(Placement(pose.from_rotation_vector((0, 0, 0.3), (0, 0, 1)))))
     corners = [(-0.15, -0.1), (0.15, -0.1), (0.15, 0.1), (-0.15, 0.1)]
     rim = np.concatenate([np.linspace(p, q, 50, endpoint=False) for p, q in zip(corners, corners[1:] + corners[:1])])
     outline = camera.project(surface_points(Placement(pose.from_rotation_vector((0, 0, 0.3), (0, 0, 1))), *rim.T))
@@ -120,13 +132,13 @@ def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
 def test_a_sheet_out_of_sight_is_an_empty_region() -> None:
     view = View(SHEET, CAMERA)
     for elsewhere in ((5.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
-        assert view.look(Placement(pose.from_rotation_vector((0, 0, 0), elsewhere))).share.size == 0
+        assert view.look(moment(Placement(pose.from_rotation_vector((0, 0, 0), elsewhere))))[0].share.size == 0
 
 
 def test_the_wall_is_a_plane() -> None:
     camera = Camera(40, 30, 40.0, 40.0, 19.5, 14.5, T_rs=pose.from_rotation_vector((0.1, 0.2, 0), (0.1, 0, 0.2)))
     points = camera.unproject(View(SHEET, camera).wall.distance)
-    np.testing.assert_allclose(points[..., 2], scene.WALL_Z, atol=1e-6)
+    np.testing.assert_allclose(points[..., 2], WALL_Z, atol=1e-6)
 
 
 def test_shadow_lies_where_the_sheet_is_between_light_and_point() -> None:
@@ -144,12 +156,11 @@ def test_textures_are_interpolated_and_end_at_their_edge() -> None:
 
 
 @pytest.mark.parametrize("world", [SHEET, BOARD])
-def test_motion_begins_at_rest_and_stays_within_reach(world: scene.Scene) -> None:
-    placements = [world.motion.at(k / 30) for k in range(600)]
-    points = np.array([world.grid(placement, 5, 7) for placement in placements])
+def test_motion_begins_at_rest_and_stays_within_reach(world: Scene) -> None:
+    points = np.array([world.surfaces[0].at(k / 30).grid(5, 7) for k in range(600)])
     steps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
     assert np.all(steps[:30] == 0)
-    assert np.all(np.abs(points[0][..., 2] - scene.REST_Z) < 1e-12)
+    assert np.all(np.abs(points[0][..., 2] - REST_Z) < 1e-12)
     assert steps.max() < 0.010
     assert np.median(steps[120:].max(axis=(1, 2))) > 0.002
     assert np.abs(np.diff(steps, axis=0)).max() < 0.002
@@ -159,5 +170,6 @@ def test_motion_begins_at_rest_and_stays_within_reach(world: scene.Scene) -> Non
 
 
 def test_only_the_sheet_bends() -> None:
-    assert max(abs(SHEET.motion.at(k / 30).curvature) for k in range(600)) > 2.0
-    assert all(BOARD.motion.at(k / 30).curvature == 0 for k in range(600))
+    sheet, board = rectangle(SHEET).motion, rectangle(BOARD).motion
+    assert max(abs(sheet.at(k / 30).curvature) for k in range(600)) > 2.0
+    assert all(board.at(k / 30).curvature == 0 for k in range(600))

@@ -101,7 +101,7 @@ def test_deviation_and_offset_of_time_of_flight_follow_the_declared_law() -> Non
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
     depths = np.array([expose(simulation, k)[0]["tof/depth"].si() for k in range(30)])  # the first second is at rest
-    distance, amplitude = head.ideal(head._view.look(simulation.scene.motion.at(0.0)))
+    distance, amplitude = head.ideal(head._view.look(simulation.scene.at(0.0)))
     bright = amplitude > 1000
     normalized = ((depths - distance - head.noise.mu(amplitude)) / head.noise.sigma(distance, amplitude))[:, bright]
     assert head.noise == TimeOfFlightNoise(mu_offset=0.02)
@@ -135,7 +135,7 @@ def test_pixels_at_the_rim_fly_between_sheet_and_wall() -> None:
     simulation = build("sensors=tof&noise=0")
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
-    sight = head._view.look(simulation.scene.motion.at(4.0))
+    (sight,) = head._view.look(simulation.scene.at(4.0))
     depth = expose(simulation, 120)[0]["tof/depth"].si()[sight.region]
     rim = (sight.share > 0.2) & (sight.share < 0.8) & np.isfinite(depth)
     assert rim.sum() > 50

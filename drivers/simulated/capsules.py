@@ -1,0 +1,144 @@
+"""Kernels that follow lines of sight to capsules: segments with a radius, of which a hand is made.
+
+Closed-form, and independent of every model a tracker may use. A capsule is a row (x, y, z of its first end, x, y, z
+from there to its other end, radius) [m], relative to the point where the lines of sight begin.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+
+#: A capsule does not shadow its own lit side: what is nearer to its surface than this is not beyond it [m].
+_CLEARANCE = 2e-3
+
+
+@kernel
+def approach(
+    x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
+) -> tuple[float, float]:
+    """Where the line of sight in the unit direction (x, y, z) comes closest to the segment from a to a + b.
+
+    Seen along the line of sight the segment is one in the plane; its point nearest to the origin is s of its length.
+
+    Returns:
+        (distance along the line of sight [m], distance of the line from the segment [m]).
+    """
+    along_a, along_b = ax * x + ay * y + az * z, bx * x + by * y + bz * z
+    across = bx * bx + by * by + bz * bz - along_b * along_b
+    s = (along_a * along_b - (ax * bx + ay * by + az * bz)) / across if across > 1e-18 else 0.0
+    s = min(max(s, 0.0), 1.0)
+    px, py, pz = ax + s * bx, ay + s * by, az + s * bz
+    along = along_a + s * along_b
+    return along, np.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
+
+
+@kernel
+def enter(
+    x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius: float
+) -> float:
+    """Distance [m] at which the line of sight in the unit direction (x, y, z) enters a capsule; NaN if it misses.
+
+    First the infinite cylinder A λ² + 2 B λ + C = 0; where it is entered beyond an end, the ball at that end.
+    """
+    long = bx * bx + by * by + bz * bz
+    along_a, along_b, ab = ax * x + ay * y + az * z, bx * x + by * y + bz * z, ax * bx + ay * by + az * bz
+    square = ax * ax + ay * ay + az * az
+    A = long - along_b * along_b
+    B = along_b * ab - long * along_a
+    C = long * square - ab * ab - radius * radius * long
+    discriminant = B * B - A * C
+    if discriminant < 0:
+        return np.nan
+    distance = (-B - np.sqrt(discriminant)) / A if A > 1e-18 else 0.0
+    place = distance * along_b - ab  # of the point of entry, from 0 at the first end to `long` at the other
+    if A > 1e-18 and 0 <= place <= long:
+        return distance
+    if (A > 1e-18 and place > long) or (A <= 1e-18 and along_b < 0):
+        along_a, square = along_a + along_b, square + 2 * ab + long
+    discriminant = along_a * along_a - square + radius * radius
+    return along_a - np.sqrt(discriminant) if discriminant >= 0 else np.nan
+
+
+@kernel
+def cast_capsules(
+    rays: NDArray[np.float64], capsules: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]:
+    """What every pixel sees of some capsules.
+
+    A rim covers as much of a pixel as a straight edge at its distance from the pixel's centre would.
+
+    Args:
+        rays: unit directions in the sensor frame, (height, width, 3).
+        capsules: (n, 7), relative to the camera centre in the sensor frame [m].
+
+    Returns:
+        (share, radial distance [m], cosine of incidence, number of the capsule), each (height, width); without a
+        capsule they are 0, NaN, NaN and -1. Where the centre misses, the distance is that of the nearest miss.
+    """
+    height, width = rays.shape[:2]
+    share = np.zeros((height, width), np.float32)
+    distance, cosine = np.full((height, width), np.nan, np.float32), np.full((height, width), np.nan, np.float32)
+    part = np.full((height, width), -1, np.int8)
+    cones = _cones(capsules)
+    for row in range(height):
+        for column in range(width):
+            x, y, z = rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
+            beside = rays[row, column + 1 if column + 1 < width else max(column - 1, 0)]
+            pixel = np.sqrt((beside[0] - x) ** 2 + (beside[1] - y) ** 2 + (beside[2] - z) ** 2)
+            best, nearest = 0.0, np.inf
+            for i in range(len(capsules)):
+                if cones[i, 0] * x + cones[i, 1] * y + cones[i, 2] * z < cones[i, 3] - pixel:
+                    continue
+                ax, ay, az, bx, by, bz, radius = capsules[i]
+                along, miss = approach(x, y, z, ax, ay, az, bx, by, bz)
+                if along <= 0 or miss > radius + 0.5 * pixel * along:
+                    continue
+                covered = min(0.5 + (radius - miss) / (pixel * along), 1.0)
+                found = enter(x, y, z, ax, ay, az, bx, by, bz, radius)
+                entry = along if np.isnan(found) else found
+                if (covered >= 0.5 and entry < nearest) or (best < 0.5 and covered > best):
+                    nearest = entry if covered >= 0.5 else np.inf
+                    px, py, pz = entry * x - ax, entry * y - ay, entry * z - az
+                    s = (px * bx + py * by + pz * bz) / max(bx * bx + by * by + bz * bz, 1e-18)
+                    s = min(max(s, 0.0), 1.0)
+                    outward = (px - s * bx) * x + (py - s * by) * y + (pz - s * bz) * z
+                    distance[row, column], part[row, column] = entry, i
+                    cosine[row, column] = 0.0 if np.isnan(found) else max(-outward / radius, 0.0)
+                best = max(best, covered)
+            share[row, column] = best
+    return share, distance, cosine, part
+
+
+@kernel
+def shadowed_by_capsules(
+    points: NDArray[np.float64], light: NDArray[np.float64], capsules: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether capsules (n, 7), relative to the light, keep the light at `light` (3,) from points (height, width, 3)."""
+    height, width = points.shape[:2]
+    dark = np.zeros((height, width), np.bool_)
+    for row in range(height):
+        for column in range(width):
+            x = points[row, column, 0] - light[0]
+            y, z = points[row, column, 1] - light[1], points[row, column, 2] - light[2]
+            length = np.sqrt(x * x + y * y + z * z)
+            for i in range(len(capsules)):
+                ax, ay, az, bx, by, bz, radius = capsules[i]
+                found = enter(x / length, y / length, z / length, ax, ay, az, bx, by, bz, radius)
+                if 0 < found < length - _CLEARANCE:
+                    dark[row, column] = True
+                    break
+    return dark
+
+
+@kernel
+def _cones(capsules: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A cone around each capsule: its axis (x, y, z) and the cosine of its half angle; most rays are in few of them."""
+    cones = np.empty((len(capsules), 4))
+    for i in range(len(capsules)):
+        middle = capsules[i, 0:3] + 0.5 * capsules[i, 3:6]
+        reach = 0.5 * np.sqrt((capsules[i, 3:6] ** 2).sum()) + capsules[i, 6]
+        away = np.sqrt((middle**2).sum())
+        cones[i, 0:3] = middle / away
+        cones[i, 3] = np.sqrt(1 - (reach / away) ** 2) if reach < away else -1.0
+    return cones

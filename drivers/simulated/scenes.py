@@ -1,0 +1,87 @@
+"""The scenes there are, each before a textured wall; what an address chooses of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.simulated.hand import Hand
+from drivers.simulated.motion import Motion
+from drivers.simulated.rectangle import Rectangle
+from drivers.simulated.scene import REST_Z, Scene
+from drivers.simulated.texture import Texture, checkerboard, smooth_pattern
+
+#: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
+_WALL = (4.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What can be chosen of a scene.
+
+    Attributes:
+        seed: of motion and texture.
+        bend: largest bend of a sheet from end to end [rad].
+        speed: factor on the speed of all motion.
+        hand: whether a hand crosses the view.
+    """
+
+    seed: int = 1
+    bend: float = np.deg2rad(60)
+    speed: float = 1.0
+    hand: bool = False
+
+
+def sheet(choices: Choices) -> Scene:
+    """A sheet of 0.30 × 0.20 m that bends by up to `choices.bend` while it moves and turns."""
+    width, height = 0.30, 0.20
+    motion = Motion(
+        seed=choices.seed,
+        rest=(0.0, 0.0, REST_Z),
+        translation=(0.04, 0.03, 0.05),
+        rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)),
+        bend=choices.bend,
+        width=width,
+        height=height,
+        turn=np.deg2rad(35),
+        shift=0.02,
+        speed=choices.speed,
+    )
+    return _scene(choices, Rectangle(width, height, motion, _print(choices, width, height)))
+
+
+def board(choices: Choices) -> Scene:
+    """A rigid checker board of 0.30 × 0.20 m, squares of 50 mm, that moves and turns; nothing bends it."""
+    width, height = 0.30, 0.20
+    motion = Motion(
+        seed=choices.seed,
+        rest=(0.0, 0.0, REST_Z),
+        translation=(0.06, 0.05, 0.08),
+        rotation=(np.deg2rad(20), np.deg2rad(20), np.deg2rad(15)),
+        bend=0.0,
+        width=width,
+        height=height,
+        turn=0.0,
+        shift=0.0,
+        speed=choices.speed,
+    )
+    return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05)))
+
+
+#: The scenes by the name that an address calls them.
+SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board}
+
+
+def _scene(choices: Choices, *surfaces: Rectangle) -> Scene:
+    hands = (Hand(choices.seed, surfaces, choices.speed),) if choices.hand else ()
+    return Scene(surfaces, _wall(choices.seed), hands)
+
+
+def _print(choices: Choices, width: float, height: float) -> Texture:
+    scales = (0.025, 0.01, 0.004)
+    return smooth_pattern(choices.seed, width, height, scales, 800.0, color=(0.1, 0.95), infrared=(0.35, 0.9))
+
+
+def _wall(seed: int) -> Texture:
+    """Paler than the sheet, and so dark in places that a time-of-flight sensor gets no return."""
+    return smooth_pattern(seed + 1, *_WALL, (0.2, 0.05), 100.0, color=(0.3, 0.6), infrared=(0.12, 0.7))

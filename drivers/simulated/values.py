@@ -1,0 +1,58 @@
+"""Readers of an address's values: what a text means, or a ValueError that says what it must be."""
+
+import re
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+Number = TypeVar("Number", int, float)
+
+#: Least and greatest width and height of images [px].
+_LEAST, _GREATEST = 16, 2048
+
+
+def number(kind: type[Number], low: float, high: float) -> Callable[[str], Number]:
+    """Reads a number from `low` to `high`."""
+
+    def read(text: str) -> Number:
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not low <= value <= high:
+            raise ValueError(f"a number from {low:g} to {high:g}")
+        return value
+
+    return read
+
+
+def one_of(*words: str) -> Callable[[str], str]:
+    """Reads one of some words."""
+
+    def read(text: str) -> str:
+        if text not in words:
+            raise ValueError(f"one of {sorted(words)}")
+        return text
+
+    return read
+
+
+def some_of(words: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
+    """Reads a list of words with commas in between."""
+    allowed = sorted(words)
+
+    def read(text: str) -> tuple[str, ...]:
+        names = tuple(text.split(","))
+        if not set(names) <= set(allowed) or len(set(names)) != len(names):
+            raise ValueError(f"one or more of {allowed}, each once")
+        return names
+
+    return read
+
+
+def size(text: str) -> tuple[int, int]:
+    """Reads width and height of an image [px], such as 640x480."""
+    match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
+    width, height = (int(number) for number in match.groups()) if match else (0, 0)
+    if not (_LEAST <= width <= _GREATEST and _LEAST <= height <= _GREATEST):
+        raise ValueError(f"WIDTHxHEIGHT, each from {_LEAST} to {_GREATEST}")
+    return width, height
