@@ -114,7 +114,7 @@ def evaluate(
         np.ascontiguousarray(coefficients, np.float64),
         np.broadcast_to(place, one).astype(np.int64).ravel(),
         x.reshape(out.shape),
-        np.ascontiguousarray(np.broadcast_to(a, one)).ravel(),
+        np.broadcast_to(a, one).astype(np.float64).ravel(),
         np.array([*distances, *amplitudes], np.float64),
         out,
     )

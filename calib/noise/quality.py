@@ -7,6 +7,10 @@ import numpy as np
 from calib.noise.base import DepthNoise, log_density
 from calib.noise.fitting import RANGE_M
 from calib.noise.samples import Samples
+from calib.noise.truncation import deviation_within
+
+#: Residuals of more deviations than this say nothing about the variance.
+CUT = 3.0
 
 #: Deviations within which 95 % of a normal distribution lie.
 _DEVIATIONS_95 = 1.959964
@@ -26,7 +30,8 @@ class Quality:
         log_likelihood: mean logarithm of the density of a sample, outliers mixed in; larger is better.
         outlier_share: share of the samples that a uniform density explains better, by maximum likelihood; 0.5 at
             most.
-        variance: of the residuals over their deviations, outliers aside; 1 if the model is right.
+        variance: of the residuals over their deviations, from those within three; 1 if the model is right, NaN if it
+            explains no sample.
         within_one: share within one deviation, outliers aside; 0.683 if the model is right.
         within_95: share within 1.96 deviations, outliers aside; 0.95 if the model is right.
     """
@@ -53,11 +58,11 @@ def judge(model: DepthNoise, samples: Samples) -> Quality:
         inlier = (1 - share) * density / ((1 - share) * density + share / RANGE_M)
         previous, share = share, min(float(1 - inlier.mean()), _MOST_OUTLIERS)
     z = (samples.residual - model.mean(x, a, p)) / model.deviation(x, a, p)
-    total = inlier.sum()
+    near, total = z[np.abs(z) < CUT], max(float(inlier.sum()), 1e-9)
     return Quality(
         log_likelihood=float(np.log((1 - share) * density + share / RANGE_M).mean()),
         outlier_share=share,
-        variance=float((inlier * z**2).sum() / total),
+        variance=deviation_within(float(np.mean(near**2)) if near.size else np.nan, CUT) ** 2,
         within_one=float(inlier[np.abs(z) < 1].sum() / total),
         within_95=float(inlier[np.abs(z) < _DEVIATIONS_95].sum() / total),
     )

@@ -1,0 +1,217 @@
+"""Fits find the simulator's laws again, whatever outliers there are, and know how good they are."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abs_service import plugins
+from calib.noise import constant, fitting, gaussian_polynomial, structured_light, tof_amplitude
+from calib.noise.base import NoiseError
+from calib.noise.quality import judge
+from calib.noise.samples import Samples, domain, from_images
+from tests.calib import laws
+
+SEEDS = range(4)
+
+
+def errors(model, x, a, mean, sigma):
+    """Largest error of the mean offset [m], and of the deviation as a share of it."""
+    p = laws.somewhere(len(x))
+    return np.abs(model.mean(x, a, p) - mean).max(), np.abs(model.deviation(x, a, p) / sigma - 1).max()
+
+
+@pytest.mark.parametrize("outliers", [0.0, 0.05, 0.2])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_time_of_flight_is_found_again_all_over_its_domain(seed, outliers):
+    model = tof_amplitude.fit(laws.time_of_flight(seed, outliers=outliers))
+    x, a = laws.grid()
+    mean, sigma = errors(model, x, a, laws.TOF.mu(a), laws.TOF.sigma(x, a))
+    assert mean < 1e-3
+    assert sigma < 0.10
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_polynomial_fits_where_the_amplitudes_are_of_one_order(seed):
+    """From 2000 to 10000; a polynomial is no 1/a, so it fails over several."""
+    samples = laws.time_of_flight(seed, 40_000, outliers=0.05)
+    samples = samples.take((samples.amplitude > 2000) & (samples.amplitude < 10_000))
+    model = gaussian_polynomial.fit(samples, sigma_degrees=(1, 2), mu_degrees=(1, 2))
+    x, a, p = samples.true, samples.amplitude, samples.pixels
+    assert np.abs(model.mean(x, a, p) - laws.TOF.mu(a)).max() < 1e-3
+    assert np.quantile(np.abs(model.deviation(x, a, p) / laws.TOF.sigma(x, a) - 1), 0.97) < 0.10
+
+
+@pytest.mark.parametrize(("outliers", "floor"), [(0.0, 0.0), (0.1, 0.0), (0.05, 2e-3)])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_structured_light_is_found_again(seed, outliers, floor):
+    samples = laws.structured_light(seed, outliers=outliers, floor=floor)
+    model = structured_light.fit(samples, laws.KINECT.step)
+    x = np.linspace(0.6, 3.5, 30)
+    truth = np.hypot(laws.structured_light_deviation(x), floor)
+    assert errors(model, x, x, 0, truth)[1] < 0.10
+    assert model.noise == pytest.approx(laws.KINECT.random, rel=0.15)
+    assert model.floor == pytest.approx(floor, abs=4e-4)
+    assert model.step == laws.KINECT.step
+
+
+def test_a_step_that_is_larger_than_all_there_is_leaves_no_noise_but_a_model():
+    model = structured_light.fit(laws.structured_light(0), step=0.1)
+    assert 0 < model.noise < 1e-3
+    assert model.floor >= 0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_constant_is_found_again(seed):
+    generator = np.random.default_rng(seed)
+    x = generator.uniform(0.5, 2, 5000)
+    measured = laws.scattered(generator, x - 0.02 + 4e-3 * generator.standard_normal(5000), 0.1)
+    model = constant.fit(Samples(measured, x, np.full(5000, np.nan), *laws.somewhere(5000)))
+    assert model.sigma == pytest.approx(4e-3, rel=0.05)
+    assert model.offset == pytest.approx(-0.02, abs=3e-4)
+
+
+FITS = {
+    "constant": constant.fit,
+    "line": lambda samples: gaussian_polynomial.fit(samples, (1, 0), (1, 0)),
+    "polynomial": lambda samples: gaussian_polynomial.fit(samples, (1, 3), (1, 3)),
+    "law": tof_amplitude.fit,
+}
+
+
+def test_the_more_a_model_says_of_the_sensor_the_likelier_are_samples_that_it_never_saw():
+    known, held_out = laws.time_of_flight(1, outliers=0.05), laws.time_of_flight(2, outliers=0.05)
+    likelihood = [judge(fit(known), held_out).log_likelihood for fit in FITS.values()]
+    assert sorted(likelihood) == likelihood
+    assert likelihood[-1] > likelihood[0] + 0.2
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_as_many_unseen_samples_as_promised_lie_within_one_and_two_deviations(seed):
+    pairs = [
+        (tof_amplitude.fit, laws.time_of_flight),
+        (lambda samples: structured_light.fit(samples, laws.KINECT.step), laws.structured_light),
+    ]
+    for fit, law in pairs:
+        quality = judge(fit(law(seed, outliers=0.05)), law(seed + 100, outliers=0.05))
+        assert quality.within_one == pytest.approx(0.683, abs=0.02)
+        assert quality.within_95 == pytest.approx(0.95, abs=0.01)
+        assert quality.variance == pytest.approx(1, abs=0.05)
+        assert quality.outlier_share == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_model_that_is_wrong_by_a_factor_is_told_by_the_variance():
+    right = tof_amplitude.fit(laws.time_of_flight(1))
+    half = dataclasses.replace(
+        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, least_sigma=1e-4
+    )
+    quality = judge(half, laws.time_of_flight(2))
+    assert quality.variance == pytest.approx(4, rel=0.1)
+    assert quality.within_95 < 0.75
+
+
+def test_a_model_that_explains_nothing_is_no_reason_to_fail():
+    far = constant.Constant(1e-4, offset=1.0)
+    quality = judge(far, laws.time_of_flight(1))
+    assert quality.outlier_share == 0.5
+    assert np.isfinite(quality.log_likelihood)
+    assert np.isnan(quality.variance)
+    assert quality.within_95 == 0
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_the_same_samples_give_the_same_model_and_no_returns_change_nothing(name):
+    samples = laws.time_of_flight(1, 3000, outliers=0.02)
+    lost = Samples(
+        np.array([np.nan, np.inf, -1.0, 0.0, 1.0, 1.0]),
+        np.array([1.0, 1.0, 1.0, 1.0, np.nan, np.inf]),
+        np.full(6, 3000.0),
+        *laws.somewhere(6),
+    )
+    both = Samples(
+        *(np.concatenate([getattr(s, f.name) for s in (samples, lost)]) for f in dataclasses.fields(Samples))
+    )
+    assert FITS[name](samples) == FITS[name](both) == FITS[name](samples)
+
+
+def test_amplitudes_that_are_none_count_only_where_they_are_needed():
+    samples = laws.time_of_flight(1, 3000)
+    samples.amplitude[:1000] = np.nan
+    samples.amplitude[1000:1100] = 0.0
+    assert tof_amplitude.fit(samples) == tof_amplitude.fit(samples.take(np.arange(1100, 3000)))
+    dark = samples.take(np.arange(1000))
+    assert not FITS["line"](dark).uses_amplitude
+    with pytest.raises(NoiseError, match="none of 1000 samples has a distance and an amplitude"):
+        tof_amplitude.fit(dark)
+
+
+def test_without_samples_there_is_no_model():
+    nothing = laws.time_of_flight(1, 10).take(np.zeros(10, bool))
+    for fit in FITS.values():
+        with pytest.raises(NoiseError, match="none of 0 samples"):
+            fit(nothing)
+
+
+def test_arrays_of_different_length_are_no_samples():
+    with pytest.raises(NoiseError, match="one length"):
+        Samples(np.ones(3), np.ones(3), np.ones(2), np.ones(3, int), np.ones(3, int))
+
+
+def test_bright_returns_that_err_more_are_not_read_as_a_negative_law():
+    samples = laws.time_of_flight(3)
+    generator = np.random.default_rng(3)
+    odd = samples.true + (1e-3 + samples.amplitude * 1e-6) * generator.standard_normal(len(samples))
+    model = tof_amplitude.fit(dataclasses.replace(samples, measured=odd))
+    assert model.sigma_amplitude == 0
+    assert model.deviation(*laws.grid(), laws.somewhere(400)).min() > 0
+
+
+def test_where_the_domain_s_corner_holds_no_sample_the_deviation_is_no_less_than_elsewhere():
+    samples = laws.time_of_flight(4)
+    model = gaussian_polynomial.fit(samples, (1, 3), (1, 1))
+    sigma = model.deviation(*laws.grid(), laws.somewhere(400))
+    assert sigma.min() > 0.8 * laws.TOF.sigma(samples.true, samples.amplitude).min()
+
+
+def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
+    samples = laws.time_of_flight(5)
+    everything = tof_amplitude.fit(samples)
+    monkeypatch.setattr(fitting, "LARGEST", 5000)
+    assert len(fitting.thinned(samples)) == 5000
+    x, a = laws.grid()
+    p = laws.somewhere(len(x))
+    ratio = tof_amplitude.fit(samples).deviation(x, a, p) / everything.deviation(x, a, p)
+    assert np.abs(ratio - 1).max() < 0.1
+
+
+def test_measurements_that_are_all_equal_are_fitted_too():
+    """A sensor that repeats itself, at one distance: no spread and no domain, yet a model."""
+    samples = Samples(np.full(100, 1.02), np.full(100, 1.0), np.full(100, 500.0), *laws.somewhere(100))
+    assert constant.fit(samples).offset == pytest.approx(0.02, abs=1e-6)
+    model = FITS["line"](samples)
+    assert model.distances == pytest.approx((0.999, 1.001))
+    assert 0 < model.deviation(np.ones(1), np.ones(1), laws.somewhere(1))[0] < 1e-3
+
+
+def test_the_domain_leaves_outliers_aside():
+    values = np.concatenate([np.linspace(1, 2, 10_000), [1e-3, 500.0]])
+    low, high = domain(values)
+    assert 1 < low < 1.01
+    assert 1.99 < high < 2
+
+
+def test_images_become_samples_pixel_by_pixel():
+    measured = np.arange(12.0).reshape(2, 2, 3)
+    samples = from_images(measured, np.full((2, 3), 0.5), np.nan)
+    assert len(samples) == 12
+    np.testing.assert_array_equal(samples.measured, measured.ravel())
+    np.testing.assert_array_equal(samples.residual, measured.ravel() - 0.5)
+    assert samples.row.tolist() == [0, 0, 0, 1, 1, 1] * 2
+    assert samples.column.tolist() == [0, 1, 2] * 4
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_what_was_fitted_can_be_written_into_a_rig_file(name):
+    model = FITS[name](laws.time_of_flight(1, 3000))
+    assert plugins.load("calib.noise", plugins.table(model), Path()) == model
