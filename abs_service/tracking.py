@@ -14,7 +14,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
-from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
 from abs_service.tracker.tracker import Tracker
@@ -124,6 +124,7 @@ class Tracking:
             model,
             plan.objective.build(self._rig, mesh),
             StretchPrior(mesh, plan.priors.stretch),
+            ShapePrior(model.rest, model.prior),
             MotionPrior(model.rest, model.scales, plan.priors),
             plan.optimizer.build(len(model.rest), np.random.default_rng(plan.seed)),
             plan.status,

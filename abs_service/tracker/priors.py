@@ -58,6 +58,22 @@ class StretchPrior:
         return Linearization((length * scale)[:, 0] - self._inverse_deviation, rows)
 
 
+class ShapePrior:
+    """What a model knows of Θ before any measurement, its `prior`: W (Θ − Θ⁰) is standard normal."""
+
+    def __init__(self, rest: NDArray[np.float64], prior: NDArray[np.float64]):
+        self._rest = rest
+        self._prior = prior
+
+    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Negative log-density (population,) of parameters (population, dim), up to a constant."""
+        return 0.5 * np.sum(((thetas - self._rest) @ self._prior.T) ** 2, axis=1)
+
+    def linearize(self, theta: NDArray[np.float64]) -> Linearization:
+        """The normalised residuals of parameters (dim,), and their derivatives, which are constant."""
+        return Linearization(self._prior @ (theta - self._rest), self._prior)
+
+
 class MotionPrior:
     """Θ_t given the past is normal around the parameters that the last motion predicts.
 

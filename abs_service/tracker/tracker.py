@@ -12,7 +12,7 @@ from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
-from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.terms.base import SensorFit, stack
 
 
@@ -28,6 +28,7 @@ class Tracker:
         model: DeformationModel,
         objective: Objective,
         stretch: StretchPrior,
+        shape: ShapePrior,
         motion: MotionPrior,
         optimizer: Optimizer,
         verdict: status.Settings,
@@ -35,6 +36,7 @@ class Tracker:
         self.model = model
         self._objective = objective
         self._stretch = stretch
+        self._shape = shape
         self._motion = motion
         self._optimizer = optimizer
         self._verdict = verdict
@@ -62,6 +64,7 @@ class Tracker:
         parts = [
             self._objective.linearize(surface, jacobian),
             self._stretch.linearize(surface, jacobian),
+            self._shape.linearize(predicted),
             self._motion.linearize(),
         ]
         linear = stack(parts, len(predicted))
@@ -76,7 +79,8 @@ class Tracker:
     def _cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative logarithm (population,) of likelihood times priors."""
         surface = self.model.deform(thetas)
-        return self._objective.cost(surface) + self._stretch.cost(surface) + self._motion.cost(thetas)
+        priors = self._stretch.cost(surface) + self._shape.cost(thetas) + self._motion.cost(thetas)
+        return self._objective.cost(surface) + priors
 
     def _estimate(
         self,

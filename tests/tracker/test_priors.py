@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.priors import FIRST_INTERVAL_S, LONGEST_INTERVAL_S, MotionPrior, Settings, StretchPrior
+from abs_service.tracker.priors import (
+    FIRST_INTERVAL_S,
+    LONGEST_INTERVAL_S,
+    MotionPrior,
+    Settings,
+    ShapePrior,
+    StretchPrior,
+)
 from tests.tracker.scenes import as_surface, flat, sheet
 
 MS = 1_000_000
@@ -82,6 +89,22 @@ def test_time_that_stands_still_or_goes_back_is_survived(again_ns):
     motion.update(np.ones(2))
     motion.predict(again_ns)
     assert np.isfinite(motion.cost(np.ones((1, 2)))).all()
+
+
+def test_what_a_model_knows_is_normal_around_its_rest():
+    shape = ShapePrior(np.array([1.0, 2.0, 3.0]), np.array([[2.0, 0, 0], [0, 1, -1]]))
+    thetas = np.array([[1.0, 2, 3], [2, 2, 3], [1, 5, 3], [1, 5, 6]])
+    np.testing.assert_allclose(shape.cost(thetas), [0, 2, 4.5, 0])
+    linear = shape.linearize(thetas[1])
+    for step in np.eye(3):
+        moved = shape.cost((thetas[1] + step)[None])[0]
+        assert moved == pytest.approx(0.5 * np.sum((linear.residual + linear.jacobian @ step) ** 2))
+
+
+def test_who_knows_nothing_pays_nothing():
+    shape = ShapePrior(np.zeros(2), np.zeros((0, 2)))
+    np.testing.assert_array_equal(shape.cost(np.ones((3, 2))), 0)
+    assert shape.linearize(np.ones(2)).jacobian.shape == (0, 2)
 
 
 MESH = sheet(height=flat)

@@ -33,11 +33,14 @@ class DeformationModel(Protocol):
         mesh: the mesh it deforms, vertices in the order of `deform`'s output.
         rest: parameters Θ⁰ (dim,) that leave the mesh undeformed.
         scales: size (dim,) of each parameter that moves the surface by about one metre.
+        prior: what is known of Θ before any measurement: a matrix (k, dim) whose product with Θ − Θ⁰ is standard
+            normal; k is 0 where nothing is known.
     """
 
     mesh: Mesh
     rest: NDArray[np.float64]
     scales: NDArray[np.float64]
+    prior: NDArray[np.float64]
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, dim)."""

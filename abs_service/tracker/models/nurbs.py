@@ -69,6 +69,7 @@ class Nurbs:
         mesh: the mesh, its vertices sorted by knot span; a vertex at the surface's edge is moved onto its normal there.
         rest: control points Θ⁰ (dim,) of the rest surface [m].
         scales: ones (dim,), since every parameter is a length.
+        prior: nothing is known (0, dim).
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Nurbs:
         ordered = mesh.reordered(order)
         self.rest = control.reshape(-1)
         self.scales = np.ones_like(self.rest)
+        self.prior = np.zeros((0, self.rest.size))
         self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
         self._offset = offset[order].astype(np.float32)
         tables = spline.rational_basis(u[order], w[order], degree, np.ones(shape))

@@ -32,6 +32,7 @@ class Rigid:
         mesh: the mesh.
         rest: zeros (6,).
         scales: (6,): the rotation [rad] that moves the farthest vertex by one metre, and one metre.
+        prior: nothing is known (0, 6).
     """
 
     def __init__(self, mesh: Mesh):
@@ -42,6 +43,7 @@ class Rigid:
         self._normals = mesh.normals
         radius = np.linalg.norm(self._arms, axis=1).max()
         self.scales = np.repeat([1 / max(radius, 1e-3), 1.0], 3)
+        self.prior = np.zeros((0, 6))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Moves the mesh with every row of `thetas` (population, 6)."""
