@@ -43,27 +43,30 @@ def rational_basis(u: float, w: float, degree: int, weights: np.ndarray) -> np.n
     return products / products.sum()
 
 
-def surface(u: float, w: float, control: np.ndarray, degree: int) -> np.ndarray:
-    """N((u, w), Θ) for control points (rows, columns, 3) of equal weight (2)."""
-    basis = rational_basis(u, w, degree, np.ones(control.shape[:2]))
+def surface(u: float, w: float, control: np.ndarray, weights: np.ndarray, degree: int) -> np.ndarray:
+    """N((u, w), Θ) for control points (rows, columns, 3) and their weights (rows, columns) (2)."""
+    basis = rational_basis(u, w, degree, weights)
     return np.einsum("ij,ijk->k", basis, control)
 
 
-def surface_normal(u: float, w: float, control: np.ndarray, degree: int) -> np.ndarray:
-    """N̂ = ∂u × ∂w / ‖∂u × ∂w‖ for control points (rows, columns, 3) of equal weight."""
-    rows, columns = control.shape[:2]
+def surface_normal(u: float, w: float, control: np.ndarray, weights: np.ndarray, degree: int) -> np.ndarray:
+    """N̂ = ∂u × ∂w / ‖∂u × ∂w‖; with N = A/W, ∂N is the quotient rule's (∂A − N ∂W)/W, whose W cancels here."""
+    rows, columns = weights.shape
     eta_u, eta_w = knots(rows, degree), knots(columns, degree)
     n_u = [base_spline(i, degree, u, eta_u) for i in range(rows)]
     n_w = [base_spline(j, degree, w, eta_w) for j in range(columns)]
     d_u = [base_spline_slope(i, degree, u, eta_u) for i in range(rows)]
     d_w = [base_spline_slope(j, degree, w, eta_w) for j in range(columns)]
-    normal = np.cross(np.einsum("i,j,ijk->k", d_u, n_w, control), np.einsum("i,j,ijk->k", n_u, d_w, control))
+    arms = control - surface(u, w, control, weights, degree)
+    along_u = np.einsum("i,j,ij,ijk->k", d_u, n_w, weights, arms)
+    along_w = np.einsum("i,j,ij,ijk->k", n_u, d_w, weights, arms)
+    normal = np.cross(along_u, along_w)
     return normal / np.linalg.norm(normal)
 
 
-def deform(u: float, w: float, offset: float, control: np.ndarray, degree: int) -> np.ndarray:
+def deform(u: float, w: float, offset: float, control: np.ndarray, weights: np.ndarray, degree: int) -> np.ndarray:
     """D_Θ(v) = N((u, w), Θ) + N̂((u, w), Θ) · o (8)."""
-    return surface(u, w, control, degree) + surface_normal(u, w, control, degree) * offset
+    return surface(u, w, control, weights, degree) + surface_normal(u, w, control, weights, degree) * offset
 
 
 def distort(x: float, y: float, coefficients: np.ndarray) -> tuple[float, float]:

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
-from abs_service.tracker.models.nurbs import Nurbs, Settings, bind
+from abs_service.tracker.models.binding import bind
+from abs_service.tracker.models.nurbs import Nurbs, Settings
 from calib import pose
 from tests import reference
 from tests.tracker.scenes import flat, sheet, wave
@@ -46,11 +47,15 @@ def test_only_the_order_of_the_vertices_changes(case):
     np.testing.assert_array_equal(mesh.chart[place], MESH.chart)
 
 
-def bound(control, degree, count, generator):
+def random_weights(generator: np.random.Generator, shape: tuple[int, int] = (5, 4)) -> np.ndarray:
+    return generator.uniform(0.5, 2.0, shape)
+
+
+def bound(control, weights, degree, count, generator):
     """Parameters, offsets and the vertices that they belong to."""
     u, w = generator.uniform(0.05, 0.95, (2, count))
     offset = generator.uniform(-5e-3, 5e-3, count)
-    vertices = np.array([reference.deform(*at, control, degree) for at in zip(u, w, offset)])
+    vertices = np.array([reference.deform(*at, control, weights, degree) for at in zip(u, w, offset)])
     return u, w, offset, vertices
 
 
@@ -60,34 +65,37 @@ def bent_control(rows=5, columns=4):
 
 
 @pytest.mark.parametrize("degree", [2, 3])
-def test_binding_finds_the_closest_point_and_the_offset(degree):
+@pytest.mark.parametrize("weighted", [False, True])
+def test_binding_finds_the_closest_point_and_the_offset(degree, weighted):
     """Eqs. 6 and 7, from a start that is some way off."""
     generator = np.random.default_rng(7)
-    u, w, offset, vertices = bound(bent_control(), degree, 40, generator)
+    weights = random_weights(generator) if weighted else np.ones((5, 4))
+    u, w, offset, vertices = bound(bent_control(), weights, degree, 40, generator)
     start = np.clip(np.stack([u, w]) + generator.uniform(-0.05, 0.05, (2, 40)), 0, 1)
-    found = bind(vertices, bent_control(), degree, *start)
+    found = bind(vertices, bent_control(), weights, degree, *start)
     np.testing.assert_allclose(found, [u, w, offset], atol=1e-9)
 
 
 def test_binding_far_from_every_normal_is_an_error():
     control = bent_control()
     with pytest.raises(ModelError, match=r"a vertex is 1\d\d\.\d mm away .* larger margin help"):
-        bind(np.array([[0.35, 0.0, 1.0]]), control, 2, np.array([0.9]), np.array([0.5]))
+        bind(np.array([[0.35, 0.0, 1.0]]), control, np.ones((5, 4)), 2, np.array([0.9]), np.array([0.5]))
 
 
 @pytest.mark.parametrize(("shape", "degree"), [((4, 4), 2), ((5, 4), 3), ((7, 3), 1), ((6, 6), 4)])
-@given(seed=seeds)
-def test_deformation_is_eq_8(shape, degree, seed):
+@given(seed=seeds, weighted=st.booleans())
+def test_deformation_is_eq_8(shape, degree, seed, weighted):
     generator = np.random.default_rng(seed)
     u, w, offset = *generator.uniform(0, 1, (2, 9)), generator.uniform(-0.02, 0.02, 9)
     mesh = sheet(3, 3)
     rest = bent_control(*shape)
-    model = Nurbs(mesh, rest, degree, u, w, offset)
+    weights = random_weights(generator, shape) if weighted else np.ones(shape)
+    model = Nurbs(mesh, rest, weights, degree, u, w, offset)
     control = rest + generator.normal(0, 0.01, rest.shape)
     surface = model.deform(control.reshape(1, -1))
     place = [np.flatnonzero((model.mesh.colors == color).all(axis=1))[0] for color in mesh.colors]
-    expected = [reference.deform(*at, control, degree) for at in zip(u, w, offset)]
-    normals = [reference.surface_normal(*at, control, degree) for at in zip(u, w)]
+    expected = [reference.deform(*at, control, weights, degree) for at in zip(u, w, offset)]
+    normals = [reference.surface_normal(*at, control, weights, degree) for at in zip(u, w)]
     np.testing.assert_allclose(surface.vertices[0].T[place], expected, atol=2e-6)
     np.testing.assert_allclose(surface.normals[0].T[place], normals, atol=2e-4)
 
@@ -157,3 +165,33 @@ def test_a_mesh_that_the_surface_cannot_follow_is_refused():
     mesh = sheet(height=lambda x, y: flat(x, y) + 0.3 * (np.sin(60 * x) > 0))
     with pytest.raises(ModelError, match="away from the normal of its closest surface point"):
         Settings(control_points=(3, 3)).of_mesh(mesh)
+
+
+def test_the_surface_comes_closer_to_a_heavier_control_point():
+    """And the mesh at rest stays where it is, whatever the weights: the control points are fitted with them."""
+    gaps = []
+    for weight in (0.5, 1.0, 4.0):
+        rows = tuple(tuple(weight if (i, j) == (1, 2) else 1.0 for j in range(4)) for i in range(4))
+        model = Settings(weights=rows).of_mesh(MESH)
+        np.testing.assert_allclose(model.mesh.vertices[order_of(model.mesh)], MESH.vertices, atol=1e-6)
+        theta = model.rest.copy().reshape(4, 4, 3)
+        theta[1, 2, 2] -= 0.1
+        gaps.append(np.abs(vertices_of(model, theta.ravel())[:, 2] - model.mesh.vertices[:, 2]).max())
+    assert gaps[0] < 0.8 * gaps[1]
+    assert gaps[1] < 0.8 * gaps[2]
+    assert gaps[2] < 0.1
+
+
+def test_equal_weights_are_no_weights():
+    weighted = Settings(control_points=(3, 5), weights=((2.0,) * 5,) * 3).of_mesh(MESH)
+    plain = Settings(control_points=(3, 5)).of_mesh(MESH)
+    np.testing.assert_allclose(weighted.rest, plain.rest, atol=1e-9)
+    np.testing.assert_array_equal(weighted.mesh.vertices, plain.mesh.vertices)
+
+
+@pytest.mark.parametrize("weights", [((1.0,) * 4,) * 3, ((1.0,) * 3,) * 4, ((1.0,) * 4, (1.0,) * 3) * 2])
+def test_weights_that_are_not_one_per_control_point_are_refused(weights):
+    with pytest.raises(
+        ValueError, match=r"4 rows of 4 numbers, one for each of control_points = \[4, 4\], not rows of"
+    ):
+        Settings(weights=weights)

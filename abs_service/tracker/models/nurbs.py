@@ -9,15 +9,12 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models import spline
+from abs_service.tracker.models import binding, spline
 from abs_service.tracker.models.base import ModelError, Surface
 from abs_service.tracker.sighting import Sighting
 from calib.jit import kernel
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
-
-#: Largest distance [m] between a vertex and the normal of its closest surface point; the vertex moves onto the normal.
-BINDING_TOLERANCE_M = 1e-2
 
 
 @dataclass(frozen=True)
@@ -28,14 +25,26 @@ class Settings:
         control_points: control points along the object's long and short side; Θ has three numbers for each.
         degree: polynomial degree of the splines.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
+        weights: weight of every control point, a table of as many rows and columns; the surface comes closer to a point
+            of more weight than its neighbours. Empty: all 1, a plain B-spline surface.
         smoothing: weight of the bending of the rest surface against the squared distance to the vertices when
             it is fitted; it decides only where the object has no vertices.
     """
 
     control_points: tuple[ControlPoints, ControlPoints] = (4, 4)
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    weights: tuple[tuple[Annotated[float, Interval(gt=0, le=1000)], ...], ...] = ()
     margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
     smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
+
+    def __post_init__(self) -> None:
+        rows, columns = self.control_points
+        if self.weights and [len(row) for row in self.weights] != [columns] * rows:
+            given = ", ".join(str(len(row)) for row in self.weights)
+            raise ValueError(
+                f"weights must be {rows} rows of {columns} numbers, one for each of "
+                f"control_points = [{rows}, {columns}], not rows of {given}"
+            )
 
     def build(self, sighting: Sighting) -> "Nurbs":
         """The surface of an object of any smooth shape.
@@ -56,10 +65,11 @@ class Settings:
                 f"control_points = {list(self.control_points)} is too few for degree = {self.degree}: "
                 f"each direction needs at least {self.degree + 1}"
             )
-        u, w = _chart_parameters(mesh, self.margin)
-        control = _fit_control_points(mesh.vertices, u, w, self)
-        u, w, offset = bind(mesh.vertices, control, self.degree, u, w)
-        return Nurbs(mesh, control, self.degree, u, w, offset)
+        weights = np.array(self.weights) if self.weights else np.ones(self.control_points)
+        u, w = binding.chart_parameters(mesh, self.margin)
+        control = binding.fit_control_points(mesh.vertices, u, w, weights, self.degree, self.smoothing)
+        u, w, offset = binding.bind(mesh.vertices, control, weights, self.degree, u, w)
+        return Nurbs(mesh, control, weights, self.degree, u, w, offset)
 
 
 class Nurbs:
@@ -76,6 +86,7 @@ class Nurbs:
         self,
         mesh: Mesh,
         control: NDArray[np.float64],
+        weights: NDArray[np.float64],
         degree: int,
         u: NDArray[np.float64],
         w: NDArray[np.float64],
@@ -90,7 +101,7 @@ class Nurbs:
         self.prior = np.zeros((0, self.rest.size))
         self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
         self._offset = offset[order].astype(np.float32)
-        tables = spline.rational_basis(u[order], w[order], degree, np.ones(shape))
+        tables = spline.rational_basis(u[order], w[order], degree, weights)
         local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
         self._basis = np.ascontiguousarray(local.transpose(0, 2, 1), np.float32)
         self.mesh = replace(ordered, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
@@ -102,76 +113,6 @@ class Nurbs:
         normals = np.empty_like(vertices)
         _deform(control, self._span_start, self._span_control, self._basis, self._offset, vertices, normals)
         return Surface(vertices, normals)
-
-
-def bind(
-    vertices: NDArray[np.float64],
-    control: NDArray[np.float64],
-    degree: int,
-    u: NDArray[np.float64],
-    w: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Closest surface point (eq. 6) and offset along the normal there (eq. 7) of every vertex.
-
-    Args:
-        vertices: positions (n, 3) [m].
-        control: control points (rows, columns, 3) [m].
-        degree: degree of the surface.
-        u, w: start values (n,) in [0, 1].
-
-    Returns:
-        u, w and offset o [m], each (n,).
-
-    Raises:
-        ModelError: a vertex is far from the normal of its closest point: at the surface's edge, or where it folds.
-    """
-    points = control.reshape(-1, 3)
-    weights = np.ones(control.shape[:2])
-    for _ in range(25):
-        basis, along_u, along_w = spline.rational_basis(u, w, degree, weights)
-        gap = vertices - basis @ points
-        tangents = np.stack([along_u @ points, along_w @ points], axis=-1)
-        step = np.einsum("nij,nj->ni", np.linalg.pinv(tangents), gap)
-        u, w = np.clip(u + step[:, 0], 0, 1), np.clip(w + step[:, 1], 0, 1)
-        if np.all(np.abs(step) < 1e-10):
-            break
-    basis, along_u, along_w = spline.rational_basis(u, w, degree, weights)
-    gap = vertices - basis @ points
-    normals = np.cross(along_u @ points, along_w @ points)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offset = np.einsum("ni,ni->n", gap, normals)
-    astray = np.linalg.norm(gap - offset[:, None] * normals, axis=1).max()
-    if astray > BINDING_TOLERANCE_M:
-        raise ModelError(
-            f"a vertex is {astray * 1e3:.1f} mm away from the normal of its closest surface point: the object "
-            "folds over or the surface does not cover it; fewer control points or a larger margin help"
-        )
-    return u, w, offset
-
-
-def _chart_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Surface parameters (n,) of the vertices: u along the chart's first axis; N̂ points as the mesh's normals do."""
-    low, size = mesh.chart.min(axis=0), np.ptp(mesh.chart, axis=0)
-    u, w = ((mesh.chart - low) / size * (1 - 2 * margin) + margin).T
-    chart = mesh.chart[mesh.faces]
-    (a, b), (c, d) = (chart[:, 1] - chart[:, 0]).T, (chart[:, 2] - chart[:, 0]).T
-    turn = np.sum(a * d - b * c)
-    return (u, w) if turn > 0 else (u, 1 - w)
-
-
-def _fit_control_points(
-    vertices: NDArray[np.float64], u: NDArray[np.float64], w: NDArray[np.float64], settings: Settings
-) -> NDArray[np.float64]:
-    """Control points (rows, columns, 3) that minimise the squared distances plus a little bending."""
-    rows, columns = settings.control_points
-    basis = spline.rational_basis(u, w, settings.degree, np.ones((rows, columns)))[0]
-    bend_u = np.kron(np.diff(np.eye(rows), 2, axis=0), np.eye(columns))
-    bend_w = np.kron(np.eye(rows), np.diff(np.eye(columns), 2, axis=0))
-    bending = np.concatenate([bend_u, bend_w]) * np.sqrt(settings.smoothing * len(vertices) / (rows * columns))
-    system = np.concatenate([basis, bending])
-    target = np.concatenate([vertices, np.zeros((len(bending), 3))])
-    solution = np.linalg.lstsq(system, target, rcond=None)[0]
-    return np.asarray(solution, np.float64).reshape(rows, columns, 3)
 
 
 @kernel
