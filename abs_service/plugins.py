@@ -42,6 +42,8 @@ def load(package: str, table: Any, base: Path) -> Any:
 def settings(module: str, table: Any, base: Path) -> Any:
     """The `Settings` of one module from a table without `type`.
 
+    A field with the metadata `parts = PACKAGE` is a table with a `type` of its own, the `Settings` of a module there.
+
     Raises:
         ProblemsError: unknown keys or values out of range; all of them.
     """
@@ -51,6 +53,12 @@ def settings(module: str, table: Any, base: Path) -> Any:
     allowed = [field.name for field in fields(Settings)]
     # pydantic ignores unknown keys of standard dataclasses, so a misspelt optional key would pass in silence.
     problems = [unknown_key((key,), allowed) for key in table if key not in allowed]
+    nested: dict[str, Any] = {}
+    for key, package in _nested(Settings).items():
+        try:
+            nested |= {key: load(package, table[key], base)} if key in table else {}
+        except ProblemsError as error:
+            problems += [problem.under((key,)) for problem in error.problems]
     try:
         # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.
         made = TypeAdapter(Settings).validate_json(json.dumps(table, default=str), strict=True)
@@ -58,8 +66,14 @@ def settings(module: str, table: Any, base: Path) -> Any:
         raise ProblemsError(problems + from_pydantic(error, lambda _: allowed)) from None
     if problems:
         raise ProblemsError(problems)
-    paths = {field.name: getattr(made, field.name) for field in fields(Settings)}
-    return replace(made, **{name: base / value for name, value in paths.items() if isinstance(value, Path)})
+    values = {field.name: getattr(made, field.name) for field in fields(Settings)}
+    paths = {name: base / value for name, value in values.items() if isinstance(value, Path)}
+    return replace(made, **paths, **nested)
+
+
+def _nested(Settings: Any) -> dict[str, str]:
+    """The fields that are tables with a `type` of their own, and the packages that the types are modules of."""
+    return {field.name: field.metadata["parts"] for field in fields(Settings) if "parts" in field.metadata}
 
 
 def _modules(package: str) -> set[str]:
@@ -77,4 +91,5 @@ def table(made: Any) -> dict[str, Any]:
 
 def plain(made: Any) -> dict[str, Any]:
     """The TOML table that `settings` makes the same settings from."""
-    return TypeAdapter(type(made)).dump_python(made, mode="json", exclude_none=True)
+    values = TypeAdapter(type(made)).dump_python(made, mode="json", exclude_none=True)
+    return values | {name: table(getattr(made, name)) for name in _nested(made)}

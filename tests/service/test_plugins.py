@@ -25,14 +25,25 @@ class Bendy:
 Settings = Bendy
 """
 
+AROUND = """
+from dataclasses import dataclass, field
+from typing import Any
+
+@dataclass(frozen=True)
+class Settings:
+    inner: Any = field(metadata={"parts": "parts_for_test"})
+    size: int = 1
+"""
+
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
-    """A package of parts on disk: one with settings, one without."""
+    """A package of parts on disk: one with settings, one that takes another one, one without."""
     folder = tmp_path / "parts_for_test"
     folder.mkdir()
     (folder / "__init__.py").write_text("")
     (folder / "bendy.py").write_text(BENDY)
+    (folder / "around.py").write_text(AROUND)
     (folder / "base.py").write_text("")
     monkeypatch.syspath_prepend(str(tmp_path))
     yield "parts_for_test"
@@ -52,7 +63,7 @@ def test_the_type_names_the_module_and_the_other_keys_are_its_settings(package):
 
 
 def test_only_modules_with_settings_are_available(package):
-    assert plugins.available(package) == ["bendy"]
+    assert plugins.available(package) == ["around", "bendy"]
 
 
 def test_parts_that_were_not_asked_for_are_not_imported(package, tmp_path):
@@ -74,7 +85,7 @@ def test_a_table_made_from_settings_loads_again(package):
 
 def test_an_unknown_type_is_answered_with_what_there_is(package):
     assert problems(package, {"type": "bendi"}) == [
-        'type = "bendi": no such type, did you mean "bendy"? allowed: bendy'
+        'type = "bendi": no such type, did you mean "bendy"? allowed: around, bendy'
     ]
 
 
@@ -98,4 +109,35 @@ def test_what_the_settings_themselves_refuse_is_told_in_their_words(package):
 
 @pytest.mark.parametrize("table", ["bendy", 3, {}, {"type": 1}])
 def test_what_is_no_table_with_a_type_is_answered_with_an_example(package, table):
-    assert 'must be a table such as { type = "bendy"' in problems(package, table)[0]
+    assert 'must be a table such as { type = "around"' in problems(package, table)[0]
+
+
+def test_a_part_may_hold_another_part(package):
+    inner = {"type": "bendy", "degree": 3, "mask": "a.png"}
+    made = plugins.load(package, {"type": "around", "inner": inner}, Path("/rig"))
+    assert (made.size, made.inner.degree, made.inner.mask) == (1, 3, Path("/rig/a.png"))
+    assert plugins.table(made)["inner"]["type"] == "bendy"
+    assert plugins.load(package, plugins.table(made), Path("/elsewhere")) == made
+
+
+def test_mistakes_in_both_parts_are_told_with_their_full_keys(package):
+    inner = {"type": "bendy", "degreee": 2, "degree": 9}
+    assert problems(package, {"type": "around", "inner": inner, "size": "2", "sice": 2}) == [
+        'sice: unknown key, did you mean "size"? allowed: inner, size',
+        'inner.degreee: unknown key, did you mean "degree"? allowed: control_points, degree, mask',
+        "inner.degree = 9: must be less than or equal to 4",
+        'size = "2": must be a valid integer',
+    ]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({}, "inner: missing, but needed"),
+        ({"inner": "bendy"}, 'inner = "bendy": must be a table such as { type = "around"'),
+        ({"inner": {"type": "bend"}}, 'inner.type = "bend": no such type, did you mean "bendy"?'),
+    ],
+)
+def test_a_part_that_another_one_needs_must_be_one(package, table, message):
+    (problem,) = problems(package, {"type": "around"} | table)
+    assert message in problem
