@@ -9,6 +9,7 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.estimates import Effort, Identity
 from abs_service.health import Health, Level
 from abs_service.observation import ObservationError
+from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker
 from abs_service.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
@@ -107,6 +108,7 @@ class LiveTracker:
         sets: where its frame sets come from.
         publisher: where its estimates go.
         health: what others learn about it.
+        residuals: tells health which noise model is wrong.
         clock: CLOCK_MONOTONIC [ns].
         budget_ms: time that the search may take per frame set; the rest of the interval is for everything else.
     """
@@ -117,6 +119,7 @@ class LiveTracker:
         sets: NewestSets,
         publisher: EstimatePublisher,
         health: Health,
+        residuals: ResidualWatch,
         clock: Callable[[], int],
         budget_ms: float,
     ):
@@ -124,6 +127,7 @@ class LiveTracker:
         self._sets = sets
         self._publisher = publisher
         self._health = health
+        self._residuals = residuals
         self._clock = clock
         self._budget_ns = round(budget_ms * 1e6)
         self._reported = 0
@@ -161,3 +165,4 @@ class LiveTracker:
         message = "" if level == Level.OK else f"{estimate.status}: {'; '.join(estimate.reasons)}"
         self._health.report("observation", Level.OK)
         self._health.report("status", level, message)
+        self._residuals.take(estimate)

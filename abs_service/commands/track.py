@@ -19,6 +19,7 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.commands import participant, plans
 from abs_service.exits import Exit
 from abs_service.health import Health, Level
+from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
 from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
@@ -29,6 +30,7 @@ from calib.noise.base import DepthNoise
 from calib.noise.color import GaussianColor
 from calib.rig import Rig
 from drivers import codec
+from drivers.frame import Kind
 
 #: How long one question for calibrations waits for answers [s].
 ASK_S = 0.5
@@ -93,6 +95,7 @@ def _live(
         NewestSets(frames, synchroniser, time.monotonic_ns),
         EstimatePublisher(bus, speaker, name, plans.model_name(settings, name), rig.calib_id),
         health,
+        ResidualWatch(health, {sensor for sensor, stream in members if stream == Kind.DEPTH}),
         time.monotonic_ns,
         settings.trackers[name].budget_ms,
     )

@@ -12,6 +12,7 @@ from abs_service import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.health import Health
+from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
 from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
@@ -43,6 +44,7 @@ class Bench:
             self.sets,
             EstimatePublisher(self.bus, self.speaker, "sheet", "nurbs", RIG.calib_id),
             self.health,
+            ResidualWatch(self.health, {"tof"}),
             self.clock,
             budget_ms,
         )
@@ -179,6 +181,13 @@ def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
     bench.live.turn()
     assert len(bench.states) == 1
     assert bench.said.level == Message.LEVEL_OK
+
+
+def test_what_the_residuals_say_of_the_noise_models_is_in_health(bench):
+    for k in (0, 31):
+        bench.expose(k)
+        bench.live.turn()
+    assert bench.said.gauges["residual_variance.tof"] == pytest.approx(1, abs=0.5)
 
 
 def test_malformed_messages_are_counted_and_explained(bench):

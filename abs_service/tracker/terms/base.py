@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import ColorImage, DepthImage
 from abs_service.tracker.models.base import Surface
+from calib.noise.truncation import deviation_within
 
 #: Residuals up to this many deviations count as explained by the sensor's noise.
 INLIER_DEVIATIONS = 3.0
@@ -60,8 +61,8 @@ class SensorFit:
         samples: of these, how many met a measurement.
         inliers: of these, how many the measurement's own noise explains.
         mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if that is what the objective sums.
-        normalized_residual: root mean square of the inliers' residuals over their deviations; near 1 if the noise
-            model is right.
+        normalized_residual: deviation of the residuals over their own deviations, told from the inliers: 1 if the noise
+            model is right, 2 if it says half of what is true; NaN where there is none, or no noise model to judge.
     """
 
     sensor: str
@@ -78,10 +79,22 @@ def summarize(
     measured: NDArray[np.bool_],
     residual: NDArray[np.float64],
     mean_log_likelihood: float,
+    channels: int = 1,
 ) -> SensorFit:
-    """Counts what the per-vertex arrays (n,) say; `residual` is the size of each residual in its deviations."""
+    """Counts what the per-vertex arrays (n,) say.
+
+    The parameters that the search fits to the residuals make them smaller by a few per cent; nothing corrects for that.
+
+    Args:
+        sensor: its name.
+        visible, measured: whether a vertex is in sight, and whether there is a measurement of it.
+        residual: size of each residual in its deviations, the root mean square over the channels.
+        mean_log_likelihood: see `SensorFit`.
+        channels: values that a measurement consists of.
+    """
     inlier = measured & (residual < INLIER_DEVIATIONS)
-    spread = float(np.sqrt(np.mean(residual[inlier] ** 2))) if inlier.any() else float("nan")
+    square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
+    spread = deviation_within(square, INLIER_DEVIATIONS, channels)
     return SensorFit(sensor, int(visible.sum()), int(measured.sum()), int(inlier.sum()), mean_log_likelihood, spread)
 
 

@@ -65,7 +65,7 @@ class ColorTerm:
         residual, measured = self._residuals(surface)
         visible = self._synthesis.synthesize(surface).pixel[0] > 0
         mean = -float(self.cost(surface)[0]) / len(residual)
-        return summarize(self.sensor, visible, measured, np.sqrt(np.mean(residual**2, axis=1)), mean)
+        return summarize(self.sensor, visible, measured, np.sqrt(np.mean(residual**2, axis=1)), mean, channels=3)
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and whether there is a measurement (n,)."""

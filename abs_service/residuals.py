@@ -1,0 +1,80 @@
+"""Whether the sensors err as their noise models say: what a tracker's health tells about it, once a second."""
+
+from collections.abc import Set
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service.health import Health, Level
+from abs_service.tracker.estimate import Estimate, Status
+
+#: Time over which residuals are averaged [ns]; at 30 Hz and 300 vertices, their variance is then known to 2 %.
+WINDOW_NS = 1_000_000_000
+
+#: Fewer residuals than this in a window are no evidence.
+LEAST_RESIDUALS = 200
+
+#: The variance of residuals over deviations is 1 if the noise model is right. A warning begins outside the wider limits
+#: and ends within the narrower ones, so that what lies on a limit does not flicker.
+ALLOWED = (0.5, 2.0)
+SETTLED = (0.6, 1.7)
+
+
+@dataclass(slots=True)
+class _Sum:
+    """Residuals of one sensor in one window."""
+
+    number: int = 0
+    squares: float = 0.0
+
+
+class ResidualWatch:
+    """Enters into health the gauge `residual_variance.<sensor>`, and a warning where a sensor's noise model is wrong.
+
+    A depth sensor may err neither more nor less than its model says. The deviation of a colour covers as well what the
+    synthesis leaves out, and that is alike in neighbouring vertices and channels; so the deviation that tracks best is
+    larger than what the residuals show, and only one that is too small is wrong.
+
+    Args:
+        health: of the tracker.
+        depth: names of the depth sensors.
+    """
+
+    def __init__(self, health: Health, depth: Set[str]):
+        self._health = health
+        self._depth = depth
+        self._begin_ns = 0
+        self._sums: dict[str, _Sum] = {}
+        self._warned: set[str] = set()
+
+    def take(self, estimate: Estimate) -> None:
+        """Adds an estimate's residuals; those of an object that is lost say nothing about the noise."""
+        if estimate.status not in (Status.TRACKING, Status.DEGRADED):
+            return
+        if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:
+            for sensor, total in self._sums.items():
+                if total.number >= LEAST_RESIDUALS:
+                    self._judge(sensor, total.squares / total.number)
+            self._begin_ns = estimate.t_host_ns
+            self._sums = {}
+        for fit in estimate.fits:
+            if np.isfinite(fit.normalized_residual):
+                total = self._sums.setdefault(fit.sensor, _Sum())
+                total.number += fit.inliers
+                total.squares += fit.inliers * fit.normalized_residual**2
+
+    def _judge(self, sensor: str, variance: float) -> None:
+        self._health.gauge(f"residual_variance.{sensor}", variance)
+        low, high = SETTLED if sensor in self._warned else ALLOWED
+        wrong = variance > high or (variance < low and sensor in self._depth)
+        (self._warned.add if wrong else self._warned.discard)(sensor)
+        level = Level.WARNING if wrong else Level.OK
+        self._health.report(f"noise of {sensor}", level, _advice(sensor, variance) if wrong else "")
+
+
+def _advice(sensor: str, variance: float) -> str:
+    factor, change = np.sqrt(variance), "larger" if variance > 1 else "smaller"
+    return (
+        f"{sensor} errs {factor:.1f} times as much as its noise model says (variance of its residuals {variance:.1f} "
+        f"instead of 1): make the deviation in sensors.{sensor}.noise {change}, or fit it"
+    )

@@ -1,0 +1,144 @@
+"""Health says which sensor's noise model is wrong, by how much and what to do; a right one is never accused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from abs.v1.health_pb2 import Health as Message
+
+from abs_service.health import Health
+from abs_service.residuals import LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
+from abs_service.stamps import Speaker, WallClock
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.objectives import euclidean
+from abs_service.tracker.optimizers import cma
+from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracking import Tracking
+from tests.service.loopback import LoopbackBus
+from tests.service.test_estimates import ESTIMATE
+from tests.tracker.driving import default_plan, drive, rig_of, simulate
+
+PERIOD_NS = 33_000_000
+OK, WARNING = Message.LEVEL_OK, Message.LEVEL_WARNING
+
+
+class Watch:
+    """A watch over a tracker of the sensors tof, which measures depth, and color."""
+
+    def __init__(self):
+        self.bus = LoopbackBus()
+        self.health = Health(self.bus, "track/sheet", Speaker("demo", WallClock(lambda: 0, lambda: 0)))
+        self.watch = ResidualWatch(self.health, {"tof"})
+        self.t_ns = 10**12
+
+    def see(self, seconds=2.0, status=Status.TRACKING, inliers=250, **variances):
+        """Estimates for so long, whose residuals have these variances by sensor; tells what health says then."""
+        fits = tuple(SensorFit(name, 300, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
+        for _ in range(int(seconds * 1e9 / PERIOD_NS)):
+            self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, status=status, fits=fits))
+            self.t_ns += PERIOD_NS
+        return self.said
+
+    @property
+    def said(self):
+        self.health.publish()
+        return Message.FromString(self.bus.sent[-1].payload)
+
+
+def test_the_variance_of_every_sensor_is_a_gauge():
+    said = Watch().see(tof=1.1, color=0.3)
+    assert said.gauges == {
+        "residual_variance.tof": pytest.approx(1.1),
+        "residual_variance.color": pytest.approx(0.3),
+    }
+    assert (said.level, said.message) == (OK, "")
+
+
+@pytest.mark.parametrize(
+    ("sensor", "variance", "factor", "change"),
+    [("tof", 4.0, "2.0", "larger"), ("tof", 0.25, "0.5", "smaller"), ("color", 9.0, "3.0", "larger")],
+)
+def test_a_wrong_model_is_named_with_its_factor_and_what_to_do(sensor, variance, factor, change):
+    said = Watch().see(**{"tof": 1.0, "color": 1.0, sensor: variance})
+    assert said.level == WARNING
+    assert said.message.startswith(f"{sensor} errs {factor} times as much as its noise model says")
+    assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it")
+
+
+def test_two_wrong_models_are_both_named():
+    message = Watch().see(tof=4.0, color=4.0).message
+    assert "tof errs" in message
+    assert "color errs" in message
+
+
+def test_what_lies_between_the_limits_keeps_what_was_said():
+    watch = Watch()
+    said = [watch.see(tof=variance).level for variance in (1.9, 2.2, 1.9, 1.6, 1.9, 0.45, 0.55, 0.65, 0.55)]
+    assert said == [OK, WARNING, WARNING, OK, OK, WARNING, WARNING, OK, OK]
+
+
+def test_a_few_frames_are_no_evidence():
+    watch = Watch()
+    watch.see(tof=1.0)
+    watch.see(0.1, tof=9.0)
+    assert watch.see(1.0, tof=1.0).level == OK
+    assert 1 < watch.said.gauges["residual_variance.tof"] < 2
+
+
+def test_a_few_residuals_are_no_evidence():
+    said = Watch().see(inliers=LEAST_RESIDUALS // 40, tof=9.0)
+    assert said.level == OK
+    assert not said.gauges
+
+
+def test_an_object_that_is_lost_says_nothing_about_noise():
+    watch = Watch()
+    assert watch.see(status=Status.LOST, tof=9.0).level == OK
+    assert watch.see(status=Status.DEGRADED, tof=9.0).level == WARNING
+
+
+def test_time_that_goes_back_begins_a_new_window():
+    watch = Watch()
+    watch.see(tof=1.0)
+    watch.t_ns -= 100 * WINDOW_NS
+    assert watch.see(tof=4.0).level == WARNING
+
+
+def test_an_objective_without_noise_models_has_none_to_complain_of():
+    said = Watch().see(tof=float("nan"))
+    assert said.level == OK
+    assert not said.gauges
+
+
+def watched(uri, **changes):
+    """What health says after two seconds of the demo rig, whose noise model is that of noise=1."""
+    simulation = simulate(uri)
+    tracking = Tracking(rig_of(simulation), default_plan(optimizer=cma.Settings(generations=2), **changes))
+    watch = Watch()
+    for step in drive(tracking, simulation, range(62)):
+        watch.watch.take(step.estimate)
+    return watch.said
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_demo_rig_s_noise_models_are_right(seed):
+    said = watched(f"simulated://sheet?seed={seed}")
+    assert said.level == OK
+    assert said.gauges["residual_variance.tof"] == pytest.approx(1, abs=0.15)
+    assert 0 < said.gauges["residual_variance.color"] < 1
+
+
+@pytest.mark.parametrize(("noise", "change"), [(2, "larger"), (0.5, "smaller")])
+def test_a_sensor_that_errs_by_another_factor_is_told(noise, change):
+    said = watched(f"simulated://sheet?seed=1&noise={noise}")
+    assert said.level == WARNING
+    assert said.gauges["residual_variance.tof"] == pytest.approx(noise**2, rel=0.2)
+    assert said.message.startswith("tof errs ")
+    assert f"make the deviation in sensors.tof.noise {change}" in said.message
+    assert "color" not in said.message
+
+
+def test_squares_do_not_accuse_noise_models_that_they_do_not_use():
+    said = watched("simulated://sheet?seed=1&noise=2", objective=euclidean.Settings())
+    assert said.level == OK
+    assert not said.gauges
