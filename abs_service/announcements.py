@@ -58,8 +58,8 @@ def sensor_model(
         header: who speaks and when.
         sensor: its name.
         camera: its projection.
-        noise: `type` and parameters of the noise model, as in TOML; empty if the sensor has none. Only what is made of
-            numbers is told, arrays row by row.
+        noise: `type` and parameters of the noise model and the outliers' share and range, as in TOML; empty if the
+            sensor has none. Only what is made of numbers is told, arrays row by row.
     """
     message = sensor_model_pb2.SensorModel(
         header=header,

@@ -17,11 +17,16 @@ class Sensor:
         name: name in the rig.
         camera: projection `P_s`.
         noise: noise model of its distances, or of its colours.
+        outlier_share: share of its measurements that come from anywhere, 0…1; None if nobody knows better than the
+            objective.
+        range_m: distances that it can report at all, if it is a depth sensor [m]; None likewise.
     """
 
     name: str
     camera: Camera
     noise: DepthNoise | GaussianColor
+    outlier_share: float | None = None
+    range_m: float | None = None
 
 
 @dataclass(frozen=True)

@@ -152,9 +152,10 @@ class Crier:
             wall_ns = header.stamp.ToNanoseconds()
             self._put(keys.CONFIG, CONFIG, announcements.config(header, self._toml).SerializeToString())
             for sensor, camera in self._cameras.items():
-                noise = self._rig.sensors[sensor].noise
-                table = {} if noise is None else plugins.table(noise)
-                model = announcements.sensor_model(header, sensor, camera, table)
+                table = self._rig.sensors[sensor]
+                outliers = table.model_dump(include={"outlier_share", "range_m"}, exclude_none=True)
+                noise = {} if table.noise is None else plugins.table(table.noise) | outliers
+                model = announcements.sensor_model(header, sensor, camera, noise)
                 calibration = announcements.calibration(sensor, camera, wall_ns)
                 self._put(keys.model(sensor), MODEL, model.SerializeToString())
                 self._put(keys.calibration(sensor), CALIBRATION, calibration.SerializeToString())

@@ -66,7 +66,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
     for name, sensor in rig.sensors.items():
         with _noting(f"sensors.{name}.noise", problems):
             if sensor.noise is not None:
-                sensor.noise.build()
+                plans.noise(sensor.noise, sensor.range_m)
     for name, tracker in rig.trackers.items():
         with _noting(f"trackers.{name}", problems):
             plans.plan(rig, name)

@@ -1,6 +1,7 @@
 """From the configuration to what a tracker is made of."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from abs_service import plugins
 from abs_service.config import ServiceConfig
@@ -9,6 +10,7 @@ from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.color import GaussianColor
 from calib.noise.pixel_polynomial import PixelPolynomial
+from calib.noise.region_polynomial import RegionPolynomial
 from calib.rig import Rig, Sensor
 
 
@@ -54,7 +56,7 @@ def noises(config: ServiceConfig, tracker: str) -> dict[str, DepthNoise | Gaussi
     """The noise model of every sensor of one tracker.
 
     Raises:
-        PlanError: a sensor has none.
+        PlanError: a sensor has none, or one that does not fit its other keys.
         NoiseError: one cannot be made.
     """
     models: dict[str, DepthNoise | GaussianColor] = {}
@@ -62,8 +64,21 @@ def noises(config: ServiceConfig, tracker: str) -> dict[str, DepthNoise | Gaussi
         settings = config.sensors[name].noise
         if settings is None:
             raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no noise model')
-        models[name] = settings.build()
+        models[name] = noise(settings, config.sensors[name].range_m)
     return models
+
+
+def noise(settings: Any, range_m: float | None) -> DepthNoise | GaussianColor:
+    """The noise model of one sensor, from the `Settings` of a module of `calib.noise`.
+
+    Raises:
+        PlanError: the sensor is said to have a range of distances, but measures none.
+        NoiseError: the model cannot be made.
+    """
+    made = settings.build()
+    if range_m is not None and not isinstance(made, DepthNoise):
+        raise PlanError(f"range_m = {range_m:g} is for sensors that measure distances")
+    return made
 
 
 def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> Rig:
@@ -74,17 +89,18 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
         NoiseError: a noise model cannot be made.
     """
     sensors: dict[str, Sensor] = {}
-    for name, noise in noises(config, tracker).items():
+    for name, model in noises(config, tracker).items():
         if name not in cameras:
             raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no camera model')
-        _check_size(name, noise, cameras[name])
-        sensors[name] = Sensor(name, cameras[name], noise)
+        _check_size(name, model, cameras[name])
+        table = config.sensors[name]
+        sensors[name] = Sensor(name, cameras[name], model, table.outlier_share, table.range_m)
     return Rig(config.name, sensors)
 
 
 def _check_size(sensor: str, noise: DepthNoise | GaussianColor, camera: Camera) -> None:
-    if isinstance(noise, PixelPolynomial) and noise.sigma.shape[2:] != (camera.height, camera.width):
-        height, width = noise.sigma.shape[2:]
+    if isinstance(noise, (PixelPolynomial, RegionPolynomial)) and noise.shape != (camera.height, camera.width):
+        height, width = noise.shape
         raise PlanError(
             f"sensors.{sensor}.noise.file: its maps are for {width} × {height} pixels, "
             f"the camera has {camera.width} × {camera.height}"

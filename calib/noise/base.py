@@ -1,6 +1,6 @@
 """What a noise model is, and the texture into which every depth noise model is rendered (eqs. 17–19)."""
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ class NoiseError(ValueError):
     """Parameters that describe no noise model; names the key and what is allowed."""
 
 
+@runtime_checkable
 class DepthNoise(Protocol):
     """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a.
 

@@ -194,6 +194,7 @@ devices.cam.uri = "fake:x"
 device = "cam"
 head = "head"
 noise = { type = "gaussian_polynomial", sigma = [[1e-2, 2e-3]] }
+outlier_share = 0.1
 [sensors.tof.camera]
 T_rs = { translation = [0.1, 0.2, 0.3] }
 [sensors.color]
@@ -216,6 +217,8 @@ def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configura
     model = SensorModel.FromString(told["tof/model"])
     assert (model.noise, model.fx, model.width) == ("gaussian_polynomial", 5.0, 4)
     assert list(model.noise_parameters["sigma"].values) == [1e-2, 2e-3]
+    assert list(model.noise_parameters["outlier_share"].values) == [0.1]
+    assert "range_m" not in model.noise_parameters
     assert np.reshape(model.T_rs, (4, 4))[:3, 3].tolist() == [0.1, 0.2, 0.3]
     assert SensorModel.FromString(told["color/model"]).calib_id == CAMERA.calib_id
     calibration = CameraCalibration.FromString(told["tof/calibration"])

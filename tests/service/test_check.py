@@ -73,6 +73,11 @@ def test_a_mistake_for_scripts(checked):
         ("sheet?seed=1&sensors=tof", "sheet?seed=x", "seed = 'x' must be a number"),
         ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "none.mcap"),
         ('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }', "trackers.sheet.region: file = "),
+        (
+            'noise = { type = "gaussian_polynomial", sigma = [[0.005]] }',
+            'range_m = 3.0\nnoise = { type = "color" }',
+            "sensors.tof.noise: range_m = 3 is for sensors that measure distances",
+        ),
     ],
 )
 def test_what_reads_well_and_cannot_work_is_named(checked, good, bad, message):

@@ -131,6 +131,10 @@ CASES = {
         '[sensors.ir]\ndevice = "sim"\nnoise = { type = "colour" }\n',
         'sensors.ir.noise.type = "colour": no such type, did you mean "color"? allowed: color,',
     ),
+    "a share of outliers that leaves nothing": (
+        '[sensors.ir]\ndevice = "sim"\noutlier_share = 1.0\n',
+        "sensors.ir.outlier_share = 1.0: must be less than 1",
+    ),
     "a noise model's key": (
         '[sensors.ir]\ndevice = "sim"\nnoise = { type = "color", sigm = 3 }\n',
         'sensors.ir.noise.sigm: unknown key, did you mean "sigma"? allowed: sigma',

@@ -2,6 +2,7 @@
 
 import re
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,15 @@ def test_a_tracker_that_does_not_exist_is_answered_with_those_that_do():
 def test_a_sensor_without_a_camera_is_named():
     with pytest.raises(plans.PlanError, match=r'"color" of tracker "sheet" has no camera'):
         plans.rig(config.load_default(), "sheet", {"tof": TOF})
+
+
+def test_what_a_sensor_says_of_its_outliers_comes_with_its_noise():
+    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\n")
+    rig = plans.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})
+    tof, color = rig.sensors["tof"], rig.sensors["color"]
+    assert (tof.outlier_share, tof.range_m) == (0.2, 7.5)
+    assert (color.outlier_share, color.range_m) == (None, None)
 
 
 def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_path):

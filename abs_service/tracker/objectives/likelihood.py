@@ -17,7 +17,7 @@ from calib.rig import Rig, Sensor
 
 @dataclass(frozen=True)
 class Settings:
-    """TOML keys of the likelihood.
+    """TOML keys of the likelihood; a sensor's own `outlier_share` and `range_m` go before them.
 
     Attributes:
         outlier_share: share ε of measurements that come from anywhere (mixed pixels, occluders, what the model cannot
@@ -36,8 +36,12 @@ class Settings:
 
     def _term(self, sensor: Sensor, mesh: Mesh) -> Term:
         if isinstance(sensor.noise, GaussianColor):
-            return ColorTerm(sensor.name, sensor.camera, sensor.noise, mesh.colors, self._bounds(3 * np.log(LEVELS)))
-        return DepthTerm(sensor.name, sensor.camera, sensor.noise, self._bounds(np.log(self.range_m)))
+            return ColorTerm(sensor.name, sensor.camera, sensor.noise, mesh.colors, self.bounds(sensor))
+        return DepthTerm(sensor.name, sensor.camera, sensor.noise, self.bounds(sensor))
 
-    def _bounds(self, uniform: float) -> Bounds:
-        return Bounds(-np.log1p(-self.outlier_share), uniform, uniform - np.log(self.outlier_share))
+    def bounds(self, sensor: Sensor) -> Bounds:
+        """What a measurement costs that the sensor's noise does not explain."""
+        share = sensor.outlier_share or self.outlier_share
+        color = isinstance(sensor.noise, GaussianColor)
+        uniform = 3 * np.log(LEVELS) if color else np.log(sensor.range_m or self.range_m)
+        return Bounds(-np.log1p(-share), uniform, uniform - np.log(share))
