@@ -17,6 +17,7 @@ from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
@@ -34,8 +35,16 @@ class ModelSettings(Protocol):
 class ObjectiveSettings(Protocol):
     """`Settings` of a module of `abs_service.tracker.objectives`."""
 
-    def build(self, rig: Rig, mesh: Mesh) -> Objective:
+    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> Objective:
         """The objective of a mesh in a rig."""
+        ...
+
+
+class SynthesisSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.synthesis`."""
+
+    def build(self, rig: Rig, mesh: Mesh) -> Synthesizer:
+        """The synthesis of a mesh for the sensors of a rig."""
         ...
 
 
@@ -61,7 +70,7 @@ class Plan:
 
     Attributes:
         reference: sensor whose depth image gives the initial mesh.
-        model, region, objective, optimizer: settings of the exchangeable parts.
+        model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         vertices: about how many vertices the mesh is to have.
         priors, status: settings of the fixed parts.
         seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
@@ -70,6 +79,7 @@ class Plan:
     reference: str
     model: ModelSettings
     region: RegionSettings
+    synthesis: SynthesisSettings
     objective: ObjectiveSettings
     optimizer: OptimizerSettings
     vertices: int
@@ -122,7 +132,7 @@ class Tracking:
         self.mesh_version += 1
         return Tracker(
             model,
-            plan.objective.build(self._rig, mesh),
+            plan.objective.build(self._rig, mesh, plan.synthesis.build(self._rig, mesh)),
             StretchPrior(mesh, plan.priors.stretch),
             ShapePrior(model.rest, model.prior),
             MotionPrior(model.rest, model.scales, plan.priors),

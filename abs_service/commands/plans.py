@@ -39,6 +39,7 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         reference=reference,
         model=table.model,
         region=table.region,
+        synthesis=table.synthesis,
         objective=table.objective,
         optimizer=table.optimizer,
         vertices=table.mesh.vertices,

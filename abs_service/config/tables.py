@@ -79,7 +79,7 @@ class TrackerTable(Table):
     Attributes:
         sensors: names of the sensors whose measurements count.
         reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
-        model, region, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, `.regions`, ….
+        model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, `.regions`, ….
         mesh: the triangle mesh.
         priors, status: `Settings` of `abs_service.tracker.priors` and of `.status`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
@@ -90,6 +90,7 @@ class TrackerTable(Table):
     model: Annotated[Any, Plugin("abs_service.tracker.models")]
     region: Annotated[Any, Plugin("abs_service.tracker.regions")] = Field(default={"type": "nearest"})
     mesh: MeshTable = MeshTable()
+    synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
     priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})

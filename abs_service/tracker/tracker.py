@@ -43,8 +43,8 @@ class Tracker:
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """Searches until the optimiser's generations are used up or `in_time` says no, after one at least."""
-        self._objective.observe(observation)
         self._motion.predict(observation.t_host_ns)
+        self._objective.observe(observation, self.model.deform(self._motion.predicted[None]))
         start, metric = self._start(self._motion.predicted)
         self._optimizer.restart()
         generations = evaluations = 0

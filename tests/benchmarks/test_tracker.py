@@ -19,7 +19,7 @@ from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
 from abs_service.tracker.optimizers.cma import Settings as Cma
 from abs_service.tracker.priors import StretchPrior
-from abs_service.tracker.synthesis import SparseSynthesis
+from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from abs_service.tracking import Tracking
 from calib.noise.base import render_texture
 from calib.rig import Rig
@@ -49,7 +49,8 @@ def per_vertex(benchmark, population: int = POPULATION, vertices: int = VERTICES
 
 
 def single_term(sensor: str, mesh: Mesh):
-    return Likelihood().build(Rig("r", {sensor: RIG.sensors[sensor]}), mesh)
+    rig = Rig("r", {sensor: RIG.sensors[sensor]})
+    return Likelihood().build(rig, mesh, Sparse(rig, mesh))
 
 
 def test_yardstick(benchmark):
@@ -77,7 +78,7 @@ def test_deform(benchmark, shape):
 def test_synthesize(benchmark):
     model, thetas = model_and_thetas((4, 4))
     surface = model.deform(thetas)
-    synthesis = SparseSynthesis(RIG.sensors["tof"].camera)
+    synthesis = SparseView(RIG.sensors["tof"].camera, model.mesh.faces, model.mesh.colors)
     assert (benchmark(synthesis.synthesize, surface).pixel > 0).all()
     per_vertex(benchmark)
 
@@ -86,7 +87,7 @@ def test_synthesize(benchmark):
 def test_term_with_its_synthesis(benchmark, observation, sensor):
     model, thetas = model_and_thetas((4, 4))
     objective = single_term(sensor, model.mesh)
-    objective.observe(observation)
+    objective.observe(observation, model.deform(model.rest[None]))
     surface = model.deform(thetas)
     assert np.isfinite(benchmark(objective.cost, surface)).all()
     per_vertex(benchmark)
@@ -97,7 +98,7 @@ def test_what_the_yardstick_does(benchmark, observation, shape):
     """Deform, synthesise, depth term."""
     model, thetas = model_and_thetas(shape)
     objective = single_term("tof", model.mesh)
-    objective.observe(observation)
+    objective.observe(observation, model.deform(model.rest[None]))
     assert np.isfinite(benchmark(lambda: objective.cost(model.deform(thetas)))).all()
     per_vertex(benchmark)
 
@@ -116,8 +117,8 @@ def test_per_frame_render_texture(benchmark, observation):
 
 def test_per_frame_linearize(benchmark, observation):
     model, thetas = model_and_thetas((4, 4), sheet(17, 18))
-    objective = Likelihood().build(RIG, model.mesh)
-    objective.observe(observation)
+    objective = Likelihood().build(RIG, model.mesh, Sparse(RIG, model.mesh))
+    objective.observe(observation, model.deform(model.rest[None]))
     surface, jacobian = model.deform(thetas[:1]), vertex_jacobian(model, thetas[0])
     assert benchmark(objective.linearize, surface, jacobian).jacobian.shape[1] == 48
 

@@ -7,9 +7,13 @@ import numpy as np
 from abs_service.observation import ColorImage, DepthImage, Observation, Source
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesis
+from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
+from calib.noise.color import GaussianColor
+from calib.rig import Rig, Sensor
 
 #: A small camera with a lens and a pose of its own; it sees a sheet of 0.3 × 0.2 m at z = 1 m with some room around.
 CAMERA = Camera(
@@ -55,6 +59,25 @@ def as_surface(*meshes: tuple[np.ndarray, np.ndarray]) -> Surface:
     """A population from vertices and normals, each (n, 3)."""
     stacked = [np.ascontiguousarray(np.stack([pair[i].T for pair in meshes]), np.float32) for i in range(2)]
     return Surface(stacked[0], stacked[1])
+
+
+def sparse(camera: Camera, mesh: Mesh | None = None) -> Sparse:
+    """Sparse direct synthesis for two sensors, tof and color, with one camera; of single points without a mesh."""
+    faceless = Mesh(np.zeros((0, 3)), np.zeros((0, 3), np.int32), np.zeros((0, 3), np.float32), np.zeros((0, 2)))
+    rig = Rig("r", {name: Sensor(name, camera, GaussianColor()) for name in ("tof", "color")})
+    return Sparse(rig, faceless if mesh is None else mesh)
+
+
+def seen(camera: Camera, surface: Surface) -> Synthesis:
+    """What a camera sees of single points."""
+    points = surface.vertices.shape[2]
+    return SparseView(camera, np.zeros((0, 3), np.int32), np.zeros((points, 0), np.float32)).synthesize(surface)
+
+
+def in_sight(camera: Camera, count: int) -> Surface:
+    """So many vertices before a camera that face it: a prediction that hides nothing."""
+    axis = camera.T_rs[:3, 2]
+    return as_surface((np.tile(camera.center + axis, (count, 1)), np.tile(-axis, (count, 1))))
 
 
 def observation(t_ns: int = 0, missing: tuple[str, ...] = (), **images: DepthImage | ColorImage) -> Observation:

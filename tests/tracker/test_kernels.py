@@ -13,7 +13,6 @@ from abs_service.observation import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.priors import StretchPrior
-from abs_service.tracker.synthesis import SparseSynthesis
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
@@ -25,7 +24,7 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.tracker.scenes import CAMERA, as_surface, depth_image, observation, sheet
+from tests.tracker.scenes import CAMERA, as_surface, depth_image, in_sight, observation, seen, sheet, sparse
 
 SHARE, RANGE_M = 0.05, 5.0
 NOISE = GaussianPolynomial(((1e-3, 1e-7), (2e-3, 0.0)), ((5e-3,), (-2e-3,)), amplitudes=(0.0, 10_000.0))
@@ -60,14 +59,14 @@ def decided(generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.
 @given(seeds)
 def test_synthesis_is_eqs_10_11_and_20(seed):
     vertices, normals = decided(np.random.default_rng(seed), 40)
-    seen = SparseSynthesis(CAMERA).synthesize(as_surface((vertices, normals)))
+    synthesis = seen(CAMERA, as_surface((vertices, normals)))
     pixels = [reference.seen_pixel(CAMERA, *pair) for pair in zip(vertices.astype(float), normals)]
     # With a border of one pixel, pixel (row, column) is at (row + 1, column + 1).
     stride = CAMERA.width + 2
     expected = [0 if pixel is None else (pixel[0] + 1) * stride + pixel[1] + 1 for pixel in pixels]
-    assert seen.pixel[0].tolist() == expected
+    assert synthesis.pixel[0].tolist() == expected
     distances = [reference.distance(CAMERA, vertex) for vertex in vertices.astype(float)]
-    np.testing.assert_allclose(seen.distance[0], distances, rtol=1e-5)
+    np.testing.assert_allclose(synthesis.distance[0], distances, rtol=1e-5)
 
 
 def test_what_is_behind_the_camera_or_faces_away_is_pixel_0():
@@ -75,7 +74,7 @@ def test_what_is_behind_the_camera_or_faces_away_is_pixel_0():
     vertices = np.array([[0, 0, 1], [0, 0, -1], [0, 0, 0], [0, 0, 1], [np.nan, 0, 1]], np.float32)
     normals = np.array([[0, 0, -1], [0, 0, 1], [0, 0, -1], [0, 0, 1], [0, 0, -1]], np.float32)
     with np.errstate(all="ignore"):
-        pixel = SparseSynthesis(camera).synthesize(as_surface((vertices, normals))).pixel[0]
+        pixel = seen(camera, as_surface((vertices, normals))).pixel[0]
     assert pixel[0] > 0
     assert pixel[1:].tolist() == [0, 0, 0, 0]
 
@@ -88,7 +87,7 @@ def test_no_vertex_however_far_aside_reads_outside_the_texture(coefficients):
     vertices = np.abs(direction) * np.sign(generator.normal((0, 0, 9), 1.0, (400, 3)))
     with np.errstate(all="ignore"):
         surface = as_surface((vertices, -vertices / np.linalg.norm(vertices, axis=1, keepdims=True)))
-        pixel = SparseSynthesis(camera).synthesize(surface).pixel
+        pixel = seen(camera, surface).pixel
     assert pixel.min() >= 0
     assert pixel.max() < 8 * 10
 
@@ -98,7 +97,7 @@ def test_beyond_the_fold_of_a_barrel_nothing_is_seen():
     camera = Camera(64, 48, 60.0, 60.0, 31.5, 23.5, Lens(np.array([-0.3])))
     assert 0 < camera.project(np.array([1.66, 0, 1]))[0] < 64
     vertices = np.array([[1.66, 0, 1], [0.29, 0, 1]])
-    pixel = SparseSynthesis(camera).synthesize(as_surface((vertices, -vertices))).pixel[0]
+    pixel = seen(camera, as_surface((vertices, -vertices))).pixel[0]
     assert pixel[0] == 0
     assert pixel[1] > 0
 
@@ -108,12 +107,12 @@ def test_the_image_ends_half_a_pixel_beyond_its_outer_centres():
     columns = np.array([-0.51, -0.49, 0.49, 0.51, 3.49, 3.51, 40.0])
     vertices = np.column_stack([columns / 100, np.zeros(7), np.ones(7)])
     surface = as_surface((vertices, np.tile([0, 0, -1.0], (7, 1))))
-    assert SparseSynthesis(camera).synthesize(surface).pixel[0].tolist() == [0, 7, 7, 8, 10, 0, 0]
+    assert seen(camera, surface).pixel[0].tolist() == [0, 7, 7, 8, 10, 0, 0]
 
 
 def bounds() -> Bounds:
     rig = Rig("r", {"tof": Sensor("tof", CAMERA, NOISE)})
-    term = likelihood.Settings(SHARE, RANGE_M).build(rig, sheet())._terms[0]
+    term = likelihood.Settings(SHARE, RANGE_M).build(rig, sheet(), sparse(CAMERA))._terms[0]
     assert isinstance(term, DepthTerm)
     return term._bounds
 
@@ -130,8 +129,8 @@ def test_the_depth_cost_is_the_likelihood(seed):
             image[pixel] = reference.distance(CAMERA, vertex) + generator.normal(0, 6e-3)
     image[generator.uniform(size=image.shape) < 0.1] = np.nan
     amplitude = generator.uniform(500, 9000, image.shape).astype(np.float32)
-    term = DepthTerm("tof", CAMERA, NOISE, bounds())
-    term.observe(type(depth_image(image))(image, amplitude))
+    term = DepthTerm("tof", sparse(CAMERA), len(vertices), NOISE, bounds())
+    term.observe(type(depth_image(image))(image, amplitude), in_sight(CAMERA, len(vertices)))
     expected = reference.depth_cost(
         CAMERA, NOISE, image, amplitude, vertices.astype(float), normals.astype(float), SHARE, RANGE_M
     )
@@ -145,8 +144,8 @@ def test_the_depth_cost_is_the_likelihood(seed):
 def test_what_one_measurement_costs(distance, expected):
     sigma = 2e-3
     camera = Camera(8, 6, 10.0, 10.0, 3.5, 2.5)
-    term = DepthTerm("tof", camera, GaussianPolynomial(((sigma,),)), bounds())
-    term.observe(depth_image(np.full((6, 8), distance)))
+    term = DepthTerm("tof", sparse(camera), 1, GaussianPolynomial(((sigma,),)), bounds())
+    term.observe(depth_image(np.full((6, 8), distance)), in_sight(camera, 1))
     cost = term.cost(as_surface((np.array([[0, 0, 1.0]]), np.array([[0, 0, -1.0]]))))[0]
     density = {
         "uniform": (1 - SHARE) / RANGE_M,
@@ -170,8 +169,10 @@ def test_the_color_cost_is_the_likelihood(seed):
     colors[::5] = np.nan
     sensor = Sensor("color", CAMERA, GaussianColor(12.0))
     mesh = sheet()
-    objective = likelihood.Settings(SHARE).build(Rig("r", {"color": sensor}), type(mesh)(*_replaced(mesh, colors)))
-    objective.observe(observation(color=ColorImage(image)))
+    objective = likelihood.Settings(SHARE).build(
+        Rig("r", {"color": sensor}), type(mesh)(*_replaced(mesh, colors)), sparse(CAMERA)
+    )
+    objective.observe(observation(color=ColorImage(image)), in_sight(CAMERA, len(vertices)))
     expected = reference.color_cost(
         CAMERA, 12.0, image, colors.astype(float), vertices.astype(float), normals.astype(float), SHARE
     )
@@ -217,29 +218,31 @@ def test_the_euclidean_cost_is_exactly_the_weighted_squares(seed):
         expected += 4000.0 * squares[0] + 0.003 * squares[1]
     rig = Rig("r", {"tof": Sensor("tof", CAMERA, StructuredLight()), "color": Sensor("color", CAMERA, GaussianColor())})
     mesh = sheet()
-    objective = weights.build(rig, type(mesh)(*_replaced(mesh, colors)))
-    objective.observe(observation(tof=depth_image(distance), color=ColorImage(image)))
+    objective = weights.build(rig, type(mesh)(*_replaced(mesh, colors)), sparse(CAMERA))
+    objective.observe(observation(tof=depth_image(distance), color=ColorImage(image)), in_sight(CAMERA, len(vertices)))
     assert objective.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, abs=2e-3)
 
 
 def test_a_missing_sensor_costs_nothing():
     rig = Rig("r", {"tof": Sensor("tof", CAMERA, NOISE), "color": Sensor("color", CAMERA, GaussianColor())})
     mesh = sheet()
-    both, alone = (likelihood.Settings().build(rig, mesh) for _ in range(2))
+    both, alone = (likelihood.Settings().build(rig, mesh, sparse(CAMERA, mesh)) for _ in range(2))
     depth = depth_image(np.ones((CAMERA.height, CAMERA.width)))
-    both.observe(observation(tof=depth, color=ColorImage(np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8))))
-    alone.observe(observation(tof=depth, missing=("color",)))
     surface = as_surface((mesh.vertices, mesh.normals))
+    black = ColorImage(np.zeros((CAMERA.height, CAMERA.width, 3), np.uint8))
+    both.observe(observation(tof=depth, color=black), surface)
+    alone.observe(observation(tof=depth, missing=("color",)), surface)
     assert alone.cost(surface)[0] < both.cost(surface)[0]
     assert [fit.sensor for fit in alone.fits(surface)] == ["tof"]
 
 
 def test_costs_do_not_depend_on_the_rest_of_the_population():
     mesh = sheet()
-    term = DepthTerm("tof", CAMERA, NOISE, bounds())
-    term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)))
-    color = ColorTerm("color", CAMERA, GaussianColor(), mesh.colors, bounds())
-    color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)))
+    predicted = as_surface((mesh.vertices, mesh.normals))
+    term = DepthTerm("tof", sparse(CAMERA, mesh), len(mesh.vertices), NOISE, bounds())
+    term.observe(depth_image(np.full((CAMERA.height, CAMERA.width), 1.0)), predicted)
+    color = ColorTerm("color", sparse(CAMERA, mesh), mesh.colors, GaussianColor(), bounds())
+    color.observe(ColorImage(np.full((CAMERA.height, CAMERA.width, 3), 90, np.uint8)), predicted)
     generator = np.random.default_rng(3)
     population = [(mesh.vertices + generator.normal(0, 5e-3, 3), mesh.normals) for _ in range(4)]
     for part in (term, color):

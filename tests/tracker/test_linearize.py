@@ -16,7 +16,7 @@ from abs_service.tracker.terms.gradients import depth_rows
 from calib.camera import Camera
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from tests.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet
+from tests.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet, sparse
 
 #: Many fine pixels, so that rounding to one of them is small against the steps of the derivatives.
 FINE = Camera(640, 480, 1500.0, 1500.0, 319.5, 239.5)
@@ -46,8 +46,8 @@ def test_the_jacobian_of_a_rigid_motion_is_the_lever_rule():
 
 
 def depth_term() -> DepthTerm:
-    term = DepthTerm("tof", FINE, GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term.observe(depth_image(plane_distance(FINE, NORMAL, 1.0)))
+    term = DepthTerm("tof", sparse(FINE, MESH), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term.observe(depth_image(plane_distance(FINE, NORMAL, 1.0)), as_surface((MESH.vertices, MESH.normals)))
     return term
 
 
@@ -93,8 +93,8 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
     model = Rigid(mesh)
     columns, rows = COLOR.project(mesh.vertices).T
     colors = np.stack([columns, rows, 255 - rows], axis=-1)
-    term = ColorTerm("color", COLOR, GaussianColor(10.0), colors.astype(np.float32), BOUNDS)
-    term.observe(ColorImage(ramp()))
+    term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), GaussianColor(10.0), BOUNDS)
+    term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
     linear = term.linearize(model.deform(model.rest[None]), vertex_jacobian(model, model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=0.06)  # pixels are whole numbers
     for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
@@ -113,9 +113,9 @@ def test_only_inliers_with_a_measurement_are_linearized():
     distance = plane_distance(FINE, NORMAL, 1.0)
     distance[:, :320] = np.nan
     distance[:240] += 1
-    term = DepthTerm("tof", FINE, GaussianPolynomial(((SIGMA,),)), BOUNDS)
-    term.observe(depth_image(distance))
+    term = DepthTerm("tof", sparse(FINE, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((mesh.vertices, mesh.normals))
+    term.observe(depth_image(distance), surface)
     linear = term.linearize(surface, np.zeros((len(mesh.vertices), 3, 2)))
     pixels = FINE.project(mesh.vertices) + 0.5
     inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))

@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Linearization, SensorFit, Term, stack
 
 
 class Objective(Protocol):
     """A cost over deformed meshes, given one observation."""
 
-    def observe(self, observation: Observation) -> None:
-        """Takes the measurements that the following costs refer to."""
+    def observe(self, observation: Observation, predicted: Surface) -> None:
+        """Takes the measurements that the following costs refer to, and the predicted mesh, a population of one."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -39,15 +40,17 @@ class Objective(Protocol):
 class TermSum:
     """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes nothing."""
 
-    def __init__(self, terms: Sequence[Term]):
+    def __init__(self, synthesizer: Synthesizer, terms: Sequence[Term]):
+        self._synthesizer = synthesizer
         self._terms = terms
         self._active: list[Term] = []
 
-    def observe(self, observation: Observation) -> None:
+    def observe(self, observation: Observation, predicted: Surface) -> None:
         """Hands every sensor's image to its term."""
+        self._synthesizer.observe(observation)
         self._active = [term for term in self._terms if term.sensor in observation.images]
         for term in self._active:
-            term.observe(observation.images[term.sensor])
+            term.observe(observation.images[term.sensor], predicted)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""

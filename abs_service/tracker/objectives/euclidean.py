@@ -9,6 +9,7 @@ from annotated_types import Gt
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
@@ -37,18 +38,18 @@ class Settings:
     cutoff_m: Annotated[float, Gt(0)] = 0.03
     cutoff_levels: Annotated[float, Gt(0)] = 60.0
 
-    def build(self, rig: Rig, mesh: Mesh) -> "SquareSum":
+    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> "SquareSum":
         """The fitness of a mesh in a rig."""
-        return SquareSum([self._term(sensor, mesh) for sensor in rig.sensors.values()])
+        return SquareSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
 
-    def _term(self, sensor: Sensor, mesh: Mesh) -> Term:
+    def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
         if isinstance(sensor.noise, GaussianColor):
             color = GaussianColor(_deviation(self.color_weight))
             bounds = _bounds(self.color_weight * self.cutoff_levels**2, 3, color.sigma)
-            return ColorTerm(sensor.name, sensor.camera, color, mesh.colors, bounds)
+            return ColorTerm(sensor.name, synthesizer, mesh.colors, color, bounds)
         depth = GaussianPolynomial(sigma=((_deviation(self.depth_weight),),))
         bounds = _bounds(self.depth_weight * self.cutoff_m**2, 1, depth.sigma[0][0])
-        return DepthTerm(sensor.name, sensor.camera, depth, bounds)
+        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), depth, bounds)
 
 
 class SquareSum(TermSum):

@@ -8,6 +8,7 @@ from annotated_types import Gt, Interval
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.objectives.base import TermSum
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, Term
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
@@ -30,14 +31,14 @@ class Settings:
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
 
-    def build(self, rig: Rig, mesh: Mesh) -> TermSum:
+    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
-        return TermSum([self._term(sensor, mesh) for sensor in rig.sensors.values()])
+        return TermSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
 
-    def _term(self, sensor: Sensor, mesh: Mesh) -> Term:
+    def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
         if isinstance(sensor.noise, GaussianColor):
-            return ColorTerm(sensor.name, sensor.camera, sensor.noise, mesh.colors, self.bounds(sensor))
-        return DepthTerm(sensor.name, sensor.camera, sensor.noise, self.bounds(sensor))
+            return ColorTerm(sensor.name, synthesizer, mesh.colors, sensor.noise, self.bounds(sensor))
+        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), sensor.noise, self.bounds(sensor))
 
     def bounds(self, sensor: Sensor) -> Bounds:
         """What a measurement costs that the sensor's noise does not explain."""

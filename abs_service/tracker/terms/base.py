@@ -107,8 +107,8 @@ class Term(Protocol):
 
     sensor: str
 
-    def observe(self, image: DepthImage | ColorImage) -> None:
-        """Takes the image that the following costs refer to."""
+    def observe(self, image: DepthImage | ColorImage, predicted: Surface) -> None:
+        """Takes the image that the following costs refer to, and the predicted mesh, a population of one."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:

@@ -5,73 +5,76 @@ from numpy.typing import NDArray
 
 from abs_service.observation import ColorImage, DepthImage
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis import SparseSynthesis
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows
-from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.color import GaussianColor
 
 
 class ColorTerm:
-    """−log of the density of the measured colour given the vertex's own, summed over the vertices.
+    """−log of the density of the measured colour given the vertex's own, summed over the samples.
 
     Attributes:
         sensor: name of the sensor.
     """
 
-    def __init__(self, sensor: str, camera: Camera, noise: GaussianColor, colors: NDArray[np.float32], bounds: Bounds):
+    def __init__(
+        self, sensor: str, synthesizer: Synthesizer, colors: NDArray[np.float32], noise: GaussianColor, bounds: Bounds
+    ):
         self.sensor = sensor
-        self._camera = camera
-        self._synthesis = SparseSynthesis(camera)
-        self._colors = colors
+        self._synthesizer = synthesizer
+        self._view = synthesizer.view(sensor, colors)
         self._bounds = bounds
         self._inverse_deviation = 1 / noise.sigma
         self._normalizer = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
         self._texture = np.zeros((0, 3), np.float32)
         self._image = np.zeros((1, 1, 3), np.float32)
 
-    def observe(self, image: DepthImage | ColorImage) -> None:
+    def observe(self, image: DepthImage | ColorImage, predicted: Surface) -> None:
         """Takes a colour image; the border is NaN, which stands for no measurement."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered a depth image")
-        self._image = image.rgb.astype(np.float32)
+        self._image = self._synthesizer.image(self.sensor, image.rgb.astype(np.float32))
         self._texture = np.pad(self._image, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan).reshape(-1, 3)
+        self._view.look(predicted)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""
-        pixel = self._synthesis.synthesize(surface).pixel
-        out = np.empty(len(pixel))
+        seen = self._view.synthesize(surface)
+        out = np.empty(len(seen.pixel))
         constants = (
             self._inverse_deviation,
             self._normalizer,
             self._bounds.outlier,
             self._bounds.inlier + self._bounds.uniform,
         )
-        _color_cost(pixel, self._texture, self._colors, *constants, out)
+        _color_cost(seen.pixel, self._texture, seen.attributes, *constants, out)
         return out
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
-        rows = color_rows(self._image, self._camera, surface.vertices[0].T[use])
-        change = (rows * self._inverse_deviation) @ jacobian[use]
+        vertices, moves = (self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, jacobian))
+        rows = color_rows(self._image, self._view.camera, vertices)
+        change = (rows * self._inverse_deviation) @ moves
         return Linearization(residual[use].ravel(), change.reshape(-1, jacobian.shape[2]))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
         residual, measured = self._residuals(surface)
-        visible = self._synthesis.synthesize(surface).pixel[0] > 0
+        visible = self._view.synthesize(surface).pixel[0] > 0
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(self.sensor, visible, measured, np.sqrt(np.mean(residual**2, axis=1)), mean, channels=3)
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and whether there is a measurement (n,)."""
-        pixel = self._synthesis.synthesize(surface).pixel[0]
-        residual = (self._texture[pixel].astype(np.float64) - self._colors) * self._inverse_deviation
-        measured = np.all(np.isfinite(residual), axis=1)
+        seen = self._view.synthesize(surface)
+        colors = seen.attributes[0].astype(np.float64)
+        residual = (self._texture[seen.pixel[0]] - colors) * self._inverse_deviation
+        measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
         return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
 
 
@@ -86,13 +89,16 @@ def _color_cost(
     uniform: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over vertices of min(normaliser + ½e², outlier), and of `uniform` where either colour is unknown (NaN)."""
+    """Sum over samples of min(normaliser + ½e², outlier), and of `uniform` where either colour is unknown (NaN)."""
     scale = np.float32(0.5 * inverse_deviation * inverse_deviation)
     for k in range(pixel.shape[0]):
         total = 0.0
+        own = k % colors.shape[0]
         for v in range(pixel.shape[1]):
-            measured = texture[pixel[k, v]]
-            red, green, blue = measured[0] - colors[v, 0], measured[1] - colors[v, 1], measured[2] - colors[v, 2]
+            if pixel[k, v] < 0:
+                continue
+            measured, color = texture[pixel[k, v]], colors[own, v]
+            red, green, blue = measured[0] - color[0], measured[1] - color[1], measured[2] - color[2]
             square = red * red + green * green + blue * blue
             total += uniform if np.isnan(square) else min(normalizer + scale * square, outlier)
         out[k] = total

@@ -1,0 +1,77 @@
+"""What a synthesis is: samples of deformed meshes as a sensor would see them, and images that fit them."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.observation import Observation
+from abs_service.tracker.models.base import Surface
+from calib.camera import Camera
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Synthesis:
+    """What a sensor would see of a population: m samples of every member.
+
+    Attributes:
+        pixel: index (population, m) into the sensor's flattened texture with a border of one pixel; 0, in the border,
+            where the sensor cannot see the sample (outside the image, behind the camera, or facing away); −1 where
+            there is no sample, which costs nothing.
+        distance: radial distance from the camera centre (population, m) [m], eq. 11.
+        attributes: what the surface carries there, such as its colour, (population or 1, m, channels).
+    """
+
+    pixel: NDArray[np.int32]
+    distance: NDArray[np.float32]
+    attributes: NDArray[np.float32]
+
+
+class View(Protocol):
+    """A mesh through one camera.
+
+    Attributes:
+        camera: the camera into whose image it is synthesised.
+    """
+
+    camera: Camera
+
+    def look(self, predicted: Surface) -> None:
+        """Decides from the predicted mesh, a population of one, what is hidden from the sensor in this frame.
+
+        That is the same for every candidate, so hiding is neither rewarded nor punished.
+        """
+        ...
+
+    def synthesize(self, surface: Surface) -> Synthesis:
+        """Synthesises a population of deformed meshes."""
+        ...
+
+    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
+        ...
+
+    def render(self, surface: Surface) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
+        ...
+
+
+class Synthesizer(Protocol):
+    """Views of all sensors of a rig, and their images as these views need them."""
+
+    def observe(self, observation: Observation) -> None:
+        """Takes the images that the following calls refer to."""
+        ...
+
+    def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
+        """The mesh with attributes (n, channels) through one sensor's camera."""
+        ...
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """A rendered noise model (height + 2, width + 2, 8) of a depth sensor's frame in its view's camera."""
+        ...
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An image (height, width, channels) of a sensor in its view's camera; NaN where nothing is known."""
+        ...

@@ -1,0 +1,86 @@
+"""The distance image of one deformed mesh, by a z-buffer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from calib.jit import kernel
+
+
+class Raster:
+    """Renders meshes with the same faces into one camera, forward distortion included.
+
+    Between its corners, which are exact, a triangle is flat in the distorted image.
+    """
+
+    def __init__(self, camera: Camera, faces: NDArray[np.int32]):
+        self._camera = camera
+        self._faces = np.ascontiguousarray(faces, np.int32)
+        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)
+        self._limit = field_radius(camera)
+
+    def render(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite where it is not."""
+        camera = self._camera
+        points = vertices.T.astype(np.float64)
+        local = (points - camera.center) @ camera.T_rs[:3, :3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aside = np.linalg.norm(local[:, :2], axis=1) / local[:, 2]
+            inverse_z = np.where((local[:, 2] > 1e-6) & (aside < self._limit), 1 / local[:, 2], np.nan)
+        place = np.where(np.isfinite(inverse_z)[:, None], camera.project(points), 0.0)
+        nearness = np.zeros((camera.height, camera.width), np.float32)
+        _nearest(place.astype(np.float32), inverse_z.astype(np.float32), self._faces, nearness)
+        with np.errstate(divide="ignore"):
+            return self._ray_length / nearness
+
+
+def field_radius(camera: Camera) -> float:
+    """Largest x/z and y/z, as a radius, that the camera sees.
+
+    Beyond, the polynomial of a lens may fold back into the image, or leave the range of numbers.
+    """
+    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    rim = (columns % (camera.width - 1 or 1) == 0) | (rows % (camera.height - 1 or 1) == 0)
+    directions = camera.directions(np.stack([columns[rim], rows[rim]], axis=-1))
+    radius = np.linalg.norm(directions[:, :2], axis=1) / directions[:, 2]
+    return float(radius.max() * (1 + 2 / min(camera.width, camera.height)) + 1 / min(camera.fx, camera.fy))
+
+
+@kernel
+def _nearest(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    nearness: NDArray[np.float32],
+) -> None:
+    """Largest 1/z of all faces at every pixel centre (height, width).
+
+    Args:
+        place: pixel coordinates (n, 2) of the vertices.
+        inverse_z: their 1/z (n,), NaN where the camera cannot see them; it is linear in the image (exactly, for a
+            pinhole).
+        faces: vertex indices (m, 3).
+        nearness: result, zeros at the start.
+    """
+    height, width = nearness.shape
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if np.isnan(inverse_z[a] + inverse_z[b] + inverse_z[c]):
+            continue
+        ax, ay, bx, by = place[a, 0], place[a, 1], place[b, 0], place[b, 1]
+        cx, cy = place[c, 0], place[c, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if area == 0:
+            continue
+        first_row = max(int(np.ceil(min(ay, by, cy))), 0)
+        last_row = min(int(np.floor(max(ay, by, cy))), height - 1)
+        first_column = max(int(np.ceil(min(ax, bx, cx))), 0)
+        last_column = min(int(np.floor(max(ax, bx, cx))), width - 1)
+        for row in range(first_row, last_row + 1):
+            for column in range(first_column, last_column + 1):
+                at_b = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
+                at_c = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
+                at_a = 1 - at_b - at_c
+                if at_a >= 0 and at_b >= 0 and at_c >= 0:
+                    near = at_a * inverse_z[a] + at_b * inverse_z[b] + at_c * inverse_z[c]
+                    nearness[row, column] = max(nearness[row, column], near)
