@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from abs_service.observation import Observation, Observer
+from abs_service.readers import reader
 from abs_service.tracker import priors, status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.initialization import sight, vertex_colors
@@ -19,9 +20,8 @@ from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
-from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
-from drivers.frame import FrameSet, Kind
+from drivers.frame import FrameSet
 
 
 class ModelSettings(Protocol):
@@ -142,15 +142,8 @@ class Tracking:
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
-    """The (sensor, stream) of every image that the sensors' noise models need; streams are called by their kind."""
-    keys: list[tuple[str, str]] = []
-    for sensor in sensors:
-        if isinstance(sensor.noise, GaussianColor):
-            keys.append((sensor.name, Kind.COLOR.value))
-        else:
-            keys.append((sensor.name, Kind.DEPTH.value))
-            keys += [(sensor.name, Kind.AMPLITUDE.value)] if sensor.noise.uses_amplitude else []
-    return keys
+    """The (head, stream) of every image that the sensors' noise models need; streams are called by their kind."""
+    return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in reader(sensor).kinds))
 
 
 def _initializing(observation: Observation, reason: str) -> Estimate:

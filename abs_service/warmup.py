@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.observation import ColorImage, DepthImage, Observation, Source
+from abs_service.images import ColorImage, DepthImage
+from abs_service.observation import Observation, Source
 from abs_service.tracker.regions import nearest
 from abs_service.tracking import Plan, Tracking
 from calib.camera import Camera

@@ -6,17 +6,27 @@ from dataclasses import dataclass
 
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
+from calib.noise.bayer import GaussianBayer
+from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
+from calib.noise.grey import GaussianGrey
+from calib.noise.intensity import GaussianIntensity
+
+#: Noise models of what an image shows of a surface, and no length.
+PictureNoise = GaussianColor | GaussianGrey | GaussianBayer | GaussianIntensity
+Noise = DepthNoise | PictureNoise | LightBarrier
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """One optical head: where it is, how it projects and how it errs.
+    """A sensor s of the paper, one kind of measurement of one optical head: where it is, how it projects, how it errs.
+
+    A head that delivers two, such as a time-of-flight camera with its amplitudes, is two sensors with one camera.
 
     Attributes:
-        name: name in the rig.
+        name: name in the rig: that of the head, `tof`, and with its stream, `tof/amplitude`, if it is the head's second.
         camera: projection `P_s`.
-        noise: noise model of its distances, or of its colours.
+        noise: noise model of what it measures, and so what that is.
         outlier_share: share of its measurements that come from anywhere, 0…1; None if nobody knows better than the
             objective.
         range_m: distances that it can report at all, if it is a depth sensor [m]; None likewise.
@@ -24,9 +34,14 @@ class Sensor:
 
     name: str
     camera: Camera
-    noise: DepthNoise | GaussianColor
+    noise: Noise
     outlier_share: float | None = None
     range_m: float | None = None
+
+    @property
+    def head(self) -> str:
+        """Name of the optical head."""
+        return self.name.partition("/")[0]
 
 
 @dataclass(frozen=True)
@@ -39,5 +54,6 @@ class Rig:
     @property
     def calib_id(self) -> str:
         """Short hash of all cameras; changes whenever one of them does."""
-        parts = "".join(f"{name}:{sensor.camera.calib_id};" for name, sensor in sorted(self.sensors.items()))
+        cameras = {sensor.head: sensor.camera.calib_id for sensor in self.sensors.values()}
+        parts = "".join(f"{name}:{calib_id};" for name, calib_id in sorted(cameras.items()))
         return hashlib.sha256(parts.encode()).hexdigest()[:16]

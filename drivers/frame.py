@@ -20,6 +20,7 @@ class Kind(StrEnum):
     BAYER = "bayer"
     PHASE = "phase"
     DISPARITY = "disparity"
+    BINARY = "binary"
 
 
 class Geometry(StrEnum):
@@ -41,6 +42,9 @@ class Reference(StrEnum):
 class FrameError(ValueError):
     """A frame that contradicts itself."""
 
+
+#: The unit of an image that declares none, by its kind; the others hold numbers that only the device understands.
+_UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.BINARY: "1"}
 
 #: Pixel encodings as in foxglove.RawImage, with the array they hold: (dtype, channels).
 ENCODINGS: Mapping[str, tuple[np.dtype, int]] = {
@@ -72,8 +76,8 @@ class Frame:
         seq: counts the device's exposures; depth and amplitude of one exposure share it; gaps are losses.
         epoch: grows by one with each reconnect or clock step; seq and ticks start anew.
         scale: value, in `unit`, of one step of `data`.
-        unit: what `data` times `scale` is measured in: "m" for lengths, "dn" for numbers that only the device knows the
-            meaning of; by default what fits the kind.
+        unit: what `data` times `scale` is measured in: "m" for lengths, "1" for yes (1) and no (0), "dn" for numbers that
+            only the device knows the meaning of; by default what fits the kind.
         geometry: which length a depth image holds.
         invalid: the value of `data` that means "no return"; NaN always does; None if every value is a measurement.
         t_device_ticks, tick_hz: the device's own stamp and its rate; rate 0 if the device has no clock.
@@ -131,7 +135,7 @@ class Frame:
         if self.kind == Kind.DEPTH and self.geometry == Geometry.NONE:
             raise FrameError(f"{self.sensor}/{self.stream}: a depth frame must declare its geometry, z or radial")
         if not self.unit:
-            object.__setattr__(self, "unit", "m" if self.kind == Kind.DEPTH else "dn")
+            object.__setattr__(self, "unit", _UNITS.get(self.kind, "dn"))
         if self.data.flags.writeable:
             view = self.data.view()
             view.setflags(write=False)

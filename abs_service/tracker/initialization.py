@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import ColorImage, DepthImage, Observation
+from abs_service.images import ColorImage, DepthImage
+from abs_service.observation import Observation
 from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
 from calib.camera import Camera

@@ -16,6 +16,9 @@ LEAST_DISTANCE_M = 1e-3
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 
+#: Values that a channel of a colour can have.
+LEVELS = 256.0
+
 #: Rows and columns of the pixels that measured, each (n,).
 Pixels = tuple[NDArray[np.integer], NDArray[np.integer]]
 

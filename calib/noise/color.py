@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 from annotated_types import Gt
 
-LEVELS = 256.0
+from calib.noise.base import LEVELS
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,11 @@ class GaussianColor:
     """
 
     sigma: Annotated[float, Gt(0)] = 15.0
+
+    @property
+    def uniform(self) -> float:
+        """Negative log-density of a colour that says nothing about the surface."""
+        return float(3 * np.log(LEVELS))
 
     def build(self) -> "GaussianColor":
         """The model itself: its TOML keys are its fields."""

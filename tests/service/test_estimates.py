@@ -26,7 +26,7 @@ ESTIMATE = Estimate(
     generations=3,
     evaluations=45,
     inlier_share=0.9,
-    fits=(SensorFit("tof", 280, 270, 260, 1.5, 1.1),),
+    fits=(SensorFit("tof", 280, 10, 270, 260, 1.5, 1.1),),
     sources={"tof": Source(42, 10**9, 25_000)},
     missing=("color",),
 )

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.observation import ColorImage, DepthImage, ObservationError, Observer
+from abs_service.images import ColorImage, DepthImage
+from abs_service.observation import ObservationError, Observer
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

@@ -33,7 +33,7 @@ class Watch:
 
     def see(self, seconds=2.0, status=Status.TRACKING, inliers=250, **variances):
         """Estimates for so long, whose residuals have these variances by sensor; tells what health says then."""
-        fits = tuple(SensorFit(name, 300, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
+        fits = tuple(SensorFit(name, 300, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
         for _ in range(int(seconds * 1e9 / PERIOD_NS)):
             self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, status=status, fits=fits))
             self.t_ns += PERIOD_NS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.observation import ColorImage
+from abs_service.images import ColorImage
 from abs_service.tracker.grid import LEAST_VERTICES, grid_mesh
 from abs_service.tracker.initialization import sight, vertex_colors
 from abs_service.tracker.regions import nearest

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.observation import ColorImage
+from abs_service.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.priors import StretchPrior

@@ -1,14 +1,24 @@
 """What the predicted mesh hides from a sensor is neither rewarded nor punished."""
 
 import numpy as np
+import pytest
 
+from abs_service.images import ColorImage
+from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sparse import SparseView
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.shadow import Shadow
+from abs_service.tracker.visibility import classify
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
-from tests.tracker.scenes import CAMERA, as_surface, flat, plane_distance, sheet
+from calib.noise.color import GaussianColor
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from tests.tracker.scenes import CAMERA, as_surface, depth_image, flat, plane_distance, sheet, sparse
 
 
 def folded():
@@ -81,3 +91,129 @@ def test_an_open_sheet_hides_nothing_from_any_side():
         view = SparseView(camera, mesh.faces, mesh.colors)
         view.look(surface)
         assert (view.synthesize(surface).pixel > 0).all()
+
+
+def board(camera: Camera, background: float = 1.6) -> np.ndarray:
+    """Distances of a flat sheet at z = 1 m before a wall."""
+    mesh = sheet(height=flat)
+    distance = Raster(camera, mesh.faces).render(mesh.vertices.T.astype(np.float32))
+    return np.where(np.isfinite(distance), distance, plane_distance(camera, np.array([0, 0, 1.0]), background))
+
+
+STRAIGHT = Camera(140, 72, 220.0, 220.0, 69.5, 35.5)
+MESH = sheet(height=flat)
+PREDICTED = Raster(STRAIGHT, MESH.faces).render(MESH.vertices.T.astype(np.float32))
+EXPECTED = np.isfinite(PREDICTED)
+
+
+def test_a_sheet_before_a_wall_is_the_object_and_the_wall_is_free():
+    seen = classify(board(STRAIGHT).astype(np.float32), PREDICTED, STRAIGHT.fx)
+    assert np.count_nonzero(seen.object) > 0.8 * np.count_nonzero(EXPECTED)  # all but its rim
+    assert not (seen.object & ~EXPECTED).any()
+    assert not seen.foreground.any()
+    assert not seen.hole.any()
+    assert (seen.free_m[EXPECTED] == 0).all()
+    assert seen.free_m[35, 24] == pytest.approx((36.5 - 24) / 220, abs=0.012)  # the sheet begins at column 36.5
+
+
+def test_what_stands_before_the_sheet_is_foreground_also_beside_it():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[20:45, :62] = 0.85
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    hand = np.zeros_like(EXPECTED)
+    hand[20:45, :62] = True
+    assert seen.foreground[22:43, 2:60].all()
+    assert not seen.foreground[~hand].any()
+    assert seen.object[:, 72:102][EXPECTED[:, 72:102]].mean() > 0.8
+
+
+def test_a_hole_inside_the_outline_is_told_from_missing_returns_at_its_rim():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[~EXPECTED] = np.nan  # a background out of range
+    distance[:, 82:] = np.nan
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert seen.hole[30:42, 84:96].all()
+    assert not seen.hole[~EXPECTED].any()
+    assert not seen.hole[:15].any()
+    assert (seen.free_m == 0).all()
+
+
+def test_a_prediction_that_nothing_agrees_with_classifies_nothing():
+    distance = (board(STRAIGHT) - 0.2).astype(np.float32)
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert not seen.object.any()
+    assert not seen.foreground.any()
+    assert not seen.hole.any()
+    assert not seen.free_m.any()
+
+
+def test_a_surface_that_moved_as_a_whole_is_still_the_object():
+    distance = board(STRAIGHT).astype(np.float32)
+    columns = np.arange(STRAIGHT.width)
+    turned = np.where(EXPECTED, distance - 0.0012 * (columns - 52), distance).astype(np.float32)
+    seen = classify(turned, PREDICTED, STRAIGHT.fx)
+    assert not seen.foreground.any()
+
+
+def term_before(distance: np.ndarray) -> DepthTerm:
+    noise = GaussianPolynomial(((3e-3,),))
+    term = DepthTerm("tof", sparse(STRAIGHT, MESH), len(MESH.vertices), noise, Bounds(0.05, 1.6, 4.6))
+    term.observe(depth_image(distance), as_surface((MESH.vertices, MESH.normals)))
+    return term
+
+
+def moved(x: float) -> Surface:
+    return as_surface((MESH.vertices + np.array([x, 0, 0]), MESH.normals))
+
+
+def test_behind_an_occluder_no_motion_pays():
+    """All but a patch in the middle is hidden: the sheet may slide; in full sight its rims would meet the wall."""
+    distance = board(STRAIGHT)
+    covered = distance.copy()
+    covered[:, 27:112] = 0.85
+    covered[25:47, 57:82] = distance[25:47, 57:82]
+    slides = [moved(0.0), moved(0.03), moved(-0.03)]
+    costs = np.array([[term_before(image).cost(slide)[0] for slide in slides] for image in (covered, distance)])
+    assert np.ptp(costs[0]) < 5
+    assert np.ptp(costs[1]) > 20
+    fit = term_before(covered).fit(slides[0])
+    assert fit.hidden > 0.6 * len(MESH.vertices)
+    assert fit.inliers >= 0.9 * fit.visible
+
+
+def test_free_space_pushes_back_the_more_the_farther():
+    term = term_before(board(STRAIGHT))
+    steps = [float(term.cost(moved(x))[0]) for x in (0.0, 0.03, 0.06, 0.1)]
+    growth = np.diff(steps)
+    assert (growth > 0).all()
+    assert growth[1] / 0.03 > growth[0] / 0.03
+    assert growth[2] / 0.04 > growth[1] / 0.03
+
+
+def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():
+    camera = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, T_rs=pose.from_rotation_vector([0, 0, 0], [0.05, 0, 0]))
+    distance = board(STRAIGHT)
+    distance[20:45, 52:77] = 0.85
+    points = term_before(distance).foreground()
+    term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
+    black = ColorImage(np.zeros((120, 160, 3), np.uint8))
+    surface = as_surface((MESH.vertices, MESH.normals))
+    term.observe(black, surface)
+    before, cost = term.fit(surface), term.cost(surface)[0]
+    term.hide(points)
+    after = term.fit(surface)
+    assert before.hidden == 0
+    low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)
+    place = camera.project(MESH.vertices)
+    inside = np.all((place > low + 0.5) & (place < high - 0.5), axis=1)
+    near = np.all((place > low - 3) & (place < high + 3), axis=1)
+    assert np.count_nonzero(inside) > 5
+    assert np.count_nonzero(inside) <= after.hidden <= np.count_nonzero(near)
+    assert term.cost(surface)[0] == pytest.approx(
+        cost - after.hidden * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
+    )
+
+
+def test_points_behind_a_camera_cast_no_shadow():
+    points = np.array([[0.0, 0, -1], [0, 0, 0], [5, 0, 0.5]])
+    assert not Shadow(STRAIGHT).mask(points).any()

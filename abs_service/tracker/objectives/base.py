@@ -51,6 +51,9 @@ class TermSum:
         self._active = [term for term in self._terms if term.sensor in observation.images]
         for term in self._active:
             term.observe(observation.images[term.sensor], predicted)
+        occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in self._active)])
+        for term in self._active:
+            term.hide(occluders)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""

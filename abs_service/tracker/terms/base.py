@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import ColorImage, DepthImage
+from abs_service.images import Image
 from abs_service.tracker.models.base import Surface
 from calib.noise.truncation import deviation_within
 
@@ -57,7 +57,8 @@ class SensorFit:
 
     Attributes:
         sensor: its name.
-        visible: vertices that face the sensor and lie inside its image.
+        visible: vertices that face the sensor and lie inside its image, with nothing before them that is known of.
+        hidden: vertices behind the mesh's own surface, behind something else, or where the sensor has a hole.
         samples: of these, how many met a measurement.
         inliers: of these, how many the measurement's own noise explains.
         mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if that is what the objective sums.
@@ -67,6 +68,7 @@ class SensorFit:
 
     sensor: str
     visible: int
+    hidden: int
     samples: int
     inliers: int
     mean_log_likelihood: float
@@ -76,6 +78,7 @@ class SensorFit:
 def summarize(
     sensor: str,
     visible: NDArray[np.bool_],
+    hidden: NDArray[np.bool_],
     measured: NDArray[np.bool_],
     residual: NDArray[np.float64],
     mean_log_likelihood: float,
@@ -87,7 +90,8 @@ def summarize(
 
     Args:
         sensor: its name.
-        visible, measured: whether a vertex is in sight, and whether there is a measurement of it.
+        visible, hidden, measured: whether a vertex is in sight, whether something hides it, and whether there is a
+            measurement of it.
         residual: size of each residual in its deviations, the root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
         channels: values that a measurement consists of.
@@ -95,7 +99,8 @@ def summarize(
     inlier = measured & (residual < INLIER_DEVIATIONS)
     square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
     spread = deviation_within(square, INLIER_DEVIATIONS, channels)
-    return SensorFit(sensor, int(visible.sum()), int(measured.sum()), int(inlier.sum()), mean_log_likelihood, spread)
+    counts = (int(np.count_nonzero(mask)) for mask in (visible, hidden, measured, inlier))
+    return SensorFit(sensor, *counts, mean_log_likelihood, spread)
 
 
 class Term(Protocol):
@@ -107,8 +112,16 @@ class Term(Protocol):
 
     sensor: str
 
-    def observe(self, image: DepthImage | ColorImage, predicted: Surface) -> None:
+    def observe(self, image: Image, predicted: Surface) -> None:
         """Takes the image that the following costs refer to, and the predicted mesh, a population of one."""
+        ...
+
+    def foreground(self) -> NDArray[np.float64]:
+        """Points (k, 3) [m] of things that stand between the sensor and the predicted mesh, as far as it sees them."""
+        ...
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Leaves out of this frame what the sensor cannot see behind points (k, 3) [m] that other sensors saw."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:

@@ -3,13 +3,19 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import ColorImage, DepthImage
+from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import depth_rows
+from abs_service.tracker.visibility import Visibility, classify
+from calib import pose
 from calib.jit import kernel
 from calib.noise.base import WINDOW_M, DepthNoise, render_texture
+
+#: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
+#: errs by a Laplace distribution of this scale.
+FREE_SCALE_M = 0.01
 
 
 class DepthTerm:
@@ -26,14 +32,51 @@ class DepthTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._texture = np.zeros((0, 8), np.float32)
+        self._obscured = np.zeros(0, np.bool_)
+        self._free = np.zeros(0, np.bool_)
+        self._foreground = np.zeros((0, 0), np.float32)
 
-    def observe(self, image: DepthImage | ColorImage, predicted: Surface) -> None:
-        """Renders the noise model over a depth image; what the predicted mesh hides is left out of this frame."""
+    def observe(self, image: Image, predicted: Surface) -> None:
+        """Renders the noise model over a depth image; what is hidden is left out of this frame."""
         if not isinstance(image, DepthImage):
-            raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered a colour image")
+            raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         texture = render_texture(self._noise, image.distance, image.amplitude, self._bounds.uniform)
-        self._texture = self._synthesizer.texture(self.sensor, texture).reshape(-1, 8)
+        texture = self._synthesizer.texture(self.sensor, texture)
         self._view.look(predicted)
+        distance = np.where(texture[1:-1, 1:-1, 3] > 0, texture[1:-1, 1:-1, 0], np.float32(np.nan))
+        seen = classify(distance, self._view.render(predicted), self._view.camera.fx)
+        self._foreground = np.where(seen.foreground, distance, np.nan)
+        self._obscured = np.pad(seen.foreground | seen.hole, 1).ravel()
+        self._free = np.pad(seen.free_m > 0, 1).ravel()
+        self._texture = self._classified(texture, seen).reshape(-1, 8)
+
+    def foreground(self) -> NDArray[np.float64]:
+        """Points (k, 3) [m] of what stands before the object."""
+        rows, columns = np.nonzero(np.isfinite(self._foreground))
+        camera = self._view.camera
+        sight = camera.directions(np.stack([columns, rows], axis=-1))
+        return pose.transform(camera.T_rs, sight * self._foreground[rows, columns, None])
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Nothing more: a depth sensor sees for itself what stands before the object."""
+
+    def _classified(self, texture: NDArray[np.float32], seen: Visibility) -> NDArray[np.float32]:
+        """The texture (height + 2, width + 2, 8) with constants where a measurement says nothing about distances.
+
+        Behind an occluder, and where returns are missing, a vertex costs what one that agrees costs on average, so that
+        it has no reason to move there or away. In free space it costs an outlier, and more the farther it is from the
+        object.
+        """
+        inner = texture[1:-1, 1:-1].copy()
+        if seen.object.any():
+            inner[seen.foreground | seen.hole] = 0
+            inner[seen.foreground | seen.hole, 6] = np.median(inner[seen.object, 6]) + 0.5
+        free = seen.free_m > 0
+        inner[free] = 0
+        inner[free, 6] = self._bounds.outlier - self._bounds.inlier + seen.free_m[free] / FREE_SCALE_M
+        result = texture.copy()
+        result[1:-1, 1:-1] = inner
+        return result
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,); the outlier share is mixed in by the larger of the two densities."""
@@ -56,9 +99,12 @@ class DepthTerm:
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
         residual, _, measured = self._residuals(surface)
-        visible = self._view.synthesize(surface).pixel[0] > 0
+        pixel = self._view.synthesize(surface).pixel[0]
+        free = self._free[pixel] & (pixel > 0)
+        hidden = (pixel < 0) | self._obscured[pixel]
         mean = -float(self.cost(surface)[0]) / residual.size
-        return summarize(self.sensor, visible, measured, np.abs(residual), mean)
+        size = np.where(free, np.inf, np.abs(residual))
+        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured | free, size, mean)
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
@@ -79,7 +125,10 @@ def _depth_cost(
     outlier: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over vertices of min(inlier + ½e² + log normaliser, outlier); texture as `render_texture` makes it."""
+    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured.
+
+    Texture as `render_texture` makes it.
+    """
     window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
     for k in range(pixel.shape[0]):
         total = np.float32(0)
@@ -90,5 +139,6 @@ def _depth_cost(
             t = texel[0] - distance[k, v]
             inside = min(max(t, -window), window)
             e = (t - texel[1] - texel[2] * inside) * (texel[3] + inside * (texel[4] + inside * texel[5]))
-            total += min(np.float32(0.5) * e * e + texel[6] + texel[7] * inside, ceiling) + least
+            cost = np.float32(0.5) * e * e + texel[6] + texel[7] * inside
+            total += (min(cost, ceiling) if texel[3] > 0 else cost) + least
         out[k] = total

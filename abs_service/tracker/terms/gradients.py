@@ -7,6 +7,7 @@ from calib.camera import Camera
 
 #: Half the side of the neighbourhood whose colours give the image's slope at a vertex [px].
 RADIUS_PX = 2
+_STEPS = np.arange(-RADIUS_PX, RADIUS_PX + 1.0)
 
 #: Grazing views: the cosine between line of sight and normal below which a row would explode.
 LEAST_COSINE = 0.2
@@ -38,23 +39,72 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
+    pixels, projection = _projected(camera, vertices)
+    column, row = _neighborhood(pixels, image.shape[:2])
+    weights = _bell()
+    slopes = np.stack([weights * _STEPS, weights * _STEPS[:, None]], axis=-1) / np.sum(weights * _STEPS**2)
+    return np.einsum("nrkc,rkd->ncd", image[row, column].astype(np.float64), slopes) @ projection
+
+
+def channel_rows(
+    values: NDArray[np.float32],
+    channels: NDArray[np.float32],
+    camera: Camera,
+    vertices: NDArray[np.floating],
+) -> NDArray[np.float64]:
+    """Derivatives (n, 3) of the measured value at a vertex's pixel by the vertex, in the image's unit per metre.
+
+    Behind a Bayer mosaic the slope is that of the lattice of pixels with the same channel: between channels the values
+    jump, and a slope across them is none of the surface's.
+
+    Args:
+        values: image (height, width), NaN where nothing is known.
+        channels: channel (height, width) of every pixel.
+        camera: its camera.
+        vertices: positions (n, 3) [m].
+    """
+    pixels, projection = _projected(camera, vertices)
+    column, row = _neighborhood(pixels, values.shape)
+    patches = values[row, column].astype(np.float64)
+    same = channels[row, column] == channels[row[:, RADIUS_PX], column[:, :, RADIUS_PX]][..., None]
+    weights = _bell() * (same & np.isfinite(patches))
+    patches = np.where(weights > 0, patches, 0.0)
+    slopes = np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
+    return np.einsum("nd,ndi->ni", slopes, projection)
+
+
+def _bell() -> NDArray[np.float64]:
+    """Weights of a neighbourhood: a Gaussian of one pixel."""
+    return np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
+
+
+def _slope(
+    patches: NDArray[np.float64], weights: NDArray[np.float64], steps: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Weighted regression (n,) of patches (n, rows, columns) on steps along one axis; 0 where there is nothing."""
+    total = np.maximum(weights.sum(axis=(1, 2)), 1e-12)
+    mean = (weights * steps).sum(axis=(1, 2)) / total
+    centered = steps - mean[:, None, None]
+    spread = (weights * centered**2).sum(axis=(1, 2))
+    return np.where(spread > 1e-6, (weights * centered * patches).sum(axis=(1, 2)) / np.maximum(spread, 1e-6), 0.0)
+
+
+def _projected(camera: Camera, vertices: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Pixels (n, 2) of vertices (n, 3), and derivatives (n, 2, 3) of their projection [px/m]."""
     points = np.asarray(vertices, np.float64)
     step = 1e-4
     offsets = np.concatenate([np.eye(3), -np.eye(3)]) * step
     moved = camera.project(points[:, None] + offsets)
     projection = (moved[:, :3] - moved[:, 3:]).transpose(0, 2, 1) / (2 * step)
-    return _image_gradient(image, np.floor(camera.project(points) + 0.5).astype(int)) @ projection
+    return np.floor(camera.project(points) + 0.5).astype(int), projection
 
 
-def _image_gradient(image: NDArray[np.float32], pixels: NDArray[np.integer]) -> NDArray[np.float64]:
-    """Derivatives (n, 3 channels, 2) of an image by column and row at pixels (n, 2), over a Gaussian neighbourhood.
+def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Columns (n, 1, k) and rows (n, k, 1) around pixels (n, 2), as indices of an image.
 
-    Only the vertices' pixels are smoothed; a colour image has a thousand times as many.
+    Only the vertices' pixels are looked at; an image has a thousand times as many.
     """
-    steps = np.arange(-RADIUS_PX, RADIUS_PX + 1)
-    column = np.clip(pixels[:, :1] + steps, 0, image.shape[1] - 1)
-    row = np.clip(pixels[:, 1:] + steps, 0, image.shape[0] - 1)
-    patches = image[row[:, :, None], column[:, None, :]].astype(np.float64)
-    bell = np.exp(-0.5 * steps**2)
-    weights = np.outer(bell, steps * bell) / (bell.sum() * (steps**2 * bell).sum())
-    return np.einsum("nrkc,rkd->ncd", patches, np.stack([weights, weights.T], axis=-1))
+    steps = _STEPS.astype(int)
+    column = np.clip(pixels[:, :1] + steps, 0, shape[1] - 1)
+    row = np.clip(pixels[:, 1:] + steps, 0, shape[0] - 1)
+    return column[:, None, :], row[:, :, None]

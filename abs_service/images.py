@@ -1,0 +1,60 @@
+"""What sensors measured, one type for each kind of sensor: SI values, radial distances, NaN for what is unknown."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Shares of red, green and blue in grey (ITU-R BT.601).
+LUMA = np.array([0.299, 0.587, 0.114], np.float32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DepthImage:
+    """What a depth sensor measured.
+
+    Attributes:
+        distance: radial distances (height, width) [m], NaN without return.
+        amplitude: amplitudes (height, width) in the sensor's unit; NaN where there is none.
+    """
+
+    distance: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColorImage:
+    """What a colour sensor measured: red, green, blue (height, width, 3) in 0…255."""
+
+    rgb: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelImage:
+    """What a sensor measured whose pixels hold one number each.
+
+    Attributes:
+        values: (height, width), NaN where nothing was measured; grey and colour filters in 0…255, others in the
+            sensor's unit.
+        channels: of the surface's colours (red, green, blue: 0, 1, 2), the one that a pixel shows, (rows, columns) of
+            the pattern that repeats from the upper left corner on; [[0]] if there is only one.
+    """
+
+    values: NDArray[np.float32]
+    channels: NDArray[np.uint8]
+
+    @property
+    def channel(self) -> NDArray[np.uint8]:
+        """The channel of every pixel (height, width)."""
+        repeats = [-(-size // period) for size, period in zip(self.values.shape, self.channels.shape)]
+        return np.tile(self.channels, repeats)[: self.values.shape[0], : self.values.shape[1]]
+
+
+@dataclass(frozen=True, slots=True)
+class BeamReading:
+    """What a light barrier says."""
+
+    interrupted: bool
+
+
+Image = DepthImage | ColorImage | ChannelImage | BeamReading

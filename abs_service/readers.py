@@ -1,0 +1,146 @@
+"""From the frames of one head to the image of one sensor, one reader for each kind of sensor."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.images import LUMA, BeamReading, ChannelImage, ColorImage, DepthImage, Image
+from calib.camera import Camera
+from calib.noise.base import DepthNoise
+from calib.noise.bayer import GaussianBayer
+from calib.noise.binary import LightBarrier
+from calib.noise.color import GaussianColor
+from calib.noise.grey import GaussianGrey
+from calib.noise.intensity import GaussianIntensity
+from calib.rig import Sensor
+from drivers.frame import Frame, Geometry, Kind
+
+#: The pattern of channels of an image without colours, and those of the mosaics by what their two upper rows read.
+ONE_CHANNEL = np.zeros((1, 1), np.uint8)
+BAYER_ORDERS: Mapping[str, NDArray[np.uint8]] = {
+    order: np.array(["rgb".index(letter) for letter in order], np.uint8).reshape(2, 2)
+    for order in ("rggb", "bggr", "grbg", "gbrg")
+}
+
+
+class ObservationError(ValueError):
+    """A frame that does not fit the rig it is said to come from."""
+
+
+class Reader(Protocol):
+    """Makes the image of one sensor from the frames of its head.
+
+    Attributes:
+        kinds: of the frames that it needs; the image is of the first one's exposure.
+    """
+
+    kinds: tuple[Kind, ...]
+
+    def read(self, frames: Mapping[Kind, Frame]) -> Image:
+        """The image.
+
+        Raises:
+            ObservationError: a frame's encoding does not fit what the sensor is said to measure.
+        """
+        ...
+
+
+def reader(sensor: Sensor) -> Reader:
+    """The reader for what a sensor's noise model is about."""
+    match sensor.noise:
+        case DepthNoise():
+            return _DepthReader(sensor.camera, sensor.noise.uses_amplitude)
+        case GaussianColor():
+            return _ColorReader()
+        case GaussianGrey():
+            return _GreyReader()
+        case GaussianBayer():
+            return _BayerReader()
+        case GaussianIntensity():
+            return _IntensityReader(sensor.noise.stream)
+        case LightBarrier():
+            return _BeamReader()
+
+
+class _DepthReader:
+    def __init__(self, camera: Camera, uses_amplitude: bool):
+        self.kinds = (Kind.DEPTH, Kind.AMPLITUDE) if uses_amplitude else (Kind.DEPTH,)
+        self._camera = camera
+
+    @cached_property
+    def _ray_length(self) -> NDArray[np.float32]:
+        """Radial distance per unit of z of every pixel (height, width)."""
+        return (1 / self._camera.rays()[..., 2]).astype(np.float32)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
+        depth = frames[Kind.DEPTH]
+        distance = depth.si()
+        if depth.geometry == Geometry.Z:
+            distance = distance * self._ray_length
+        amplitude = frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full_like(distance, np.nan)
+        return DepthImage(distance, amplitude)
+
+
+class _ColorReader:
+    kinds = (Kind.COLOR,)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> ColorImage:
+        return ColorImage(_rgb(frames[Kind.COLOR], "color", "rgb8 or bgr8; monochrome cameras have the noise type grey"))
+
+
+class _GreyReader:
+    """Grey as it comes, or the luma of a colour."""
+
+    kinds = (Kind.COLOR,)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+        frame = frames[Kind.COLOR]
+        match frame.encoding:
+            case "mono8":
+                return ChannelImage(frame.si(), ONE_CHANNEL)
+            case "mono16":
+                return ChannelImage(frame.si() * np.float32(255 / 65535), ONE_CHANNEL)
+        return ChannelImage(_rgb(frame, "grey", "mono8, mono16, rgb8 or bgr8") @ LUMA, ONE_CHANNEL)
+
+
+class _BayerReader:
+    kinds = (Kind.BAYER,)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+        frame = frames[Kind.BAYER]
+        order = frame.encoding.removeprefix("bayer_").removesuffix("8")
+        if order not in BAYER_ORDERS:
+            raise _unfit(frame, "bayer", "bayer_rggb8, bayer_bggr8, bayer_grbg8 or bayer_gbrg8")
+        return ChannelImage(frame.si(), BAYER_ORDERS[order])
+
+
+class _IntensityReader:
+    def __init__(self, stream: str):
+        self.kinds = (Kind(stream),)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+        return ChannelImage(frames[self.kinds[0]].si(), ONE_CHANNEL)
+
+
+class _BeamReader:
+    kinds = (Kind.BINARY,)
+
+    def read(self, frames: Mapping[Kind, Frame]) -> BeamReading:
+        return BeamReading(bool(frames[Kind.BINARY].si().max() > 0.5))
+
+
+def _rgb(frame: Frame, noise: str, needed: str) -> NDArray[np.uint8]:
+    if frame.encoding not in {"rgb8", "bgr8"}:
+        raise _unfit(frame, noise, needed)
+    pixels = frame.data.view(np.uint8)
+    return pixels[..., ::-1] if frame.encoding == "bgr8" else pixels
+
+
+def _unfit(frame: Frame, noise: str, needed: str) -> ObservationError:
+    return ObservationError(
+        f"{frame.sensor}/{frame.stream} is {frame.encoding}, but sensors.{frame.sensor} has noise of type {noise}, "
+        f"which needs {needed}"
+    )

@@ -1,0 +1,24 @@
+"""Which pixels of a depth image belong to one and the same surface."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+
+def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> tuple[NDArray[np.int32], int]:
+    """Label of every pixel's surface, 0 for none, and the number of labels.
+
+    Surfaces are separated where the distance jumps; noise is smoothed first, because one noisy pixel would
+    otherwise connect or cut.
+
+    Args:
+        distance: radial distances (height, width) [m], NaN without return.
+        largest_step: difference between neighbours that still connects them [m].
+    """
+    filled = np.where(np.isfinite(distance), distance, 0).astype(np.float32)
+    smooth = cv2.medianBlur(filled, 5)
+    highest = cv2.dilate(smooth, np.ones((3, 3)))
+    lowest = cv2.erode(smooth, np.ones((3, 3)))
+    surface = (np.isfinite(distance) & (lowest > 0) & (highest - lowest < largest_step)).astype(np.uint8)
+    count, labels = cv2.connectedComponents(surface, connectivity=4)
+    return np.asarray(labels, np.int32), count

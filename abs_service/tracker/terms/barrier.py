@@ -1,0 +1,98 @@
+"""A light barrier's reading against whether the deformed mesh crosses its beam."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.images import BeamReading, Image
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import Bounds, Linearization, SensorFit
+from calib.camera import Camera
+from calib.jit import kernel
+from calib.noise.binary import LightBarrier
+
+
+class BarrierTerm:
+    """−log of the probability of the reading, given whether the mesh crosses the beam.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(self, sensor: str, camera: Camera, faces: NDArray[np.int32], noise: LightBarrier, bounds: Bounds):
+        self.sensor = sensor
+        self._faces = np.ascontiguousarray(faces, np.int32)
+        beam = np.stack([camera.center, camera.center + noise.length_m * camera.T_rs[:3, 2]])
+        self._beam = np.ascontiguousarray(beam, np.float32)
+        self._noise = noise
+        self._bounds = bounds
+        self._costs = np.zeros(2)  # for a mesh that leaves the beam free, and one that crosses it
+        self._interrupted = False
+
+    def observe(self, image: Image, predicted: Surface) -> None:
+        """Takes a reading."""
+        if not isinstance(image, BeamReading):
+            raise TypeError(f"sensor {self.sensor} has noise of a light barrier but delivered {type(image).__name__}")
+        self._interrupted = image.interrupted
+        self._costs = np.minimum(np.add(self._noise.cost(image.interrupted), self._bounds.inlier), self._bounds.outlier)
+
+    def foreground(self) -> NDArray[np.float64]:
+        """None: where on the beam something is remains unknown."""
+        return np.zeros((0, 3))
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Nothing: what interrupts the beam is taken for the object; how often that is wrong is in the noise model."""
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−log P(reading | does the mesh cross the beam) (population,)."""
+        return self._costs[self._crossing(surface).astype(int)]
+
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """Nothing: the cost is constant but for a step, which the search has to find."""
+        return Linearization(np.zeros(0), np.zeros((0, jacobian.shape[2])))
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """One sample, which agrees or not."""
+        agrees = int(self._crossing(surface)[0] == self._interrupted)
+        return SensorFit(self.sensor, 1, 0, 1, agrees, -float(self.cost(surface)[0]), float("nan"))
+
+    def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
+        crossing = np.zeros(len(surface.vertices), np.bool_)
+        _crossing(surface.vertices, self._faces, *self._beam, crossing)
+        return crossing
+
+
+@kernel
+def _crossing(
+    vertices: NDArray[np.float32],
+    faces: NDArray[np.int32],
+    begin: NDArray[np.float32],
+    end: NDArray[np.float32],
+    crossing: NDArray[np.bool_],
+) -> None:
+    """Whether any face of each member meets the segment from begin to end (3,) [m].
+
+    A line meets a face if it passes all edges on the same side; the volumes that tell the side are the weights of the
+    opposite corners in the meeting point. Neighbouring faces share an edge's volume, so there is no crack between them.
+    """
+    ox, oy, oz = np.float64(begin[0]), np.float64(begin[1]), np.float64(begin[2])
+    x, y, z = end[0] - ox, end[1] - oy, end[2] - oz
+    for k in range(vertices.shape[0]):
+        crossing[k] = False
+        for f in range(faces.shape[0]):
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            ax, ay, az = vertices[k, 0, a] - ox, vertices[k, 1, a] - oy, vertices[k, 2, a] - oz
+            bx, by, bz = vertices[k, 0, b] - ox, vertices[k, 1, b] - oy, vertices[k, 2, b] - oz
+            cx, cy, cz = vertices[k, 0, c] - ox, vertices[k, 1, c] - oy, vertices[k, 2, c] - oz
+            ab = x * (ay * bz - az * by) + y * (az * bx - ax * bz) + z * (ax * by - ay * bx)
+            bc = x * (by * cz - bz * cy) + y * (bz * cx - bx * cz) + z * (bx * cy - by * cx)
+            ca = x * (cy * az - cz * ay) + y * (cz * ax - cx * az) + z * (cx * ay - cy * ax)
+            if not ((ab >= 0 and bc >= 0 and ca >= 0) or (ab <= 0 and bc <= 0 and ca <= 0)):
+                continue
+            total = ab + bc + ca
+            if total == 0:  # the segment lies in the face's plane, or the face is a line
+                continue
+            reach = bc * (ax * x + ay * y + az * z) + ca * (bx * x + by * y + bz * z) + ab * (cx * x + cy * y + cz * z)
+            place = reach / total / (x * x + y * y + z * z)
+            if 0 <= place <= 1:
+                crossing[k] = True
+                break

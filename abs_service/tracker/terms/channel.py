@@ -1,0 +1,147 @@
+"""A sensor whose pixels hold one number each: grey, a Bayer mosaic, amplitudes, infra-red."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.images import ChannelImage, Image
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
+from abs_service.tracker.terms.gradients import channel_rows
+from abs_service.tracker.terms.illumination import Illumination
+from abs_service.tracker.terms.shadow import Shadow
+from calib.jit import kernel
+from calib.noise.base import LOG_SQRT_2PI
+
+#: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
+VALUE, CHANNEL, INVERSE, NORMALIZER = range(4)
+
+
+class ChannelNoise(Protocol):
+    """Gaussian noise of one number per pixel."""
+
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Standard deviation of measured values, in their shape."""
+        ...
+
+
+class ChannelTerm:
+    """−log of the density of the measured number given what the vertex has in the pixel's channel.
+
+    Behind a Bayer mosaic only the channel that the pixel has is compared, and nothing is interpolated (section 4.1).
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        appearance: NDArray[np.float32],
+        noise: ChannelNoise,
+        illumination: Illumination,
+        bounds: Bounds,
+    ):
+        self.sensor = sensor
+        self._synthesizer = synthesizer
+        self._view = synthesizer.view(sensor, appearance)
+        self._illumination = illumination
+        self._shadow = Shadow(self._view.camera)
+        self._noise = noise
+        self._bounds = bounds
+        self._image = np.zeros((1, 1, 4), np.float32)
+        self._texture = np.zeros((0, 4), np.float32)
+
+    def observe(self, image: Image, predicted: Surface) -> None:
+        """Takes an image; NaN, which the border is as well, stands for no measurement."""
+        if not isinstance(image, ChannelImage):
+            raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
+        deviation = self._noise.deviation(image.values)
+        normalizer = np.log(deviation) + np.float32(LOG_SQRT_2PI + self._bounds.inlier)
+        texels = np.stack([image.values, image.channel.astype(np.float32), 1 / deviation, normalizer], axis=-1)
+        self._image = self._synthesizer.image(self.sensor, texels)
+        texture = np.zeros((self._image.shape[0] + 2, self._image.shape[1] + 2, 4), np.float32)
+        texture[..., VALUE] = np.nan
+        texture[1:-1, 1:-1] = self._image
+        texture[..., CHANNEL] = np.nan_to_num(texture[..., CHANNEL])
+        self._texture = texture.reshape(-1, 4)
+        self._view.look(predicted)
+
+    def foreground(self) -> NDArray[np.float64]:
+        """None: brightness does not tell what is nearer."""
+        return np.zeros((0, 3))
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
+        covered = np.pad(self._shadow.mask(points), 1).ravel()
+        self._texture[covered, VALUE] = np.inf
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log of the density of the measured values (population,)."""
+        seen = self._illumination.shine(self._view.synthesize(surface), surface)
+        out = np.empty(len(seen.pixel))
+        uniform = self._bounds.inlier + self._bounds.uniform
+        _channel_cost(seen.pixel, self._texture, seen.attributes, self._bounds.outlier, uniform, out)
+        return out
+
+    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """The inliers' normalised residuals, and how they change with the parameters.
+
+        The slope of the image is that of the pixel's own channel. What light makes of a turning surface changes slower
+        than its texture, and is left to the search.
+        """
+        residual, inverse, measured = self._residuals(surface)
+        use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
+        vertices, moves = (self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, jacobian))
+        rows = channel_rows(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, vertices)
+        return Linearization(residual[use], np.einsum("ni,nid->nd", rows * inverse[use, None], moves))
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        residual, _, measured = self._residuals(surface)
+        pixel = self._view.synthesize(surface).pixel[0]
+        hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
+        mean = -float(self.cost(surface)[0]) / len(residual)
+        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, np.abs(residual), mean)
+
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+        """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
+        seen = self._illumination.shine(self._view.synthesize(surface), surface)
+        texels = self._texture[seen.pixel[0]].astype(np.float64)
+        own = seen.attributes[0][np.arange(len(texels)), texels[:, CHANNEL].astype(int)]
+        residual = (texels[:, VALUE] - own) * texels[:, INVERSE]
+        measured = (seen.pixel[0] > 0) & np.isfinite(residual)
+        return np.where(measured, residual, np.inf), texels[:, INVERSE], measured
+
+
+@kernel
+def _channel_cost(
+    pixel: NDArray[np.int32],
+    texture: NDArray[np.float32],
+    appearance: NDArray[np.float32],
+    outlier: float,
+    uniform: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Sum over samples of min(normaliser + ½e², outlier).
+
+    Where the value or the vertex's own is unknown (NaN) of `uniform`, and where something stands before the object (∞)
+    of what an agreeing value costs on average. Texels are [value, channel, inverse deviation, normaliser].
+    """
+    half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
+    for k in range(pixel.shape[0]):
+        total = np.float32(0)
+        own = k % appearance.shape[0]
+        for v in range(pixel.shape[1]):
+            if pixel[k, v] < 0:
+                continue
+            texel = texture[pixel[k, v]]
+            e = (texel[0] - appearance[own, v, np.int32(texel[1])]) * texel[2]
+            if np.isfinite(e):
+                total += min(half * e * e + texel[3], most)
+            else:
+                total += unknown if np.isnan(e) else half + texel[3]
+        out[k] = total

@@ -1,0 +1,37 @@
+"""What one sensor saw before the object, in the image of another sensor that measures no distances."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.raster import field_radius
+from calib import pose
+from calib.camera import Camera
+
+
+class Shadow:
+    """Where points that stand before the object cover it in one camera's image."""
+
+    def __init__(self, camera: Camera):
+        self._camera = camera
+        self._limit = field_radius(camera)
+
+    def mask(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Pixels (height, width) that points (k, 3) [m], neighbours in another sensor's image, cover.
+
+        Each stands for a square as wide as the gap to its neighbour, so that the mask has no holes.
+        """
+        camera = self._camera
+        covered = np.zeros((camera.height, camera.width), np.uint8)
+        local = pose.transform(camera.T_sr, points)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = (local[:, 2] > 0) & (np.linalg.norm(local[:, :2], axis=1) / local[:, 2] < self._limit)
+        pixel = np.floor(camera.project(points[seen]) + 0.5)
+        inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
+        column, row = pixel[inside].astype(int).T
+        if not len(row):
+            return covered > 0
+        covered[row, column] = 1
+        gap_m = float(np.median(np.linalg.norm(np.diff(points, axis=0), axis=1))) if len(points) > 1 else 0.0
+        side = 2 * int(np.ceil(gap_m * camera.fx / float(np.median(local[seen, 2])) / 2)) + 1
+        return cv2.dilate(covered, np.ones((side, side), np.uint8)) > 0

@@ -1,0 +1,65 @@
+"""Noise of a raw pixel behind one colour filter of a Bayer mosaic (section 4.1)."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import NDArray
+
+from calib.noise.base import LEVELS, NoiseError
+
+#: Every filter lets its own colour through and nothing else.
+IDEAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class GaussianBayer:
+    """Every pixel deviates with one deviation from the one channel that its filter lets through.
+
+    What the optics and the filters do to a colour before it is measured is done to the colours of the vertices, never
+    undone in the measurement, where it would spread the noise of a pixel over its neighbours.
+
+    Attributes:
+        sigma: standard deviation of a pixel, in levels of 256.
+        crosstalk: shares of red, green and blue light (columns) in a pixel behind the red, green and blue filter
+            (rows): leakage of the filters, and of light into neighbouring pixels.
+        defocus_px: how much more this sensor blurs than the one that the vertices' colours come from: deviation of a
+            Gaussian in pixels of this sensor. It does nothing to colours that come from this sensor itself, because
+            they are as blurred as what they are compared with.
+    """
+
+    sigma: Annotated[float, Gt(0)] = 15.0
+    crosstalk: tuple[tuple[float, float, float], ...] = IDEAL
+    defocus_px: Annotated[float, Ge(0)] = 0.0
+
+    def __post_init__(self) -> None:
+        if len(self.crosstalk) != 3 or abs(np.linalg.det(np.array(self.crosstalk))) < 1e-3:
+            raise NoiseError(
+                "crosstalk must be three rows of three numbers, of which none follows from the others, "
+                f"not {[list(row) for row in self.crosstalk]}"
+            )
+
+    @property
+    def uniform(self) -> float:
+        """Negative log-density of a pixel that says nothing about the surface."""
+        return float(np.log(LEVELS))
+
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Standard deviation of measured values, in their shape."""
+        return np.full_like(values, self.sigma)
+
+    def filtered(self, colors: NDArray[np.floating]) -> NDArray[np.float64]:
+        """What the red, green and blue pixels (…, 3) make of colours (…, 3)."""
+        return colors @ np.array(self.crosstalk).T
+
+    def unfiltered(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The colours (…, 3) of which red, green and blue pixels made (…, 3)."""
+        return pixels @ np.linalg.inv(np.array(self.crosstalk)).T
+
+    def build(self) -> "GaussianBayer":
+        """The model itself: its TOML keys are its fields."""
+        return self
+
+
+Settings = GaussianBayer
