@@ -6,10 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service.health import Health, Level
-from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.estimate import Estimate
 
 #: Time over which residuals are averaged [ns]; at 30 Hz and 300 vertices, their variance is then known to 2 %.
 WINDOW_NS = 1_000_000_000
+
+#: With a smaller share of inliers it is not the noise that is wrong: the object is lost, hidden, or bends as its model
+#: cannot.
+EXPLAINED = 0.6
 
 #: Fewer residuals than this in a window are no evidence.
 LEAST_RESIDUALS = 200
@@ -48,8 +52,8 @@ class ResidualWatch:
         self._warned: set[str] = set()
 
     def take(self, estimate: Estimate) -> None:
-        """Adds an estimate's residuals; those of an object that is lost say nothing about the noise."""
-        if estimate.status not in (Status.TRACKING, Status.DEGRADED):
+        """Adds an estimate's residuals, if it explains what the sensors see."""
+        if estimate.inlier_share < EXPLAINED:
             return
         if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:
             for sensor, total in self._sums.items():
@@ -76,5 +80,5 @@ def _advice(sensor: str, variance: float) -> str:
     factor, change = np.sqrt(variance), "larger" if variance > 1 else "smaller"
     return (
         f"{sensor} errs {factor:.1f} times as much as its noise model says (variance of its residuals {variance:.1f} "
-        f"instead of 1): make the deviation in sensors.{sensor}.noise {change}, or fit it"
+        f"instead of 1): make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/noise.md)"
     )

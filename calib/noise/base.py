@@ -14,6 +14,10 @@ WINDOW_M = 0.05
 #: No surface is nearer than this [m]; keeps the window's near end in front of the camera.
 LEAST_DISTANCE_M = 1e-3
 
+#: Pixels that are rendered at once: so many that calls cost little, so few that what lies between them stays in the
+#: processor's memory.
+_BLOCK = 32768
+
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 
 #: Values that a channel of a colour can have.
@@ -96,10 +100,26 @@ def render_texture(
     height, width = distance.shape
     texture = np.zeros((height + 2, width + 2, 8), np.float32)
     texture[..., 6] = uniform
+    rows = max(1, _BLOCK // max(width, 1))
+    for top in range(0, height, rows):
+        block = slice(top, top + rows)
+        _render_rows(model, distance[block], amplitude[block], top, texture)
+    return texture
+
+
+def _render_rows(
+    model: DepthNoise,
+    distance: NDArray[np.float32],
+    amplitude: NDArray[np.float32],
+    top: int,
+    texture: NDArray[np.float32],
+) -> None:
+    """Writes the texels of some rows of an image, of which the first is row `top`."""
     pixels, returns = np.empty((2, distance.size), np.int64), np.empty((2, distance.size))
     n = _returns(
         np.ascontiguousarray(distance, np.float32),
         np.ascontiguousarray(amplitude, np.float32),
+        top,
         model.uses_amplitude,
         pixels,
         returns,
@@ -109,13 +129,13 @@ def render_texture(
     center = measured - offset
     nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), LEAST_DISTANCE_M)
     _write_texels(*p, center, model.mean(nodes, a, p) - offset, model.deviation(nodes, a, p), texture)
-    return texture
 
 
 @kernel
 def _returns(
     distance: NDArray[np.float32],
     amplitude: NDArray[np.float32],
+    top: int,
     uses_amplitude: bool,
     pixels: NDArray[np.int64],
     returns: NDArray[np.float64],
@@ -129,7 +149,7 @@ def _returns(
         for column in range(distance.shape[1]):
             x, a = distance[row, column], amplitude[row, column]
             if x > 0 and np.isfinite(x) and (np.isfinite(a) or not uses_amplitude):
-                pixels[0, n], pixels[1, n] = row, column
+                pixels[0, n], pixels[1, n] = top + row, column
                 returns[0, n], returns[1, n] = x, a
                 n += 1
     return n

@@ -50,6 +50,16 @@ def test_where_nothing_returned_and_around_the_image_it_is_uniform():
     np.testing.assert_allclose(negative_log_density(silent, [-3.0, 0.0, 3.0]), UNIFORM, rtol=1e-7)
 
 
+def test_a_large_image_is_rendered_in_blocks_that_leave_no_seam():
+    """Rows of the two images are the same; the large one has more pixels than are rendered at once."""
+    row = np.linspace(0.7, 3.0, 600, dtype=np.float32)
+    row[::7] = np.nan
+    amplitude = np.linspace(500, 9000, 600, dtype=np.float32)
+    large = render_texture(BIASED, np.tile(row, (130, 1)), np.tile(amplitude, (130, 1)), UNIFORM)
+    small = render_texture(BIASED, row[None], amplitude[None], UNIFORM)
+    np.testing.assert_array_equal(large[1:-1], np.tile(small[1:2], (130, 1, 1)))
+
+
 def test_infinite_distances_are_no_returns_for_every_model():
     distance = np.full((2, 2), np.inf, np.float32)
     for model in MODELS.values():

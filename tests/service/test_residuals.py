@@ -7,9 +7,8 @@ import pytest
 from abs.v1.health_pb2 import Health as Message
 
 from abs_service.health import Health
-from abs_service.residuals import LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
+from abs_service.residuals import EXPLAINED, LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
 from abs_service.stamps import Speaker, WallClock
-from abs_service.tracker.estimate import Status
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.base import SensorFit
@@ -31,11 +30,11 @@ class Watch:
         self.watch = ResidualWatch(self.health, {"tof"})
         self.t_ns = 10**12
 
-    def see(self, seconds=2.0, status=Status.TRACKING, inliers=250, **variances):
+    def see(self, seconds=2.0, share=0.9, inliers=250, **variances):
         """Estimates for so long, whose residuals have these variances by sensor; tells what health says then."""
         fits = tuple(SensorFit(name, 300, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
         for _ in range(int(seconds * 1e9 / PERIOD_NS)):
-            self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, status=status, fits=fits))
+            self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, inlier_share=share, fits=fits))
             self.t_ns += PERIOD_NS
         return self.said
 
@@ -62,7 +61,7 @@ def test_a_wrong_model_is_named_with_its_factor_and_what_to_do(sensor, variance,
     said = Watch().see(**{"tof": 1.0, "color": 1.0, sensor: variance})
     assert said.level == WARNING
     assert said.message.startswith(f"{sensor} errs {factor} times as much as its noise model says")
-    assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it")
+    assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/noise.md)")
 
 
 def test_two_wrong_models_are_both_named():
@@ -91,10 +90,10 @@ def test_a_few_residuals_are_no_evidence():
     assert not said.gauges
 
 
-def test_an_object_that_is_lost_says_nothing_about_noise():
+def test_an_object_that_is_lost_or_bends_as_its_model_cannot_says_nothing_about_noise():
     watch = Watch()
-    assert watch.see(status=Status.LOST, tof=9.0).level == OK
-    assert watch.see(status=Status.DEGRADED, tof=9.0).level == WARNING
+    assert watch.see(share=EXPLAINED - 0.05, tof=9.0).level == OK
+    assert watch.see(share=EXPLAINED + 0.05, tof=9.0).level == WARNING
 
 
 def test_time_that_goes_back_begins_a_new_window():
