@@ -76,8 +76,8 @@ class Frame:
         seq: counts the device's exposures; depth and amplitude of one exposure share it; gaps are losses.
         epoch: grows by one with each reconnect or clock step; seq and ticks start anew.
         scale: value, in `unit`, of one step of `data`.
-        unit: what `data` times `scale` is measured in: "m" for lengths, "1" for yes (1) and no (0), "dn" for numbers that
-            only the device knows the meaning of; by default what fits the kind.
+        unit: what `data` times `scale` is measured in: "m" for lengths, "1" for yes (1) and no (0), "dn" for numbers
+            that only the device knows the meaning of; by default what fits the kind.
         geometry: which length a depth image holds.
         invalid: the value of `data` that means "no return"; NaN always does; None if every value is a measurement.
         t_device_ticks, tick_hz: the device's own stamp and its rate; rate 0 if the device has no clock.

@@ -6,11 +6,15 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
+import numpy as np
+
+from calib.lens import COEFFICIENTS, Lens, LensError
 from drivers.device import AddressError
 from drivers.simulated import values
+from drivers.simulated.barrier import Barrier, BarrierNoise
 from drivers.simulated.color import SIGMA, Bayer, Color
 from drivers.simulated.exposure import Head
-from drivers.simulated.optics import OPTICS
+from drivers.simulated.optics import BEAMS, OPTICS
 from drivers.simulated.scene import Scene
 from drivers.simulated.scenes import SCENES, Choices
 from drivers.simulated.simulation import Simulation
@@ -20,7 +24,7 @@ from drivers.simulated.time_of_flight import TimeOfFlight, TimeOfFlightNoise
 #: The keys, and what reads their values.
 KEYS: Mapping[str, Callable[[str], Any]] = {
     "seed": values.number(int, 0, 2**32 - 1),
-    "sensors": values.some_of(OPTICS),
+    "sensors": values.some_of([*OPTICS, *BEAMS]),
     "rate": values.number(float, 0.1, 200),
     "noise": values.number(float, 0, 10),
     "offset": values.number(float, -0.5, 0.5),
@@ -28,6 +32,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
     "occluder": values.one_of("none", "hand"),
+    "lens": values.numbers(len(COEFFICIENTS), -1, 1),
     **dict.fromkeys(OPTICS, values.size),
 }
 
@@ -39,7 +44,7 @@ class Address:
     Attributes:
         scene: one of `SCENES`.
         seed: of motion, texture and noise.
-        sensors: heads, of `OPTICS`.
+        sensors: heads, of `OPTICS` and `BEAMS`.
         sizes: width and height [px] of heads that differ from their default; in the address `color=640x480`.
         rate: exposures per second [Hz].
         noise: factor on all random errors; 0 leaves only what digits do.
@@ -48,6 +53,7 @@ class Address:
         speed: factor on the speed of all motion.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
         occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
+        lens: distortion of all heads, `calib.lens.COEFFICIENTS`; `lens=-0.2,0.05` is a barrel's k1 and k2.
     """
 
     scene: str
@@ -61,17 +67,29 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
+    lens: tuple[float, ...] = (0.0,)
 
     def build(self) -> Simulation:
-        """The world that the address describes."""
+        """The world that the address describes.
+
+        Raises:
+            AddressError: light from somewhere in an image cannot have come through the lens.
+        """
         choices = Choices(self.seed, math.radians(self.bend), self.speed, hand=self.occluder == "hand")
         world = SCENES[self.scene](choices)
-        heads = {name: self._head(name, world) for name in self.sensors}
+        try:
+            heads = {name: self._head(name, world) for name in self.sensors}
+        except LensError as error:
+            raise AddressError(f"simulated://{self.scene}: lens = {self.lens} is too strong: {error}") from error
         return Simulation(world, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
 
     def _head(self, name: str, world: Scene) -> Head:
+        if name in BEAMS:
+            beam, noise = BEAMS[name], BarrierNoise()
+            wrong = BarrierNoise(self.noise * noise.miss, self.noise * noise.false_alarm)
+            return Barrier(name, beam.camera, beam.length_m, self.rate, wrong)
         optics = OPTICS[name]
-        camera = optics.camera(*self.sizes.get(name, (optics.width, optics.height)))
+        camera = optics.camera(*self.sizes.get(name, (optics.width, optics.height)), Lens(np.array(self.lens)))
         if name == "tof":
             return TimeOfFlight(name, camera, world, self.rate, self._time_of_flight_noise())
         if name == "structured_light":

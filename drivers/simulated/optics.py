@@ -1,10 +1,12 @@
 """The geometry of the heads there are: where they look from, and how wide."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from calib import pose
 from calib.camera import Camera
+from calib.lens import Lens
 
 
 @dataclass(frozen=True)
@@ -16,11 +18,29 @@ class Optics:
     focal_ratio: float
     position: tuple[float, float, float]
 
-    def camera(self, width: int, height: int) -> Camera:
-        """A camera without lens distortion that sees the same angle in `width` pixels."""
+    def camera(self, width: int, height: int, lens: Lens) -> Camera:
+        """A camera whose image has `width` pixels; without its lens it would see the same angle as any other width."""
         focal = self.focal_ratio * width
         T_rs = pose.from_rotation_vector((0, 0, 0), self.position)
-        return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, T_rs=T_rs)
+        return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, lens, T_rs)
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Geometry of a light barrier: where its lamp and its receiver are in the rig [m]."""
+
+    lamp: tuple[float, float, float]
+    receiver: tuple[float, float, float]
+
+    @property
+    def camera(self) -> Camera:
+        """One pixel at the lamp that looks at the receiver."""
+        return Camera(1, 1, 1.0, 1.0, 0.0, 0.0, T_rs=pose.look_at(self.lamp, self.receiver))
+
+    @property
+    def length_m(self) -> float:
+        """From the lamp to the receiver [m]."""
+        return math.dist(self.lamp, self.receiver)
 
 
 #: The heads that make images. The rig's frame is that of `tof`, whose geometry is that of a SwissRanger SR4000.
@@ -30,3 +50,7 @@ OPTICS: Mapping[str, Optics] = {
     "structured_light": Optics(320, 240, 288 / 320, (-0.06, 0.0, 0.0)),
     "bayer": Optics(320, 240, 275 / 320, (0.05, 0.03, 0.0)),
 }
+
+#: The light barriers. The beam crosses the view at 45° to the image planes and passes the right rim of a sheet of
+#: 0.30 m at rest with 3.5 mm to spare, so that it tells of motion to the side and of motion in depth alike.
+BEAMS: Mapping[str, Beam] = {"barrier": Beam((0.455, 0.0, 0.70), (-0.145, 0.0, 1.30))}

@@ -49,6 +49,23 @@ def some_of(words: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
     return read
 
 
+def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, ...]]:
+    """Reads up to `most` numbers from `low` to `high` with commas in between."""
+    read_one = number(float, low, high)
+
+    def read(text: str) -> tuple[float, ...]:
+        parts = text.split(",")
+        try:
+            found = tuple(map(read_one, parts))
+        except ValueError:
+            found = ()
+        if not 1 <= len(found) <= most:
+            raise ValueError(f"1 to {most} numbers from {low:g} to {high:g} with commas in between")
+        return found
+
+    return read
+
+
 def size(text: str) -> tuple[int, int]:
     """Reads width and height of an image [px], such as 640x480."""
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)

@@ -118,7 +118,8 @@ def test_a_sink_may_stop_the_device_itself() -> None:
 
 
 def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
-    uri = "simulated://board?seed=2&sensors=tof,structured_light,color,bayer&rate=15&color=64x48&tof=32x24"
+    heads = "tof,structured_light,color,bayer,barrier"
+    uri = f"simulated://board?seed=2&sensors={heads}&rate=15&color=64x48&tof=32x24"
     device = open_device(uri, Time().clock)
     assert device.info.uri == uri
     assert [f"{s.sensor}/{s.stream}" for s in device.streams] == [
@@ -127,6 +128,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
         "structured_light/depth",
         "color/color",
         "bayer/bayer",
+        "barrier/binary",
     ]
     assert isinstance(device, SimulatedDevice)
     frames, _ = device._simulation.expose(0)
@@ -160,9 +162,15 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?rate=0", r"rate = '0' must be a number from 0.1 to 200"),
         ("simulated://sheet?rate=nan", r"rate = 'nan' must be"),
         ("simulated://sheet?rate=", r"rate = '' must be"),
-        ("simulated://sheet?sensors=tof,lidar", r"sensors = 'tof,lidar' must be one or more of \['bayer'"),
+        ("simulated://sheet?sensors=tof,lidar", r"sensors = 'tof,lidar' must be one or more of \['barrier', 'bayer'"),
         ("simulated://sheet?sensors=", r"sensors = '' must be"),
         ("simulated://sheet?sensors=tof,tof", "each once"),
+        ("simulated://sheet?occluder=cat", r"occluder = 'cat' must be one of \['hand', 'none'\]"),
+        ("simulated://sheet?lens=round", r"lens = 'round' must be 1 to 8 numbers from -1 to 1 with commas"),
+        ("simulated://sheet?lens=0,0,0,0,0,0,0,0,0", "lens = .* must be 1 to 8 numbers"),
+        ("simulated://sheet?lens=", "lens = '' must be 1 to 8 numbers"),
+        ("simulated://sheet?lens=-0.9", r"lens = \(-0.9,\) is too strong: .* has no inverse"),
+        ("simulated://sheet?barrier=64x48", "unknown key 'barrier'"),
         ("simulated://sheet?color=640", r"color = '640' must be WIDTHxHEIGHT"),
         ("simulated://sheet?color=8x8", r"color = '8x8' must be WIDTHxHEIGHT, each from 16 to 2048"),
         ("laser://x", r"scheme 'laser' is none of \[.*'simulated'"),

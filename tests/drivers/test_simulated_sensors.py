@@ -52,9 +52,10 @@ def test_noise_differs_from_exposure_to_exposure_and_from_head_to_head() -> None
     assert not np.array_equal(a["color/color"].data, b["color/color"].data)
 
 
+@pytest.mark.parametrize("lens", ["0", "-0.25,0.06,0.002,-0.003", "0.3"])
 @pytest.mark.parametrize("k", [0, 100, 150, 333])
-def test_without_noise_the_truth_is_what_time_of_flight_measures(k: int) -> None:
-    simulation = build("sensors=tof&noise=0&tof=352x288")
+def test_without_noise_the_truth_is_what_time_of_flight_measures(k: int, lens: str) -> None:
+    simulation = build(f"sensors=tof&noise=0&tof=352x288&lens={lens}")
     frames, truth = expose(simulation, k)
     depth = frames["tof/depth"]
     assert depth.geometry == Geometry.RADIAL
@@ -168,8 +169,9 @@ def test_the_mosaic_is_one_channel_per_pixel_of_the_colour_image() -> None:
     np.testing.assert_array_equal(mosaic[1::2, 1::2], rgb[1::2, 1::2, 1])
 
 
-def test_material_points_keep_their_colour() -> None:
-    simulation = build("sensors=color&noise=0&color=640x480")
+@pytest.mark.parametrize("lens", ["0", "-0.25,0.06"])
+def test_material_points_keep_their_colour(lens: str) -> None:
+    simulation = build(f"sensors=color&noise=0&color=640x480&lens={lens}")
     before, truth_before = expose(simulation, 0)
     after, truth_after = expose(simulation, 150)
     colors = [
