@@ -26,6 +26,7 @@ COMMANDS = {
     "recover": "repair recordings that were cut short",
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
+    "reinitialize": "tell a running tracker to look for its object anew",
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 

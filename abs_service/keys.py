@@ -73,6 +73,11 @@ def topology(tracker: str) -> str:
     return f"{tracker}/topology"
 
 
+def reinitialize(tracker: str) -> str:
+    """Topic on which a tracker is told to look for its object anew: an abs.v1.Header of whoever says so."""
+    return f"{tracker}/reinitialize"
+
+
 def health(component: str) -> str:
     """Topic of a component's health: capture, record, run, track/<tracker>."""
     return f"health/{component}"

@@ -8,7 +8,7 @@ import numpy as np
 
 from abs_service.observation import Observation, Observer
 from abs_service.readers import reader
-from abs_service.tracker import priors, status
+from abs_service.tracker import loss, priors, status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.initialization import sight, vertex_colors
 from abs_service.tracker.mesh import Mesh
@@ -72,7 +72,7 @@ class Plan:
         reference: sensor whose depth image gives the initial mesh.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         vertices: about how many vertices the mesh is to have.
-        priors, status: settings of the fixed parts.
+        priors, status, reinitialization: settings of the fixed parts.
         seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
     """
 
@@ -85,6 +85,7 @@ class Plan:
     vertices: int
     priors: priors.Settings
     status: status.Settings
+    reinitialization: loss.Settings
     seed: int = 0
 
 
@@ -106,6 +107,8 @@ class Tracking:
         self._region = plan.region.build()
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
+        self._watch = loss.LossWatch(plan.reinitialization)
+        self._told = False
 
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for a frame set; the search goes on while `in_time` allows.
@@ -117,20 +120,41 @@ class Tracking:
 
     def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for an observation, see `track`."""
+        told, self._told = self._told, False
+        notes: tuple[str, ...] = ()
+        try:
+            if self._tracker is None:
+                self._adopt(*self._begin(observation), observation)
+            elif told or self._watch.overdue(observation.t_host_ns):
+                self._look_again(self._tracker.model.mesh, told, observation)
+        except (SightingError, ModelError) as error:
+            notes = (str(error),)
         if self._tracker is None:
-            try:
-                self._tracker = self._begin(observation)
-            except (SightingError, ModelError) as error:
-                return _initializing(observation, str(error))
-        return self._tracker.track(observation, in_time)
+            return _initializing(observation, notes)
+        estimate = self._watch.judge(self._tracker.track(observation, in_time))
+        reasons = estimate.reasons + tuple(f"looked for the object again: {note}" for note in notes)
+        return estimate if estimate.status == Status.TRACKING else replace(estimate, reasons=reasons)
 
-    def _begin(self, observation: Observation) -> Tracker:
+    def reinitialize(self) -> None:
+        """Looks for the object anew in the next frame set, whatever the old one was; safe from any thread."""
+        self._told = True
+
+    def _look_again(self, lost: Mesh, told: bool, observation: Observation) -> None:
+        """Begins anew if the object is in sight; SightingError or ModelError if it is not, or not the lost one."""
+        begun, mesh = self._begin(observation)
+        if not told and self._watch.is_another(mesh, lost):
+            raise SightingError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+        self._adopt(begun, mesh, observation)
+
+    def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
+        self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
+        self.mesh_version += 1
+
+    def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
         plan = self._plan
         model = plan.model.build(sight(observation, self._rig, plan.reference, self._region, plan.vertices))
         mesh = replace(model.mesh, colors=vertex_colors(model.mesh.vertices, observation.images, self._rig))
-        self.mesh, self.made_ns = mesh, observation.t_host_ns
-        self.mesh_version += 1
-        return Tracker(
+        tracker = Tracker(
             model,
             plan.objective.build(self._rig, mesh, plan.synthesis.build(self._rig, mesh)),
             StretchPrior(mesh, plan.priors.stretch),
@@ -139,6 +163,7 @@ class Tracking:
             plan.optimizer.build(len(model.rest), np.random.default_rng(plan.seed)),
             plan.status,
         )
+        return tracker, mesh
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
@@ -146,12 +171,12 @@ def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
     return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in reader(sensor).kinds))
 
 
-def _initializing(observation: Observation, reason: str) -> Estimate:
+def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimate:
     return Estimate(
         seq=observation.seq,
         t_host_ns=observation.t_host_ns,
         status=Status.INITIALIZING,
-        reasons=(reason,),
+        reasons=reasons,
         theta=np.zeros(0),
         covariance=np.zeros((0, 0)),
         vertices=np.zeros((0, 3), np.float32),

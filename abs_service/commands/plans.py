@@ -45,6 +45,7 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         vertices=table.mesh.vertices,
         priors=table.priors,
         status=table.status,
+        reinitialization=table.reinitialization,
     )
 
 

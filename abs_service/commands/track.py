@@ -65,7 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
         if stop.is_set():
             return Exit.OK
         rig = plans.rig(settings, name, cameras)
-        live = _live(bus, settings, name, rig, Tracking(rig, plan), speaker, health)
+        tracking = Tracking(rig, plan)
+        bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
+        live = _live(bus, settings, name, rig, tracking, speaker, health)
         while not stop.is_set():
             live.turn()
             if health.due():

@@ -79,9 +79,9 @@ class TrackerTable(Table):
     Attributes:
         sensors: names of the sensors whose measurements count.
         reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
-        model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, `.regions`, ….
+        model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
         mesh: the triangle mesh.
-        priors, status: `Settings` of `abs_service.tracker.priors` and of `.status`.
+        priors, status, reinitialization: `Settings` of `abs_service.tracker.priors`, `.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
     """
 
@@ -94,6 +94,7 @@ class TrackerTable(Table):
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
     priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
+    reinitialization: Annotated[Any, SettingsOf("abs_service.tracker.loss")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "cma"})
     budget_ms: Positive = 24.0
 

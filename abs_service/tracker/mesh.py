@@ -30,6 +30,13 @@ class Mesh:
         return np.unique(np.sort(sides, axis=1), axis=0)
 
     @property
+    def area(self) -> float:
+        """Area of the surface [m²]."""
+        corners = self.vertices[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return float(np.linalg.norm(normals, axis=1).sum() / 2)
+
+    @property
     def normals(self) -> NDArray[np.float64]:
         """Unit vertex normals (n, 3), the area-weighted mean of the adjacent faces' normals."""
         corners = self.vertices[self.faces]

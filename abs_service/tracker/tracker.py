@@ -93,7 +93,7 @@ class Tracker:
         surface = self.model.deform(theta[None])
         fits = tuple(self._objective.fits(surface))
         share = _inlier_share(fits)
-        verdict, reasons = status.judge(share, observation.missing, self._verdict)
+        verdict, reasons = status.judge(share, _hidden_share(fits), observation.missing, self._verdict)
         return Estimate(
             seq=observation.seq,
             t_host_ns=observation.t_host_ns,
@@ -117,3 +117,9 @@ def _inlier_share(fits: tuple[SensorFit, ...]) -> float:
     """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
     visible = sum(fit.visible for fit in fits)
     return sum(fit.inliers for fit in fits) / visible if visible else 0.0
+
+
+def _hidden_share(fits: tuple[SensorFit, ...]) -> float:
+    """Share of the vertices that are hidden from the sensor that sees most of them; 0 without a sensor."""
+    shares = [fit.hidden / (fit.hidden + fit.visible) for fit in fits if fit.hidden + fit.visible]
+    return min(shares, default=0.0)

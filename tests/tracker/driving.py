@@ -1,7 +1,7 @@
 """A simulated device's exposures straight into a tracking, without processes, clocks or files."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +51,7 @@ class Step:
 def drive(
     tracking: Tracking,
     simulation: Simulation,
-    exposures: range,
+    exposures: Iterable[int],
     change: Callable[[int, list[Frame]], list[Frame]] = lambda k, frames: frames,
     in_time: Callable[[], bool] = lambda: True,
 ) -> Iterator[Step]:

@@ -22,10 +22,16 @@ SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
     ],
 )
 def test_status_and_reasons(share, missing, status, reasons):
-    assert judge(share, missing, SETTINGS) == (status, reasons)
+    assert judge(share, 0.0, missing, SETTINGS) == (status, reasons)
 
 
 def test_a_lost_object_names_every_reason():
-    status, reasons = judge(0.1, ("color",), SETTINGS)
+    status, reasons = judge(0.1, 0.0, ("color",), SETTINGS)
     assert status == Status.LOST
     assert len(reasons) == 2
+
+
+def test_a_mostly_hidden_object_is_degraded_even_if_the_rest_agrees():
+    assert judge(1.0, 0.5, (), SETTINGS) == (Status.TRACKING, ())
+    reason = "62% of the vertices are hidden from the sensor that sees most of them"
+    assert judge(1.0, 0.62, (), SETTINGS) == (Status.DEGRADED, (reason,))

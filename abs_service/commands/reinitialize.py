@@ -1,0 +1,61 @@
+"""Tells a running tracker to look for its object anew: makes a new mesh of what its region shows now.
+
+  abs-service reinitialize                  the tracker of the demo rig that `abs-service run` shows elsewhere
+  abs-service reinitialize rig.toml sheet   one tracker of that rig
+
+A tracker that has lost its object does so by itself; this is for another object, or for a better view of the same.
+"""
+
+import argparse
+import threading
+
+from abs.v1 import common_pb2, deformation_state_pb2
+
+from abs_service import keys
+from abs_service.bus.contract import EVENTS, Bus, Sample
+from abs_service.commands import participant, plans
+from abs_service.exits import Exit
+from abs_service.stamps import Speaker, WallClock
+
+#: How long the tracker may take to find an object [s].
+PATIENCE_S = 10.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service reinitialize`."""
+    participant.add_arguments(parser)
+    parser.add_argument("tracker", metavar="TRACKER", nargs="?", help="its name (default: the first one)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Sends the command and waits for the new mesh."""
+    settings = participant.load_config(arguments)
+    name = arguments.tracker or next(iter(settings.trackers), "")
+    plans.plan(settings, name)
+    with participant.open_bus(settings, arguments) as bus:
+        return _reinitialize(bus, name, Speaker(settings.name, WallClock()))
+
+
+def _reinitialize(bus: Bus, tracker: str, speaker: Speaker) -> int:
+    """Sends the command once the tracker's first state shows that it runs, and waits for another mesh version."""
+    versions: list[int] = []
+    heard, renewed = threading.Event(), threading.Event()
+
+    def on_state(sample: Sample) -> None:
+        state = deformation_state_pb2.DeformationState.FromString(sample.payload)
+        versions.append(state.mesh_version)
+        heard.set()
+        if state.mesh_version != versions[0]:
+            renewed.set()
+
+    bus.subscribe(keys.state(tracker), on_state)
+    command = bus.publisher(keys.reinitialize(tracker), common_pb2.Header.DESCRIPTOR.full_name, EVENTS)
+    if not heard.wait(PATIENCE_S):
+        print(f'tracker "{tracker}" says nothing: does it run, and do its sensors deliver?')
+        return Exit.FAILED
+    command.put(speaker.now(0).SerializeToString())
+    if not renewed.wait(PATIENCE_S):
+        print(f'tracker "{tracker}" found no object within {PATIENCE_S:.0f} s; it goes on as it was')
+        return Exit.FAILED
+    print(f'tracker "{tracker}" has a new mesh, version {versions[-1]}')
+    return Exit.OK

@@ -1,0 +1,103 @@
+"""A lost object is looked for anew, and one that is back is believed only after a while."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.loss import LossWatch, Settings
+from abs_service.tracking import Tracking
+from drivers.frame import Frame, Kind
+from tests.tracker.driving import default_plan, drive, rig_of, simulate
+from tests.tracker.scenes import sheet
+
+FRAME_NS = 33_000_000
+SHEET = simulate("simulated://sheet?seed=1")
+
+
+def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
+    nothing = np.zeros(0)
+    made = Estimate(**dict.fromkeys((field.name for field in dataclasses.fields(Estimate)), nothing))  # pyright: ignore
+    return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons)
+
+
+def test_a_tracked_object_is_never_overdue():
+    watch = LossWatch(Settings())
+    assert [watch.judge(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
+    assert not watch.overdue(10**12)
+
+
+def test_a_lost_object_is_overdue_after_a_while_and_then_now_and_then():
+    watch = LossWatch(Settings(after_s=0.2, every_s=0.1))
+    tries = []
+    for k in range(1, 16):
+        if watch.overdue(k * FRAME_NS):
+            tries.append(k)
+        watch.judge(estimate(k, Status.LOST))
+    assert tries == [8, 12]  # 0.2 s after frame 1, then every 0.1 s
+
+
+def test_being_seen_once_ends_the_waiting():
+    watch = LossWatch(Settings(after_s=0.1))
+    watch.judge(estimate(0, Status.LOST))
+    watch.judge(estimate(1, Status.DEGRADED, ("no frame from color",)))
+    watch.judge(estimate(9, Status.LOST))
+    assert not watch.overdue(10 * FRAME_NS)
+    assert watch.overdue(13 * FRAME_NS)
+
+
+def test_after_a_loss_the_first_good_estimates_are_degraded():
+    watch = LossWatch(Settings(confirm=3))
+    watch.judge(estimate(0, Status.LOST))
+    after = [watch.judge(estimate(k, Status.TRACKING)) for k in range(1, 5)]
+    assert [e.status for e in after] == [Status.DEGRADED, Status.DEGRADED, Status.TRACKING, Status.TRACKING]
+    assert after[1].reasons == ("found again 2 of 3 estimates ago",)
+    assert after[2].reasons == ()
+
+
+def test_an_empty_scene_is_not_the_lost_object():
+    watch = LossWatch(Settings(size_ratio=2.0))
+    lost = sheet(size=(0.3, 0.2))
+    assert lost.area == pytest.approx(0.06, rel=0.05)
+    assert not watch.is_another(sheet(size=(0.25, 0.2)), lost)
+    assert watch.is_another(sheet(size=(1.5, 1.0)), lost)
+    assert watch.is_another(sheet(size=(0.1, 0.1)), lost)
+
+
+def without_object(k: int, frames: list[Frame]) -> list[Frame]:
+    """Nothing but a wall from exposure 20 to 50, and grey light."""
+    if not 20 <= k < 50:
+        return frames
+    plain = {Kind.DEPTH: round(1.6 / 5 * 2**14), Kind.AMPLITUDE: 2000, Kind.COLOR: 90}
+    return [dataclasses.replace(frame, data=np.full_like(frame.data, plain[frame.kind])) for frame in frames]
+
+
+def test_an_object_that_comes_back_is_found_again_with_a_new_mesh():
+    plan = dataclasses.replace(default_plan(), reinitialization=Settings(after_s=0.3, every_s=0.1))
+    tracking = Tracking(rig_of(SHEET), plan)
+    # In between it has moved for three seconds, so that the last estimate is no good start.
+    exposures = [*range(50), *range(140, 160)]
+    steps = []
+    for k, step in zip(exposures, drive(tracking, SHEET, exposures, without_object)):
+        steps.append((k, step, tracking.mesh_version))
+    status = {k: step.estimate.status for k, step, _ in steps}
+    assert {status[k] for k in range(20)} == {Status.TRACKING}
+    assert {status[k] for k in range(22, 50)} == {Status.LOST}
+    assert any("cm², not" in reason for k, step, _ in steps if 35 <= k < 50 for reason in step.estimate.reasons)
+    assert [version for k, _, version in steps if k == 49] == [1]
+    assert {status[k] for k in range(150, 160)} == {Status.TRACKING}
+    errors = [step.errors.vertex_mm for k, step, _ in steps if k >= 150 and step.errors is not None]
+    assert len(errors) == 10
+    assert max(errors) < 3
+
+
+def test_a_tracker_that_is_told_to_begins_anew_at_once():
+    tracking = Tracking(rig_of(SHEET), default_plan())
+    versions = []
+    for k, step in enumerate(drive(tracking, SHEET, range(6))):
+        assert step.estimate.status == Status.TRACKING
+        versions.append(tracking.mesh_version)
+        if k == 2:
+            tracking.reinitialize()
+    assert versions == [1, 1, 1, 2, 2, 2]
