@@ -101,6 +101,8 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
             seq=source.seq,
             t_host_ns=source.t_host_ns,
             samples=fit.samples,
+            visible=fit.visible,
+            hidden=fit.hidden,
             mean_log_likelihood=fit.mean_log_likelihood,
             normalized_residual=fit.normalized_residual,
             dropped=effort.dropped.get(fit.sensor, 0),

@@ -23,7 +23,7 @@ class DeformationState(_message.Message):
     STATUS_DEGRADED: DeformationState.Status
     STATUS_LOST: DeformationState.Status
     class Sensor(_message.Message):
-        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped")
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "hidden")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
         SEQ_FIELD_NUMBER: _ClassVar[int]
         T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
@@ -32,6 +32,8 @@ class DeformationState(_message.Message):
         NORMALIZED_RESIDUAL_FIELD_NUMBER: _ClassVar[int]
         MISSING_FIELD_NUMBER: _ClassVar[int]
         DROPPED_FIELD_NUMBER: _ClassVar[int]
+        VISIBLE_FIELD_NUMBER: _ClassVar[int]
+        HIDDEN_FIELD_NUMBER: _ClassVar[int]
         sensor: str
         seq: int
         t_host_ns: int
@@ -40,7 +42,9 @@ class DeformationState(_message.Message):
         normalized_residual: float
         missing: bool
         dropped: int
-        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ...) -> None: ...
+        visible: int
+        hidden: int
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., hidden: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]
