@@ -51,14 +51,19 @@ class TruthComparison:
 
     def compare(self, t_host_ns: int, vertices: NDArray[np.floating]) -> Errors | None:
         """Errors of vertices (n, 3) [m]; None where the truth of the moment, or of the mesh's making, is unknown."""
+        points = self.material_points(t_host_ns)
+        if points is None or len(vertices) != len(points):
+            return None
+        error = np.linalg.norm(vertices - points, axis=1)
+        surface = np.linalg.norm(vertices - closest_points(vertices, self._truths[t_host_ns]), axis=1)
+        return Errors(float(error.mean() * 1e3), float(surface.mean() * 1e3))
+
+    def material_points(self, t_host_ns: int) -> NDArray[np.float64] | None:
+        """Where the vertices' own material points (n, 3) [m] really are; None where that is unknown."""
         truth = self._truths.get(t_host_ns)
         if self._material is None and self._rest is not None and self._rest[0] in self._truths:
             self._material = _closest_parameters(self._rest[1], self._truths[self._rest[0]])
-        if truth is None or self._material is None or len(vertices) != len(self._material):
-            return None
-        error = np.linalg.norm(vertices - _bilinear(truth, self._material)[0], axis=1)
-        surface = np.linalg.norm(vertices - closest_points(vertices, truth), axis=1)
-        return Errors(float(error.mean() * 1e3), float(surface.mean() * 1e3))
+        return None if truth is None or self._material is None else _bilinear(truth, self._material)[0]
 
 
 def closest_points(vertices: NDArray[np.floating], grid: Grid) -> NDArray[np.float64]:
