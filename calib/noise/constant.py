@@ -53,5 +53,5 @@ def fit(samples: Samples) -> Constant:
     """
     residual = fitting.thinned(samples.returns(with_amplitude=False)).residual
     one = np.ones((len(residual), 1))
-    law = fitting.maximize(residual, one, one)
+    law = fitting.maximize(residual, fitting.Columns(one, one))
     return Constant(float(law.spread[0]), float(law.mean[0]))

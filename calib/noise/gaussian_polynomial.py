@@ -74,7 +74,8 @@ def fit(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tuple[int,
         sigma_degrees, mu_degrees: highest powers of the distance and of the amplitude.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude.
+        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
+            too little for so many powers.
     """
     law = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     sigma, mu = fitting.table(law.sigma[..., 0]), fitting.table(law.mu[..., 0])

@@ -120,7 +120,8 @@ def fit(
         own_degree: highest power of the distance in a region's own mean offset. Its own deviation is a factor.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude.
+        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
+            too little for so many powers.
     """
     image = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     samples = samples.returns(with_amplitude=image.use_amplitude)

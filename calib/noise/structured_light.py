@@ -67,9 +67,9 @@ def fit(samples: Samples, step: float) -> StructuredLight:
         NoiseError: no sample has a distance.
     """
     samples = fitting.thinned(samples.returns(with_amplitude=False))
-    columns = np.column_stack([samples.true**4, np.ones(len(samples))])
-    law = fitting.maximize(samples.residual, columns[:, :0], columns, power=2)
+    spread = np.column_stack([samples.true**4, np.ones(len(samples))])
+    law = fitting.maximize(samples.residual, fitting.Columns(spread[:, :0], spread), power=2)
     if law.spread[1] <= 0:  # no floor, or one that is hidden by the rest
-        law = fitting.maximize(samples.residual, columns[:, :0], columns[:, :1], power=2)
+        law = fitting.maximize(samples.residual, fitting.Columns(spread[:, :0], spread[:, :1]), power=2)
     random = max(float(law.spread[0]) - step**2 / 12, (1e-3 * step) ** 2, 1e-12)
     return StructuredLight(float(np.sqrt(random)), step, float(np.sqrt(law.spread[1:].sum())))

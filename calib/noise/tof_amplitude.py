@@ -91,15 +91,15 @@ def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmpli
         sigma_degree, mu_degree: highest powers of the distance.
 
     Raises:
-        NoiseError: no sample has a distance and an amplitude.
+        NoiseError: no sample has a distance and an amplitude, or they vary too little for so many powers.
     """
     samples = fitting.thinned(samples.returns(with_amplitude=True))
     distances, amplitudes = domain(samples.true), domain(samples.amplitude)
     x, inverse = np.clip(samples.true, *distances), 1 / np.clip(samples.amplitude, *amplitudes)
     mean, spread = (np.column_stack([polyvander(x, degree), inverse]) for degree in (mu_degree, sigma_degree))
-    law = fitting.maximize(samples.residual, mean, spread)
+    law = fitting.maximize(samples.residual, fitting.Columns(mean, spread))
     if law.spread[-1] < 0:  # brighter returns err more: not this sensor's physics, so nothing is read from it
-        law = fitting.maximize(samples.residual, mean, spread[:, :-1])
+        law = fitting.maximize(samples.residual, fitting.Columns(mean, spread[:, :-1]))
     per_amplitude = float(law.spread[sigma_degree + 1]) if len(law.spread) > sigma_degree + 1 else 0.0
     return TofAmplitude(
         sigma=tuple(law.spread[: sigma_degree + 1].tolist()),

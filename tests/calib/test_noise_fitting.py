@@ -174,6 +174,16 @@ def test_where_the_domain_s_corner_holds_no_sample_the_deviation_is_no_less_than
     assert sigma.min() > 0.8 * laws.TOF.sigma(samples.true, samples.amplitude).min()
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_where_the_domain_s_corner_holds_no_sample_no_offset_is_trusted(seed):
+    """A polynomial says something there: here up to 9 cm, if nothing held it, for a far and bright surface."""
+    model = gaussian_polynomial.fit(laws.time_of_flight(seed, outliers=0.05), (1, 3), (1, 3))
+    (x, a), p = laws.grid(), laws.somewhere(400)
+    error = np.abs(model.mean(x, a, p) - laws.TOF.mu(a))
+    assert error.max() < 0.025
+    assert (error / model.deviation(x, a, p)).max() < 3
+
+
 def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
     samples = laws.time_of_flight(5)
     everything = tof_amplitude.fit(samples)
@@ -185,13 +195,34 @@ def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
     assert np.abs(ratio - 1).max() < 0.1
 
 
+def at_one_distance(n=200):
+    """A sensor that repeats itself, before one board."""
+    return Samples(np.full(n, 1.02), np.full(n, 1.0), np.full(n, 500.0), *laws.somewhere(n))
+
+
 def test_measurements_that_are_all_equal_are_fitted_too():
-    """A sensor that repeats itself, at one distance: no spread and no domain, yet a model."""
-    samples = Samples(np.full(100, 1.02), np.full(100, 1.0), np.full(100, 500.0), *laws.somewhere(100))
-    assert constant.fit(samples).offset == pytest.approx(0.02, abs=1e-6)
-    model = FITS["line"](samples)
+    assert constant.fit(at_one_distance()).offset == pytest.approx(0.02, abs=1e-6)
+    model = gaussian_polynomial.fit(at_one_distance(), (0, 0), (0, 0))
     assert model.distances == pytest.approx((0.999, 1.001))
     assert 0 < model.deviation(np.ones(1), np.ones(1), laws.somewhere(1))[0] < 1e-3
+
+
+@pytest.mark.parametrize("name", ["line", "polynomial", "law"])
+def test_samples_that_vary_too_little_for_a_model_are_no_reason_to_guess(name):
+    with pytest.raises(NoiseError, match=r"vary too little to tell .* more distances"):
+        FITS[name](at_one_distance())
+
+
+@pytest.mark.parametrize("power", [1, 2])
+def test_the_gradients_of_the_fit_are_the_slopes_of_its_cost(power):
+    generator = np.random.default_rng(1)
+    columns = fitting.Columns(generator.normal(size=(50, 2)), generator.uniform(0.5, 2, (50, 3)))
+    samples = fitting._Samples(generator.normal(size=50), columns, power, 0.01)
+    imagined = fitting._Imagined(0.3, columns, power)
+    at, steps = np.array([0.2, -0.1, 0.5, 0.3, 0.4, -2.0]), 1e-6 * np.eye(6)
+    for cost in (lambda p: samples.cost(p[:2], p[2:5], p[5]), lambda p: imagined.cost(p[:2], p[2:5])):
+        slopes = [(cost(at + step)[0] - cost(at - step)[0]) / 2e-6 for step in steps]
+        np.testing.assert_allclose(cost(at)[1], slopes, rtol=1e-5, atol=1e-6)
 
 
 def test_the_domain_leaves_outliers_aside():
