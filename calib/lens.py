@@ -61,6 +61,8 @@ class Lens:
         """
         target = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
         ideal = target.copy()
+        if self.is_pinhole:
+            return ideal.reshape(np.shape(xy))
         for _ in range(30):
             residual = self.distort(ideal) - target
             if np.all(np.abs(residual) < tolerance) and np.all(self._is_before_fold(ideal)):

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
@@ -11,15 +11,11 @@ import numpy as np
 from calib.lens import COEFFICIENTS, Lens, LensError
 from drivers.device import AddressError
 from drivers.simulated import values
-from drivers.simulated.barrier import Barrier, BarrierNoise
-from drivers.simulated.color import SIGMA, Bayer, Color
-from drivers.simulated.exposure import Head
+from drivers.simulated.bayer import ORDERS, Mosaic
+from drivers.simulated.heads import Equipment
 from drivers.simulated.optics import BEAMS, OPTICS
-from drivers.simulated.scene import Scene
 from drivers.simulated.scenes import SCENES, Choices
 from drivers.simulated.simulation import Simulation
-from drivers.simulated.structured_light import StructuredLight, StructuredLightNoise
-from drivers.simulated.time_of_flight import TimeOfFlight, TimeOfFlightNoise
 
 #: The keys, and what reads their values.
 KEYS: Mapping[str, Callable[[str], Any]] = {
@@ -32,9 +28,16 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
     "occluder": values.one_of("none", "hand"),
+    "texture": values.one_of("smooth", "fine"),
     "lens": values.numbers(len(COEFFICIENTS), -1, 1),
+    "order": values.one_of(*ORDERS),
+    "blur": values.number(float, 0, 10),
+    "crosstalk": values.number(float, 0, 0.5),
     **dict.fromkeys(OPTICS, values.size),
 }
+
+#: The keys that mean something in some scenes only, and in which.
+SCENES_OF: Mapping[str, frozenset[str]] = {"texture": frozenset({"sheet"})}
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,11 @@ class Address:
         speed: factor on the speed of all motion.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
         occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
+        texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
         lens: distortion of all heads, `calib.lens.COEFFICIENTS`; `lens=-0.2,0.05` is a barrel's k1 and k2.
+        order: of the Bayer head's filters, one of `ORDERS`.
+        blur: defocus of the Bayer head: deviation of a Gaussian [px].
+        crosstalk: share of what a pixel of the Bayer head collects that its four neighbours read.
     """
 
     scene: str
@@ -67,7 +74,11 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
+    texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
+    order: str = "grbg"
+    blur: float = 0.0
+    crosstalk: float = 0.0
 
     def build(self) -> Simulation:
         """The world that the address describes.
@@ -75,46 +86,31 @@ class Address:
         Raises:
             AddressError: light from somewhere in an image cannot have come through the lens.
         """
-        choices = Choices(self.seed, math.radians(self.bend), self.speed, hand=self.occluder == "hand")
+        fine = self.texture == "fine"
+        choices = Choices(self.seed, math.radians(self.bend), self.speed, self.occluder == "hand", fine)
+        equipment = Equipment(
+            sizes=self.sizes,
+            rate_hz=self.rate,
+            noise=self.noise,
+            offset=self.offset,
+            lens=Lens(np.array(self.lens)),
+            mosaic=Mosaic(self.order, self.blur, self.crosstalk),
+            samples=2 if fine else 1,
+        )
         world = SCENES[self.scene](choices)
         try:
-            heads = {name: self._head(name, world) for name in self.sensors}
+            heads = {name: equipment.head(name, world) for name in self.sensors}
         except LensError as error:
             raise AddressError(f"simulated://{self.scene}: lens = {self.lens} is too strong: {error}") from error
         return Simulation(world, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
-
-    def _head(self, name: str, world: Scene) -> Head:
-        if name in BEAMS:
-            beam, noise = BEAMS[name], BarrierNoise()
-            wrong = BarrierNoise(self.noise * noise.miss, self.noise * noise.false_alarm)
-            return Barrier(name, beam.camera, beam.length_m, self.rate, wrong)
-        optics = OPTICS[name]
-        camera = optics.camera(*self.sizes.get(name, (optics.width, optics.height)), Lens(np.array(self.lens)))
-        if name == "tof":
-            return TimeOfFlight(name, camera, world, self.rate, self._time_of_flight_noise())
-        if name == "structured_light":
-            random = self.noise * StructuredLightNoise.random
-            return StructuredLight(name, camera, world, self.rate, StructuredLightNoise(random=random))
-        picture = {"color": Color, "bayer": Bayer}[name]
-        return picture(name, camera, world, self.rate, self.noise * SIGMA)
-
-    def _time_of_flight_noise(self) -> TimeOfFlightNoise:
-        default = TimeOfFlightNoise()
-        return replace(
-            default,
-            mu_offset=self.offset,
-            sigma_offset=self.noise * default.sigma_offset,
-            sigma_distance=self.noise * default.sigma_distance,
-            sigma_amplitude=self.noise * default.sigma_amplitude,
-            amplitude=self.noise * default.amplitude,
-        )
 
 
 def parse(uri: str) -> Address:
     """Reads an address such as `simulated://sheet?seed=1&sensors=tof,color&color=640x480`.
 
     Raises:
-        AddressError: unknown scene or key, a key given twice, or a value outside its range; names all three.
+        AddressError: unknown scene or key, a key that means nothing in the scene or is given twice, or a value outside
+            its range; names all three.
     """
     parts = urlsplit(uri)
     name = parts.netloc + parts.path
@@ -126,6 +122,8 @@ def parse(uri: str) -> Address:
             raise AddressError(f"{uri}: {key} is given twice")
         if key not in KEYS:
             raise AddressError(f"{uri}: unknown key {key!r}; allowed are {sorted(KEYS)}")
+        if name not in SCENES_OF.get(key, SCENES):
+            raise AddressError(f"{uri}: {key} means nothing in {name!r}, only in {sorted(SCENES_OF[key])}")
         try:
             read[key] = KEYS[key](text)
         except ValueError as error:

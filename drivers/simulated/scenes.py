@@ -9,7 +9,7 @@ from drivers.simulated.hand import Hand
 from drivers.simulated.motion import Motion
 from drivers.simulated.rectangle import Rectangle
 from drivers.simulated.scene import REST_Z, Scene
-from drivers.simulated.texture import Texture, checkerboard, smooth_pattern
+from drivers.simulated.texture import Texture, checkerboard, fine_pattern, smooth_pattern
 
 #: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
 _WALL = (4.0, 3.0)
@@ -24,12 +24,14 @@ class Choices:
         bend: largest bend of a sheet from end to end [rad].
         speed: factor on the speed of all motion.
         hand: whether a hand crosses the view.
+        fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
     """
 
     seed: int = 1
     bend: float = np.deg2rad(60)
     speed: float = 1.0
     hand: bool = False
+    fine: bool = False
 
 
 def sheet(choices: Choices) -> Scene:
@@ -78,8 +80,10 @@ def _scene(choices: Choices, *surfaces: Rectangle) -> Scene:
 
 
 def _print(choices: Choices, width: float, height: float) -> Texture:
-    scales = (0.025, 0.01, 0.004)
-    return smooth_pattern(choices.seed, width, height, scales, 800.0, color=(0.1, 0.95), infrared=(0.35, 0.9))
+    color, infrared = (0.1, 0.95), (0.35, 0.9)
+    if choices.fine:
+        return fine_pattern(choices.seed, width, height, color, infrared)
+    return smooth_pattern(choices.seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
 
 
 def _wall(seed: int) -> Texture:

@@ -170,6 +170,8 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?lens=0,0,0,0,0,0,0,0,0", "lens = .* must be 1 to 8 numbers"),
         ("simulated://sheet?lens=", "lens = '' must be 1 to 8 numbers"),
         ("simulated://sheet?lens=-0.9", r"lens = \(-0.9,\) is too strong: .* has no inverse"),
+        ("simulated://sheet?order=rgb", r"order = 'rgb' must be one of \['bggr', 'gbrg', 'grbg', 'rggb'\]"),
+        ("simulated://board?texture=fine", r"texture means nothing in 'board', only in \['sheet'\]"),
         ("simulated://sheet?barrier=64x48", "unknown key 'barrier'"),
         ("simulated://sheet?color=640", r"color = '640' must be WIDTHxHEIGHT"),
         ("simulated://sheet?color=8x8", r"color = '8x8' must be WIDTHxHEIGHT, each from 16 to 2048"),

@@ -156,19 +156,6 @@ def test_the_amplitude_falls_with_the_square_of_the_distance() -> None:
     assert np.percentile(reflectivity, 95) == pytest.approx(0.85, abs=0.01)
 
 
-def test_the_mosaic_is_one_channel_per_pixel_of_the_colour_image() -> None:
-    simulation = build("sensors=color,bayer&noise=0")
-    color, bayer = simulation.heads["color"], simulation.heads["bayer"]
-    bayer._picture = color._picture  # pyright: ignore[reportAttributeAccessIssue]  # two sensors behind one lens
-    frames, _ = expose(simulation, 100)
-    rgb, mosaic = frames["color/color"].data, frames["bayer/bayer"].data
-    assert frames["bayer/bayer"].encoding == "bayer_grbg8"
-    np.testing.assert_array_equal(mosaic[0::2, 0::2], rgb[0::2, 0::2, 1])
-    np.testing.assert_array_equal(mosaic[0::2, 1::2], rgb[0::2, 1::2, 0])
-    np.testing.assert_array_equal(mosaic[1::2, 0::2], rgb[1::2, 0::2, 2])
-    np.testing.assert_array_equal(mosaic[1::2, 1::2], rgb[1::2, 1::2, 1])
-
-
 @pytest.mark.parametrize("lens", ["0", "-0.25,0.06"])
 def test_material_points_keep_their_colour(lens: str) -> None:
     simulation = build(f"sensors=color&noise=0&color=640x480&lens={lens}")

@@ -1,0 +1,77 @@
+"""The Bayer head measures the channel of each filter, of a scene that may be out of focus and finely printed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter
+
+from calib.camera import Camera
+from drivers.simulated.address import parse
+from drivers.simulated.bayer import ORDERS, Mosaic
+from drivers.simulated.color import Picture
+from drivers.simulated.simulation import Simulation
+
+
+def build(query: str) -> Simulation:
+    return parse(f"simulated://sheet?{query}").build()
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_mosaic_is_one_channel_per_pixel_of_the_colour_image(order: str) -> None:
+    simulation = build(f"sensors=color,bayer&noise=0&order={order}")
+    color, bayer = simulation.heads["color"], simulation.heads["bayer"]
+    bayer._picture = color._picture  # pyright: ignore[reportAttributeAccessIssue]  # two sensors behind one lens
+    frames, _ = simulation.expose(100)
+    rgb, mosaic = (frame.data for frame in frames)
+    assert frames[1].encoding == f"bayer_{order}8"
+    for row in range(2):
+        for column in range(2):
+            channel = {"r": 0, "g": 1, "b": 2}[order[2 * row + column]]
+            np.testing.assert_array_equal(mosaic[row::2, column::2], rgb[row::2, column::2, channel])
+
+
+def test_an_order_that_is_not_given_is_grbg() -> None:
+    assert build("sensors=bayer").heads["bayer"].streams[0].encoding == "bayer_grbg8"
+
+
+@given(st.floats(0.8, 3))
+def test_defocus_makes_a_point_a_gaussian_and_loses_no_light(blur: float) -> None:
+    points = np.zeros((61, 61, 3), np.float32)
+    points[30, 30] = 1000
+    spread = Mosaic(blur_px=blur).expose(points)
+    offsets = np.arange(61) - 30
+    assert spread.sum() == pytest.approx(1000, rel=1e-3)
+    for axis in (0, 1):
+        variance = (spread.sum(axis=1 - axis) * offsets**2).sum() / spread.sum()
+        assert variance == pytest.approx(blur**2, rel=0.05, abs=0.03)  # a Gaussian cut off at 4 deviations, on a grid
+
+
+@given(st.sampled_from(ORDERS), st.floats(0, 0.5), st.tuples(*[st.floats(0, 255)] * 3))
+def test_crosstalk_mixes_the_channels_as_declared(order: str, c: float, color: tuple[float, float, float]) -> None:
+    mosaic = Mosaic(order, crosstalk=c).expose(np.full((6, 8, 3), color, np.float32))
+    r, g, b = color
+    mixed = {"r": (1 - c) * r + c * g, "g": (1 - c) * g + c * (r + b) / 2, "b": (1 - c) * b + c * g}
+    for place, letter in enumerate(order):
+        np.testing.assert_allclose(mosaic[place // 2 :: 2, place % 2 :: 2], mixed[letter], atol=1e-3)
+
+
+def test_the_fine_print_has_details_of_one_to_three_pixels() -> None:
+    widths = {}
+    for texture in ("smooth", "fine"):
+        frames, _ = build(f"sensors=color&color=640x480&noise=0&texture={texture}").expose(0)
+        print_ = frames[0].data[200:280, 230:350].astype(float).mean(axis=-1)
+        detail = print_ - gaussian_filter(print_, 5)
+        assert np.std(print_) > 30
+        widths[texture] = detail.shape[1] / np.mean(np.count_nonzero(np.diff(np.sign(detail), axis=1), axis=1))
+    assert 1.5 < widths["fine"] < 3.5 < widths["smooth"]
+
+
+def test_a_pixel_of_a_fine_print_is_the_mean_of_what_it_covers() -> None:
+    simulation = build("texture=fine&sensors=color")
+    camera, moment = Camera(96, 72, 275.0, 275.0, 47.5, 35.5), simulation.scene.at(3.0)
+    dense = Picture(camera, simulation.scene, samples=12).take(moment)
+    errors = [np.abs(Picture(camera, simulation.scene, n).take(moment) - dense).mean() for n in (1, 2, 4)]
+    assert errors[0] > 2 * errors[1] > 4 * errors[2]
+    head = simulation.heads["color"]
+    assert head._picture._samples == 2  # pyright: ignore[reportAttributeAccessIssue]
