@@ -5,10 +5,12 @@ from dataclasses import dataclass, field, replace
 
 from calib.camera import Camera
 from calib.lens import Lens
+from drivers.simulated import infrared
 from drivers.simulated.barrier import Barrier, BarrierNoise
 from drivers.simulated.bayer import Bayer, Mosaic
 from drivers.simulated.color import SIGMA, Color, Picture
 from drivers.simulated.exposure import Head
+from drivers.simulated.infrared import Infrared
 from drivers.simulated.optics import BEAMS, OPTICS
 from drivers.simulated.scene import Scene
 from drivers.simulated.structured_light import StructuredLight, StructuredLightNoise
@@ -55,6 +57,8 @@ class Equipment:
             case "structured_light":
                 random = self.noise * StructuredLightNoise.random
                 return StructuredLight(name, camera, scene, self.rate_hz, StructuredLightNoise(random=random))
+            case "ir":
+                return Infrared(name, camera, scene, self.rate_hz, self.noise * infrared.SIGMA)
             case "bayer":
                 return Bayer(name, self._picture(camera, scene), self.rate_hz, self.noise * SIGMA, self.mosaic)
             case _:

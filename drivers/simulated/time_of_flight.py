@@ -7,16 +7,13 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.frame import Frame, Geometry, Kind
+from drivers.simulated.active_light import returned
 from drivers.simulated.exposure import Exposure, stream_of
 from drivers.simulated.scene import Scene
 from drivers.simulated.view import Sight, View
 
 #: Unambiguous range [m] and the steps that it is digitised in: a SwissRanger SR4000 at 30 MHz.
 RANGE_M, LEVELS = 5.0, 2**14
-
-#: Amplitude of a white surface that faces the sensor at a distance of 1 m.
-WHITE = 10_000.0
-
 
 #: σ of the default noise as a polynomial: row i belongs to the power i of the distance [m], column j to the power j of
 #: the amplitude. For amplitudes from 2000 to 10000 it errs by less than 0.3 mm; below, it is up to a quarter too small.
@@ -61,7 +58,7 @@ class TimeOfFlightNoise:
 class TimeOfFlight:
     """Streams `depth` (radial, 16UC1 in steps of `RANGE_M` / `LEVELS`) and `amplitude` (16UC1).
 
-    The amplitude is `WHITE` · reflectivity · cosine of incidence / distance². A pixel at a rim mixes what it sees of
+    The amplitude is what of the sensor's light is `returned`. A pixel at a rim mixes what it sees of
     a body and what is behind it by their amplitudes, which puts its distance between the two ("flying pixel").
     """
 
@@ -75,7 +72,7 @@ class TimeOfFlight:
             stream_of(name, "amplitude", Kind.AMPLITUDE, "16UC1", camera, rate_hz),
         )
         self._view = View(scene, camera)
-        self._wall_amplitude = _amplitude(self._view.wall)
+        self._wall_amplitude = returned(self._view.wall)
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes depth and amplitude of one exposure."""
@@ -98,7 +95,7 @@ class TimeOfFlight:
         """Distance [m] and amplitude (height, width) before any noise; mixed at the rims, NaN where nothing is seen."""
         distance, amplitude = self._view.wall.distance.copy(), self._wall_amplitude.copy()
         for sight in sights:
-            body = sight.share * _amplitude(sight)
+            body = sight.share * returned(sight)
             behind = (1 - sight.share) * amplitude[sight.region]
             some = sight.share > 0
             with np.errstate(invalid="ignore", divide="ignore"):
@@ -106,7 +103,3 @@ class TimeOfFlight:
             distance[sight.region] = np.where(some, mixed, distance[sight.region])
             amplitude[sight.region] = np.where(some, body + behind, amplitude[sight.region])
         return distance, amplitude
-
-
-def _amplitude(sight: Sight) -> NDArray[np.float32]:
-    return WHITE * sight.albedo[..., 3] * sight.cosine / sight.distance**2

@@ -118,7 +118,7 @@ def test_a_sink_may_stop_the_device_itself() -> None:
 
 
 def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
-    heads = "tof,structured_light,color,bayer,barrier"
+    heads = "tof,structured_light,color,bayer,ir,barrier"
     uri = f"simulated://board?seed=2&sensors={heads}&rate=15&color=64x48&tof=32x24"
     device = open_device(uri, Time().clock)
     assert device.info.uri == uri
@@ -128,6 +128,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
         "structured_light/depth",
         "color/color",
         "bayer/bayer",
+        "ir/ir",
         "barrier/binary",
     ]
     assert isinstance(device, SimulatedDevice)

@@ -90,7 +90,7 @@ def test_shadow_is_what_the_light_does_not_see(capsules: np.ndarray, light: tupl
 
 @pytest.mark.parametrize("scene", ["sheet", "board"])
 def test_the_hand_is_not_there_in_the_first_second(scene: str) -> None:
-    heads = "seed=2&sensors=tof,structured_light,color,bayer"
+    heads = "seed=2&sensors=tof,structured_light,color,bayer,ir"
     alone, crossed = build(heads, scene), build(f"{heads}&occluder=hand", scene)
     for k in (0, 15, 30):
         for without, frame in zip(alone.expose(k)[0], crossed.expose(k)[0]):
@@ -130,7 +130,7 @@ def test_what_is_hidden_is_seen_nearer_and_the_rest_as_it_is() -> None:
 
 
 def test_every_head_sees_it_and_its_shadow_lies_beside_it() -> None:
-    heads = "seed=1&sensors=tof,structured_light,color,bayer&noise=0"
+    heads = "seed=1&sensors=tof,structured_light,color,bayer,ir&noise=0"
     alone, crossed = build(heads), build(f"{heads}&occluder=hand")
     k = round(30 * hand_of(crossed).crossings(1)[0])
     without, frames = ({frame.key: frame.data for frame in s.expose(k)[0]} for s in (alone, crossed))

@@ -5,7 +5,7 @@ import pytest
 
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from drivers.device import Truth
-from drivers.frame import Frame, Geometry
+from drivers.frame import Frame, Geometry, Kind
 from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation
 from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL, TimeOfFlight, TimeOfFlightNoise
@@ -29,7 +29,7 @@ def at(simulation: Simulation, name: str, points_r: np.ndarray) -> tuple[np.ndar
     return v, u
 
 
-ALL = "sensors=tof,structured_light,color,bayer"
+ALL = "sensors=tof,structured_light,color,bayer,ir"
 
 
 def test_the_same_seed_gives_the_same_bits_in_any_order() -> None:
@@ -156,6 +156,25 @@ def test_the_amplitude_falls_with_the_square_of_the_distance() -> None:
     assert np.percentile(reflectivity, 95) == pytest.approx(0.85, abs=0.01)
 
 
+def test_infrared_is_what_comes_back_of_the_sensors_own_light() -> None:
+    simulation = build("sensors=tof,ir&noise=0&ir=176x144")
+    tof, ir = simulation.heads["tof"], simulation.heads["ir"]
+    assert ir.camera.fx != tof.camera.fx
+    frames, truth = expose(simulation, 150)
+    assert (frames["ir/ir"].kind, frames["ir/ir"].encoding, frames["ir/ir"].unit) == (Kind.IR, "mono16", "dn")
+    brightness = frames["ir/ir"].si()[at(simulation, "ir", inner(truth))]
+    amplitude = frames["tof/amplitude"].si()[at(simulation, "tof", inner(truth))]
+    # From 6 cm beside each other, and half a pixel off, they see the same paper.
+    assert np.median(np.abs(brightness / amplitude - 1)) < 0.03
+    assert np.corrcoef(brightness, amplitude)[0, 1] > 0.97
+
+
+def test_infrared_noise_has_the_declared_deviation() -> None:
+    simulation = build("sensors=ir&noise=2")
+    images = np.array([expose(simulation, k)[0]["ir/ir"].si() for k in range(20)])
+    assert np.sqrt(images.var(axis=0, ddof=1)[images.mean(axis=0) > 500].mean()) == pytest.approx(100, rel=0.02)
+
+
 @pytest.mark.parametrize("lens", ["0", "-0.25,0.06"])
 def test_material_points_keep_their_colour(lens: str) -> None:
     simulation = build(f"sensors=color&noise=0&color=640x480&lens={lens}")
@@ -182,6 +201,6 @@ def test_all_heads_share_the_instant_and_stamps_jitter_only_if_asked() -> None:
     assert {frame.seq for frame in exact.values()} == {7}
     jittered, truth = expose(build(ALL + "&jitter_ms=2"), 7)
     errors = {frame.sensor: frame.t_host_ns - truth.t_host_ns for frame in jittered.values()}
-    assert len(set(errors.values())) == 4
+    assert len(set(errors.values())) == 5
     assert all(0 < abs(error) < 10e6 for error in errors.values())
     assert {frame.t_sigma_ns for frame in jittered.values()} == {2_000_000}
