@@ -3,8 +3,8 @@
 import numpy as np
 
 from calib.noise.samples import Samples
-from drivers.simulated.structured_light import StructuredLightNoise
 from drivers.simulated.active_light import WHITE
+from drivers.simulated.structured_light import StructuredLightNoise
 from drivers.simulated.time_of_flight import LEVELS, RANGE_M, TimeOfFlightNoise
 
 #: A time-of-flight head with a mean offset of its own and one of dark surfaces.
