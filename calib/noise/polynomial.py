@@ -133,27 +133,42 @@ def _evaluate(
     """Horner's scheme, first in the amplitude and then in the distance, block by block so that its loops vectorise."""
     nearest, farthest, faintest, brightest = domain
     rows, columns, _ = coefficients.shape
-    sums = np.empty((rows, _BLOCK))
+    sums, inside, coefficient = np.empty((rows, _BLOCK)), np.empty(_BLOCK), np.empty(_BLOCK)
     for first in range(0, x.shape[1], _BLOCK):
         last = min(first + _BLOCK, x.shape[1])
-        at, amplitude = place[first:last], a[first:last]
+        at, n = place[first:last], last - first
+        _clip(a[first:last], faintest, brightest, inside)
         for i in range(rows):
             partial = sums[i]
-            for k in range(last - first):
-                partial[k] = coefficients[i, columns - 1, at[k]]
+            _look_up(coefficients[i, columns - 1], at, partial)
             for j in range(columns - 2, -1, -1):
-                plane = coefficients[i, j]
-                for k in range(last - first):
-                    v = amplitude[k]
-                    inside = faintest if v < faintest else (brightest if v > brightest else v)
-                    partial[k] = partial[k] * inside + plane[at[k]]
+                _look_up(coefficients[i, j], at, coefficient)
+                for k in range(n):
+                    partial[k] = partial[k] * inside[k] + coefficient[k]
         for node in range(x.shape[0]):
-            distance, value = x[node, first:last], out[node, first:last]
-            for k in range(last - first):
+            _clip(x[node, first:last], nearest, farthest, inside)
+            value = out[node, first:last]
+            for k in range(n):
                 value[k] = sums[rows - 1, k]
             for i in range(rows - 2, -1, -1):
                 partial = sums[i]
-                for k in range(last - first):
-                    v = distance[k]
-                    inside = nearest if v < nearest else (farthest if v > farthest else v)
-                    value[k] = value[k] * inside + partial[k]
+                for k in range(n):
+                    value[k] = value[k] * inside[k] + partial[k]
+
+
+@kernel
+def _clip(values: NDArray[np.float64], low: float, high: float, out: NDArray[np.float64]) -> None:
+    """Values moved into a range; NaN stays NaN."""
+    for k in range(values.size):
+        v = values[k]
+        out[k] = low if v < low else (high if v > high else v)
+
+
+@kernel
+def _look_up(plane: NDArray[np.float64], at: NDArray[np.int64], out: NDArray[np.float64]) -> None:
+    """The coefficient of every place; where there is one for all it is read once, which is what the processor likes."""
+    if plane.size == 1:
+        out[: at.size] = plane[0]
+    else:
+        for k in range(at.size):
+            out[k] = plane[at[k]]
