@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from abs_service.images import ColorImage, DepthImage, Image
-from abs_service.readers import ObservationError, reader
+from abs_service.images import Image
+from abs_service.readers import ObservationError, kinds, reader
 from calib.camera import Camera
 from calib.rig import Rig
 from drivers.frame import Frame, FrameSet
 
-__all__ = ["ColorImage", "DepthImage", "Observation", "ObservationError", "Observer", "Source"]
+__all__ = ["Observation", "ObservationError", "Observer", "Source"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,10 +58,10 @@ class Observer:
             members = {frame.kind: frame for frame in frames.frames.values() if frame.sensor == sensor.head}
             for frame in members.values():
                 _check_size(frame, sensor.camera)
-            kinds = self._readers[name].kinds
-            if members.keys() >= set(kinds):
+            needed = kinds(sensor.noise)
+            if members.keys() >= set(needed):
                 images[name] = self._readers[name].read(members)
-                sources[name] = _source(members[kinds[0]])
+                sources[name] = _source(members[needed[0]])
         missing = tuple(name for name in self._rig.sensors if name not in images)
         return Observation(frames.seq, frames.stamp_ns, images, sources, missing)
 

@@ -1,7 +1,6 @@
 """From the frames of one head to the image of one sensor, one reader for each kind of sensor."""
 
 from collections.abc import Mapping
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,7 +14,7 @@ from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
-from calib.rig import Sensor
+from calib.rig import Noise, Sensor
 from drivers.frame import Frame, Geometry, Kind
 
 #: The pattern of channels of an image without colours, and those of the mosaics by what their two upper rows read.
@@ -31,13 +30,7 @@ class ObservationError(ValueError):
 
 
 class Reader(Protocol):
-    """Makes the image of one sensor from the frames of its head.
-
-    Attributes:
-        kinds: of the frames that it needs; the image is of the first one's exposure.
-    """
-
-    kinds: tuple[Kind, ...]
+    """Makes the image of one sensor from the frames of its head."""
 
     def read(self, frames: Mapping[Kind, Frame]) -> Image:
         """The image.
@@ -48,11 +41,26 @@ class Reader(Protocol):
         ...
 
 
+def kinds(noise: Noise) -> tuple[Kind, ...]:
+    """What frames a sensor needs; the image is of the first one's exposure."""
+    match noise:
+        case DepthNoise():
+            return (Kind.DEPTH, Kind.AMPLITUDE) if noise.uses_amplitude else (Kind.DEPTH,)
+        case GaussianColor() | GaussianGrey():
+            return (Kind.COLOR,)
+        case GaussianBayer():
+            return (Kind.BAYER,)
+        case GaussianIntensity():
+            return (Kind(noise.stream),)
+        case LightBarrier():
+            return (Kind.BINARY,)
+
+
 def reader(sensor: Sensor) -> Reader:
     """The reader for what a sensor's noise model is about."""
     match sensor.noise:
         case DepthNoise():
-            return _DepthReader(sensor.camera, sensor.noise.uses_amplitude)
+            return _DepthReader(sensor.camera)
         case GaussianColor():
             return _ColorReader()
         case GaussianGrey():
@@ -60,20 +68,14 @@ def reader(sensor: Sensor) -> Reader:
         case GaussianBayer():
             return _BayerReader()
         case GaussianIntensity():
-            return _IntensityReader(sensor.noise.stream)
+            return _IntensityReader(Kind(sensor.noise.stream))
         case LightBarrier():
             return _BeamReader()
 
 
 class _DepthReader:
-    def __init__(self, camera: Camera, uses_amplitude: bool):
-        self.kinds = (Kind.DEPTH, Kind.AMPLITUDE) if uses_amplitude else (Kind.DEPTH,)
-        self._camera = camera
-
-    @cached_property
-    def _ray_length(self) -> NDArray[np.float32]:
-        """Radial distance per unit of z of every pixel (height, width)."""
-        return (1 / self._camera.rays()[..., 2]).astype(np.float32)
+    def __init__(self, camera: Camera):
+        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)  # radial distance per unit of z
 
     def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]
@@ -85,16 +87,13 @@ class _DepthReader:
 
 
 class _ColorReader:
-    kinds = (Kind.COLOR,)
-
     def read(self, frames: Mapping[Kind, Frame]) -> ColorImage:
-        return ColorImage(_rgb(frames[Kind.COLOR], "color", "rgb8 or bgr8; monochrome cameras have the noise type grey"))
+        needed = "rgb8 or bgr8; monochrome cameras have the noise type grey"
+        return ColorImage(_rgb(frames[Kind.COLOR], "color", needed))
 
 
 class _GreyReader:
     """Grey as it comes, or the luma of a colour."""
-
-    kinds = (Kind.COLOR,)
 
     def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         frame = frames[Kind.COLOR]
@@ -107,8 +106,6 @@ class _GreyReader:
 
 
 class _BayerReader:
-    kinds = (Kind.BAYER,)
-
     def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         frame = frames[Kind.BAYER]
         order = frame.encoding.removeprefix("bayer_").removesuffix("8")
@@ -118,16 +115,14 @@ class _BayerReader:
 
 
 class _IntensityReader:
-    def __init__(self, stream: str):
-        self.kinds = (Kind(stream),)
+    def __init__(self, kind: Kind):
+        self._kind = kind
 
     def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
-        return ChannelImage(frames[self.kinds[0]].si(), ONE_CHANNEL)
+        return ChannelImage(frames[self._kind].si(), ONE_CHANNEL)
 
 
 class _BeamReader:
-    kinds = (Kind.BINARY,)
-
     def read(self, frames: Mapping[Kind, Frame]) -> BeamReading:
         return BeamReading(bool(frames[Kind.BINARY].si().max() > 0.5))
 

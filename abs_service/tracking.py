@@ -7,10 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from abs_service.observation import Observation, Observer
-from abs_service.readers import reader
+from abs_service.readers import kinds
 from abs_service.tracker import loss, priors, status
+from abs_service.tracker.appearance import dressed
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.initialization import sight, vertex_colors
+from abs_service.tracker.initialization import sight
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.objectives.base import Objective
@@ -153,7 +154,7 @@ class Tracking:
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
         plan = self._plan
         model = plan.model.build(sight(observation, self._rig, plan.reference, self._region, plan.vertices))
-        mesh = replace(model.mesh, colors=vertex_colors(model.mesh.vertices, observation.images, self._rig))
+        mesh = dressed(model.mesh, observation.images, self._rig)
         tracker = Tracker(
             model,
             plan.objective.build(self._rig, mesh, plan.synthesis.build(self._rig, mesh)),
@@ -168,7 +169,7 @@ class Tracking:
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
     """The (head, stream) of every image that the sensors' noise models need; streams are called by their kind."""
-    return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in reader(sensor).kinds))
+    return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in kinds(sensor.noise)))
 
 
 def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimate:

@@ -5,15 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.images import ColorImage, DepthImage
-from abs_service.observation import Observation, Source
+from abs_service.observation import Observer
 from abs_service.tracker.regions import nearest
-from abs_service.tracking import Plan, Tracking
+from abs_service.tracking import Plan, Tracking, streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
-from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.rig import Rig, Sensor
+from calib.rig import Noise, Rig, Sensor
+from drivers.frame import Frame, FrameSet, Geometry, Kind
 
 #: Stands for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
@@ -23,7 +22,7 @@ _NOISE = GaussianPolynomial(((0.01,),))
 _DISTANCE_M = 1.0
 
 
-def warm_up(noises: Mapping[str, DepthNoise | GaussianColor], plan: Plan) -> None:
+def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
     """Tracks a flat board that no sensor ever saw, once, with the parts of the plan.
 
     Args:
@@ -31,22 +30,28 @@ def warm_up(noises: Mapping[str, DepthNoise | GaussianColor], plan: Plan) -> Non
         plan: of the tracker.
     """
     rig = Rig("warm-up", {name: _sensor(name, noise) for name, noise in noises.items()})
-    tracking = Tracking(rig, replace(plan, region=nearest.Settings()))
-    tracking.track_observation(_board(rig), lambda: False)
+    frames = [_board(head, Kind(stream)) for head, stream in streams(rig.sensors.values())]
+    observation = Observer(rig).observe(FrameSet(0, 0, {frame.key: frame for frame in frames}))
+    Tracking(rig, replace(plan, region=nearest.Settings())).track_observation(observation, lambda: False)
 
 
-def _sensor(name: str, noise: DepthNoise | GaussianColor) -> Sensor:
-    return Sensor(name, _CAMERA, noise if isinstance(noise, GaussianColor) else _NOISE)
+def _sensor(name: str, noise: Noise) -> Sensor:
+    return Sensor(name, _CAMERA, _NOISE if isinstance(noise, DepthNoise) else noise)
 
 
-def _board(rig: Rig) -> Observation:
-    """A flat board in the middle of every depth image, and grey colour images."""
+def _board(head: str, kind: Kind) -> Frame:
+    """What a head sees of a flat board in the middle of its image; grey pictures, and a beam that is free."""
     height, width = _CAMERA.height, _CAMERA.width
-    distance = np.full((height, width), np.nan, np.float32)
-    distance[height // 4 : 3 * height // 4, width // 4 : 3 * width // 4] = _DISTANCE_M
-    depth = DepthImage(distance, np.ones_like(distance))
-    grey = ColorImage(np.full((height, width, 3), 128, np.uint8))
-    images: dict[str, DepthImage | ColorImage] = {
-        name: grey if isinstance(sensor.noise, GaussianColor) else depth for name, sensor in rig.sensors.items()
-    }
-    return Observation(0, 0, images, {name: Source(0, 0) for name in images}, ())
+    middle = (slice(height // 4, 3 * height // 4), slice(width // 4, 3 * width // 4))
+    match kind:
+        case Kind.DEPTH:
+            distance = np.full((height, width), np.nan, np.float32)
+            distance[middle] = _DISTANCE_M
+            return Frame(head, kind.value, kind, distance, "32FC1", 0, 0, 0, geometry=Geometry.RADIAL)
+        case Kind.COLOR:
+            return Frame(head, kind.value, kind, np.full((height, width, 3), 128, np.uint8), "rgb8", 0, 0, 0)
+        case Kind.BAYER:
+            return Frame(head, kind.value, kind, np.full((height, width), 128, np.uint8), "bayer_rggb8", 0, 0, 0)
+        case Kind.BINARY:
+            return Frame(head, kind.value, kind, np.zeros((height, width), np.uint8), "mono8", 0, 0, 0)
+    return Frame(head, kind.value, kind, np.full((height, width), 3000, "<u2"), "16UC1", 0, 0, 0)

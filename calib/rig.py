@@ -24,7 +24,7 @@ class Sensor:
     A head that delivers two, such as a time-of-flight camera with its amplitudes, is two sensors with one camera.
 
     Attributes:
-        name: name in the rig: that of the head, `tof`, and with its stream, `tof/amplitude`, if it is the head's second.
+        name: name in the rig: that of the head, `tof`, with the stream, `tof/amplitude`, if it is the head's second.
         camera: projection `P_s`.
         noise: noise model of what it measures, and so what that is.
         outlier_share: share of its measurements that come from anywhere, 0…1; None if nobody knows better than the

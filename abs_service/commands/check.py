@@ -10,7 +10,7 @@ Exit code 0 if `abs-service run` could use it, 2 if not.
 import argparse
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -18,6 +18,8 @@ from abs_service import config, keys, plugins
 from abs_service.commands import participant, plans
 from abs_service.exits import Exit, is_for_user
 from abs_service.problems import none_of
+from abs_service.readers import kinds
+from calib.rig import Noise
 from drivers import opening
 
 #: Drivers that touch no hardware, so that opening a device is the best check of its address.
@@ -67,9 +69,13 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         with _noting(f"sensors.{name}.noise", problems):
             if sensor.noise is not None:
                 plans.noise(sensor.noise, sensor.range_m)
+        with _noting(f"sensors.{name}.texture", problems):
+            if sensor.texture is not None:
+                plans.texture(sensor.texture)
     for name, tracker in rig.trackers.items():
         with _noting(f"trackers.{name}", problems):
             plans.plan(rig, name)
+            _check_streams(plans.noises(rig, name), streams)
         with _noting(f"trackers.{name}.region", problems):
             tracker.region.build()
     if problems:
@@ -93,7 +99,8 @@ def text(found: dict[str, Any]) -> str:
     lines += [f"  device   {name}: {uri}" for name, uri in found["devices"].items()]
     for name, sensor in found["sensors"].items():
         streams = ", ".join(sensor["streams"]) or "streams known once it is open"
-        lines.append(f"  sensor   {name}: {streams}; noise {sensor['noise'] or 'unknown, only recorded'}")
+        texture = f", texture {sensor['texture']}" if sensor["texture"] else ""
+        lines.append(f"  sensor   {name}: {streams}; noise {sensor['noise'] or 'unknown, only recorded'}{texture}")
     for name, tracker in found["trackers"].items():
         what = f"{tracker['model']} from {', '.join(tracker['sensors'])}, {tracker['vertices']} vertices"
         how = f"{tracker['objective']}, {tracker['optimizer']}, paced by {tracker['reference']}"
@@ -123,10 +130,20 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
     return found
 
 
+def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]) -> None:
+    """Refuses noise models of what a device is known not to deliver."""
+    for name, noise in noises.items():
+        head = name.partition("/")[0]
+        there = {stream.partition(" ")[0] for stream in streams.get(head, [])}
+        missing = [kind.value for kind in kinds(noise) if kind not in there]
+        if there and missing:
+            raise CheckError(f"{name}: its noise model needs the stream {missing[0]}, {none_of(missing[0], there)}")
+
+
 def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]]) -> dict[str, Any]:
     sensor = rig.sensors[name]
-    noise = None if sensor.noise is None else plugins.table(sensor.noise)["type"]
-    return {"device": sensor.device, "streams": streams.get(name, []), "noise": noise}
+    noise, texture = (None if part is None else plugins.table(part)["type"] for part in (sensor.noise, sensor.texture))
+    return {"device": sensor.device, "streams": streams.get(name, []), "noise": noise, "texture": texture}
 
 
 def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:

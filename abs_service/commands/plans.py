@@ -5,13 +5,13 @@ from typing import Any
 
 from abs_service import plugins
 from abs_service.config import ServiceConfig
+from abs_service.readers import kinds
 from abs_service.tracking import Plan
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
-from calib.noise.color import GaussianColor
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
-from calib.rig import Rig, Sensor
+from calib.rig import Noise, PictureNoise, Rig, Sensor
 
 
 class PlanError(Exception):
@@ -54,23 +54,28 @@ def model_name(config: ServiceConfig, tracker: str) -> str:
     return plugins.table(config.trackers[tracker].model)["type"]
 
 
-def noises(config: ServiceConfig, tracker: str) -> dict[str, DepthNoise | GaussianColor]:
-    """The noise model of every sensor of one tracker.
+def noises(config: ServiceConfig, tracker: str) -> dict[str, Noise]:
+    """The noise model of everything that the sensors of one tracker measure.
+
+    A texture is called by its sensor and stream: `tof/amplitude`.
 
     Raises:
         PlanError: a sensor has none, or one that does not fit its other keys.
         NoiseError: one cannot be made.
     """
-    models: dict[str, DepthNoise | GaussianColor] = {}
+    models: dict[str, Noise] = {}
     for name in config.trackers[tracker].sensors:
-        settings = config.sensors[name].noise
-        if settings is None:
+        table = config.sensors[name]
+        if table.noise is None:
             raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no noise model')
-        models[name] = noise(settings, config.sensors[name].range_m)
+        models[name] = noise(table.noise, table.range_m)
+        if table.texture is not None:
+            made = texture(table.texture)
+            models[f"{name}/{kinds(made)[0]}"] = made
     return models
 
 
-def noise(settings: Any, range_m: float | None) -> DepthNoise | GaussianColor:
+def noise(settings: Any, range_m: float | None) -> Noise:
     """The noise model of one sensor, from the `Settings` of a module of `calib.noise`.
 
     Raises:
@@ -83,6 +88,19 @@ def noise(settings: Any, range_m: float | None) -> DepthNoise | GaussianColor:
     return made
 
 
+def texture(settings: Any) -> PictureNoise:
+    """The noise model of what a depth sensor sees of the surface besides its distance.
+
+    Raises:
+        PlanError: it is one of distances or of light barriers.
+    """
+    made = settings.build()
+    if not isinstance(made, PictureNoise):
+        kind = plugins.table(settings)["type"]
+        raise PlanError(f'type "{kind}" is no texture: intensity, color, grey and bayer are')
+    return made
+
+
 def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> Rig:
     """The sensors of one tracker with their cameras and noise models.
 
@@ -92,15 +110,16 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
     """
     sensors: dict[str, Sensor] = {}
     for name, model in noises(config, tracker).items():
-        if name not in cameras:
-            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no camera model')
-        _check_size(name, model, cameras[name])
-        table = config.sensors[name]
-        sensors[name] = Sensor(name, cameras[name], model, table.outlier_share, table.range_m)
+        head = name.partition("/")[0]
+        if head not in cameras:
+            raise PlanError(f'sensor "{head}" of tracker "{tracker}" has no camera model')
+        _check_size(head, model, cameras[head])
+        table = config.sensors[head]
+        sensors[name] = Sensor(name, cameras[head], model, table.outlier_share, table.range_m)
     return Rig(config.name, sensors)
 
 
-def _check_size(sensor: str, noise: DepthNoise | GaussianColor, camera: Camera) -> None:
+def _check_size(sensor: str, noise: Noise, camera: Camera) -> None:
     if isinstance(noise, (PixelPolynomial, RegionPolynomial)) and noise.shape != (camera.height, camera.width):
         height, width = noise.shape
         raise PlanError(

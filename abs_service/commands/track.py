@@ -26,9 +26,7 @@ from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
 from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
 from calib.camera import Camera
-from calib.noise.base import DepthNoise
-from calib.noise.color import GaussianColor
-from calib.rig import Rig
+from calib.rig import Noise, Rig
 from drivers import codec
 from drivers.frame import Kind
 
@@ -120,7 +118,7 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     return cameras
 
 
-def _prepare(noises: Mapping[str, DepthNoise | GaussianColor], plan: Plan, health: Health) -> None:
+def _prepare(noises: Mapping[str, Noise], plan: Plan, health: Health) -> None:
     health.label("phase", "preparing")
     warm_up(noises, plan)
     health.label("phase", "waiting")

@@ -43,6 +43,7 @@ class SensorTable(Table):
         head: what the device calls it; "" if it is the sensor's name.
         camera: calibration in place of the device's own.
         noise: `Settings` of a module of `calib.noise`; None if the sensor is recorded, but no tracker uses it.
+        texture: likewise of what it sees of the surface besides: a time-of-flight camera's amplitudes, for example.
         outlier_share: share of its measurements that come from anywhere; None for the objective's own.
         range_m: distances that a depth sensor can report at all; None for the objective's own.
     """
@@ -51,6 +52,7 @@ class SensorTable(Table):
     head: str = ""
     camera: CameraTable = CameraTable()
     noise: Annotated[Any, Plugin("calib.noise")] | None = None
+    texture: Annotated[Any, Plugin("calib.noise")] | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Positive | None = None
 

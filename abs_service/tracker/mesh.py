@@ -1,6 +1,7 @@
 """The triangle mesh that is deformed."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,19 @@ class Mesh:
         colors: red, green, blue (n, 3) in 0…255 from a colour sensor; NaN where none saw the vertex.
         chart: flat coordinates (n, 2) of the vertices, in any unit, in which the mesh does not fold; first axis along
             the object's long side.
+        appearance: what sensors that make pictures see on the vertices, by sensor, (n, channels) in the sensor's unit;
+            for those with a light of their own, per unit of light. NaN where unknown.
     """
 
     vertices: NDArray[np.float64]
     faces: NDArray[np.int32]
     colors: NDArray[np.float32]
     chart: NDArray[np.float64]
+    appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+
+    def looks(self, sensor: str) -> NDArray[np.float32]:
+        """What a sensor sees on the vertices (n, channels): their colours if nothing else is known."""
+        return self.appearance.get(sensor, self.colors)
 
     @property
     def edges(self) -> NDArray[np.int32]:
@@ -50,4 +58,5 @@ class Mesh:
         """The same mesh with its vertices listed in another order: vertex i becomes the former vertex order[i]."""
         place = np.empty(len(order), np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
-        return Mesh(self.vertices[order], place[self.faces], self.colors[order], self.chart[order])
+        appearance = {sensor: values[order] for sensor, values in self.appearance.items()}
+        return Mesh(self.vertices[order], place[self.faces], self.colors[order], self.chart[order], appearance)

@@ -51,11 +51,11 @@ class GaussianBayer:
 
     def filtered(self, colors: NDArray[np.floating]) -> NDArray[np.float64]:
         """What the red, green and blue pixels (…, 3) make of colours (…, 3)."""
-        return colors @ np.array(self.crosstalk).T
+        return colors.astype(np.float64) @ np.array(self.crosstalk).T
 
     def unfiltered(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
         """The colours (…, 3) of which red, green and blue pixels made (…, 3)."""
-        return pixels @ np.linalg.inv(np.array(self.crosstalk)).T
+        return pixels.astype(np.float64) @ np.linalg.inv(np.array(self.crosstalk)).T
 
     def build(self) -> "GaussianBayer":
         """The model itself: its TOML keys are its fields."""

@@ -129,7 +129,7 @@ CASES = {
     "a lens without its camera matrix": ("[sensors.tof.camera]\nlens = [0.1]\n", "missing: width"),
     "a noise model that is none": (
         '[sensors.ir]\ndevice = "sim"\nnoise = { type = "colour" }\n',
-        'sensors.ir.noise.type = "colour": no such type, did you mean "color"? allowed: color,',
+        'sensors.ir.noise.type = "colour": no such type, did you mean "color"? allowed: bayer, binary, color,',
     ),
     "a share of outliers that leaves nothing": (
         '[sensors.ir]\ndevice = "sim"\noutlier_share = 1.0\n',

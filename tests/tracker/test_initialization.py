@@ -5,7 +5,7 @@ import pytest
 
 from abs_service.images import ColorImage
 from abs_service.tracker.grid import LEAST_VERTICES, grid_mesh
-from abs_service.tracker.initialization import sight, vertex_colors
+from abs_service.tracker.initialization import sight
 from abs_service.tracker.regions import nearest
 from abs_service.tracker.sighting import Sighting, SightingError
 from calib import pose
@@ -138,30 +138,3 @@ def test_without_a_depth_image_there_is_no_mesh_yet():
 def gradient_image() -> ColorImage:
     columns, rows = np.meshgrid(np.arange(320), np.arange(240))
     return ColorImage(np.stack([columns // 2, rows, 255 - rows], axis=-1).astype(np.uint8))
-
-
-def test_colors_are_those_that_the_color_sensor_sees():
-    seen = observation(tof=depth_image(rectangle(placed(0.3), background=1.8)), color=gradient_image())
-    mesh = grid_mesh(sight(seen, RIG, "tof", nearest.Settings(), 300))
-    colors = vertex_colors(mesh.vertices, seen.images, RIG)
-    columns, rows = np.floor(COLOR.project(mesh.vertices) + 0.5).T
-    np.testing.assert_array_equal(colors, np.stack([columns // 2, rows, 255 - rows], axis=1))
-
-
-def test_without_a_color_sensor_there_are_no_colors():
-    seen = observation(tof=depth_image(rectangle(placed(), background=1.8)), missing=("color",))
-    mesh = grid_mesh(sight(seen, RIG, "tof", nearest.Settings(), 300))
-    assert np.isnan(vertex_colors(mesh.vertices, seen.images, RIG)).all()
-
-
-def test_colors_of_several_sensors_are_averaged_and_unseen_vertices_have_none():
-    other = Sensor("other", Camera(320, 240, 275.0, 275.0, 400.0, 119.5, T_rs=COLOR.T_rs), GaussianColor())
-    rig = Rig("r", {**RIG.sensors, "other": other})
-    images = {
-        "color": ColorImage(np.full((240, 320, 3), 100, np.uint8)),
-        "other": ColorImage(np.full((240, 320, 3), 200, np.uint8)),
-    }
-    points = pose.transform(COLOR.T_rs, np.array([[-0.4, 0, 1], [0.1, 0, 1], [0, 3, 1], [0.0, 0, -1]]))
-    colors = vertex_colors(points, images, rig)
-    np.testing.assert_array_equal(colors[:2, 0], [150, 100])
-    assert np.isnan(colors[2:]).all()

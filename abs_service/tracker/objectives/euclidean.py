@@ -11,11 +11,14 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from calib.noise.base import LOG_SQRT_2PI
+from abs_service.tracker.terms.making import make_term
+from calib.noise.base import LOG_SQRT_2PI, DepthNoise
+from calib.noise.bayer import GaussianBayer
+from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
-from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.constant import Constant
+from calib.noise.grey import GaussianGrey
+from calib.noise.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 
 
@@ -28,28 +31,45 @@ class Settings:
 
     Attributes:
         depth_weight: cost of a squared metre between measured and synthesised distance.
-        color_weight: cost of a squared level of colour difference, summed over the channels.
+        color_weight: cost of a squared level between measured and synthesised colour, grey or Bayer channel.
         cutoff_m: distances that differ by more, and vertices without a measurement, cost as much as this [m].
         cutoff_levels: likewise for colours, in levels of 256.
+        intensity_weight: cost of a squared unit between measured and synthesised intensity.
+        cutoff_intensity: intensities that differ by more cost as much as this.
+        barrier_weight: cost of a light barrier that says the opposite of what the mesh does.
     """
 
     depth_weight: Annotated[float, Gt(0)] = 5000.0
     color_weight: Annotated[float, Gt(0)] = 0.002
     cutoff_m: Annotated[float, Gt(0)] = 0.03
     cutoff_levels: Annotated[float, Gt(0)] = 60.0
+    intensity_weight: Annotated[float, Gt(0)] = 5e-7
+    cutoff_intensity: Annotated[float, Gt(0)] = 4000.0
+    barrier_weight: Annotated[float, Gt(0)] = 5.0
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> "SquareSum":
         """The fitness of a mesh in a rig."""
         return SquareSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
 
     def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
-        if isinstance(sensor.noise, GaussianColor):
-            color = GaussianColor(_deviation(self.color_weight))
-            bounds = _bounds(self.color_weight * self.cutoff_levels**2, 3, color.sigma)
-            return ColorTerm(sensor.name, synthesizer, mesh.colors, color, bounds)
-        depth = GaussianPolynomial(sigma=((_deviation(self.depth_weight),),))
-        bounds = _bounds(self.depth_weight * self.cutoff_m**2, 1, depth.sigma[0][0])
-        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), depth, bounds)
+        level, cutoff = _deviation(self.color_weight), self.color_weight * self.cutoff_levels**2
+        match sensor.noise:
+            case DepthNoise():
+                sigma = _deviation(self.depth_weight)
+                noise, bounds = Constant(sigma), _bounds(self.depth_weight * self.cutoff_m**2, 1, sigma)
+            case GaussianColor():
+                noise, bounds = GaussianColor(level), _bounds(cutoff, 3, level)
+            case GaussianGrey() | GaussianBayer():
+                noise, bounds = replace(sensor.noise, sigma=level), _bounds(cutoff, 1, level)
+            case GaussianIntensity():
+                sigma = _deviation(self.intensity_weight)
+                noise = replace(sensor.noise, sigma=sigma, relative=0.0)
+                bounds = _bounds(self.intensity_weight * self.cutoff_intensity**2, 1, sigma)
+            case LightBarrier():
+                wrong = 1 / (1 + np.exp(self.barrier_weight))  # its log-odds are the weight
+                noise = LightBarrier(sensor.noise.length_m, wrong, wrong)
+                bounds = Bounds(np.log1p(-wrong), self.barrier_weight, self.barrier_weight)
+        return make_term(replace(sensor, noise=noise), mesh, synthesizer, bounds)
 
 
 class SquareSum(TermSum):

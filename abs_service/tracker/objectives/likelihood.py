@@ -9,10 +9,9 @@ from annotated_types import Gt, Interval
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Bounds, Term
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from calib.noise.color import LEVELS, GaussianColor
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.making import make_term
+from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
 
 
@@ -33,16 +32,13 @@ class Settings:
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
-        return TermSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
-
-    def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
-        if isinstance(sensor.noise, GaussianColor):
-            return ColorTerm(sensor.name, synthesizer, mesh.colors, sensor.noise, self.bounds(sensor))
-        return DepthTerm(sensor.name, synthesizer, len(mesh.vertices), sensor.noise, self.bounds(sensor))
+        return TermSum(
+            synthesizer, [make_term(sensor, mesh, synthesizer, self.bounds(sensor)) for sensor in rig.sensors.values()]
+        )
 
     def bounds(self, sensor: Sensor) -> Bounds:
         """What a measurement costs that the sensor's noise does not explain."""
         share = sensor.outlier_share or self.outlier_share
-        color = isinstance(sensor.noise, GaussianColor)
-        uniform = 3 * np.log(LEVELS) if color else np.log(sensor.range_m or self.range_m)
+        range_m = sensor.range_m or self.range_m
+        uniform = float(np.log(range_m)) if isinstance(sensor.noise, DepthNoise) else sensor.noise.uniform
         return Bounds(-np.log1p(-share), uniform, uniform - np.log(share))

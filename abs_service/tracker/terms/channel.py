@@ -60,8 +60,11 @@ class ChannelTerm:
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
         deviation = self._noise.deviation(image.values)
-        normalizer = np.log(deviation) + np.float32(LOG_SQRT_2PI + self._bounds.inlier)
-        texels = np.stack([image.values, image.channel.astype(np.float32), 1 / deviation, normalizer], axis=-1)
+        texels = np.empty((*image.values.shape, 4), np.float32)
+        texels[..., VALUE] = image.values
+        texels[..., CHANNEL] = image.channel
+        texels[..., INVERSE] = 1 / deviation
+        texels[..., NORMALIZER] = np.log(deviation) + (LOG_SQRT_2PI + self._bounds.inlier)
         self._image = self._synthesizer.image(self.sensor, texels)
         texture = np.zeros((self._image.shape[0] + 2, self._image.shape[1] + 2, 4), np.float32)
         texture[..., VALUE] = np.nan

@@ -1,0 +1,35 @@
+"""The term of a sensor: what its noise model is about decides which one."""
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.barrier import BarrierTerm
+from abs_service.tracker.terms.base import Bounds, Term
+from abs_service.tracker.terms.channel import ChannelTerm
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.illumination import Active, Passive
+from calib.noise.base import DepthNoise
+from calib.noise.bayer import GaussianBayer
+from calib.noise.binary import LightBarrier
+from calib.noise.color import GaussianColor
+from calib.noise.grey import GaussianGrey
+from calib.noise.intensity import GaussianIntensity
+from calib.rig import Sensor
+
+
+def make_term(sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, bounds: Bounds) -> Term:
+    """The term that compares a mesh with what a sensor measures, under the sensor's own noise model."""
+    name = sensor.name
+    match sensor.noise:
+        case DepthNoise() as noise:
+            return DepthTerm(name, synthesizer, len(mesh.vertices), noise, bounds)
+        case GaussianColor() as noise:
+            return ColorTerm(name, synthesizer, mesh.looks(name), noise, bounds)
+        case GaussianGrey() | GaussianBayer() as noise:
+            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds)
+        case GaussianIntensity(illumination="active") as noise:
+            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Active(sensor.camera.center), bounds)
+        case GaussianIntensity() as noise:
+            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds)
+        case LightBarrier() as noise:
+            return BarrierTerm(name, sensor.camera, mesh.faces, noise, bounds)
