@@ -28,6 +28,8 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
     "occluder": values.one_of("none", "hand"),
+    "stiffness": values.number(float, 0.0005, 10),
+    "weight": values.number(float, 0.001, 2),
     "texture": values.one_of("smooth", "fine"),
     "lens": values.numbers(len(COEFFICIENTS), -1, 1),
     "order": values.one_of(*ORDERS),
@@ -37,7 +39,12 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
 }
 
 #: The keys that mean something in some scenes only, and in which.
-SCENES_OF: Mapping[str, frozenset[str]] = {"texture": frozenset({"sheet"})}
+SCENES_OF: Mapping[str, frozenset[str]] = {
+    "bend": frozenset({"sheet", "board"}),
+    "texture": frozenset({"sheet"}),
+    "stiffness": frozenset({"strip"}),
+    "weight": frozenset({"strip"}),
+}
 
 
 @dataclass(frozen=True)
@@ -53,9 +60,11 @@ class Address:
         noise: factor on all random errors; 0 leaves only what digits do.
         offset: mean offset of the time-of-flight head's distances [m].
         bend: largest bend of the sheet from end to end [degrees].
-        speed: factor on the speed of all motion.
+        speed: factor on the speed of all motion; with 0 nothing ever moves.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
         occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
+        stiffness: bending stiffness of the strip per width [N·m].
+        weight: mass of the strip per area [kg/m²].
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
         lens: distortion of all heads, `calib.lens.COEFFICIENTS`; `lens=-0.2,0.05` is a barrel's k1 and k2.
         order: of the Bayer head's filters, one of `ORDERS`.
@@ -74,6 +83,8 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
+    stiffness: float = 0.01
+    weight: float = 0.3
     texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
     order: str = "grbg"
@@ -87,7 +98,15 @@ class Address:
             AddressError: light from somewhere in an image cannot have come through the lens.
         """
         fine = self.texture == "fine"
-        choices = Choices(self.seed, math.radians(self.bend), self.speed, self.occluder == "hand", fine)
+        choices = Choices(
+            seed=self.seed,
+            bend=math.radians(self.bend),
+            speed=self.speed,
+            hand=self.occluder == "hand",
+            fine=fine,
+            stiffness=self.stiffness,
+            weight=self.weight,
+        )
         equipment = Equipment(
             sizes=self.sizes,
             rate_hz=self.rate,

@@ -37,14 +37,47 @@ class Placement:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Oscillations about a rest pose; every channel is a sum of two sinusoids of unrelated frequencies.
+class Oscillation:
+    """Nine numbers in [-1, 1] that change smoothly; each is a sum of two sinusoids of unrelated frequencies.
 
-    Nothing moves during the first `hold_s` seconds, so that a tracker can find the flat surface; the oscillations then
-    grow to their full size within `ramp_s`.
+    They are 0 during the first `hold_s` seconds, so that a tracker can find what is at rest, and grow to their full
+    size within `ramp_s`.
 
     Attributes:
         seed: of phases and frequencies.
+        speed: factor on all frequencies; with 0 nothing ever moves.
+        hold_s, ramp_s: duration of rest and of the growth [s].
+    """
+
+    seed: int
+    speed: float = 1.0
+    hold_s: float = 1.0
+    ramp_s: float = 3.0
+
+    def at(self, t: float) -> NDArray[np.float64]:
+        """The numbers (9,) at time `t` [s] after the start."""
+        frequencies, phases = self._sinusoids
+        return self._envelope(t) * (np.array([0.7, 0.3]) @ np.sin(frequencies * t + phases))
+
+    def _envelope(self, t: float) -> float:
+        """From 0 to 1 with continuous velocity and acceleration."""
+        x = np.clip((t - self.hold_s) / self.ramp_s, 0.0, 1.0) if self.speed > 0 else 0.0
+        return float(x**3 * (10 - 15 * x + 6 * x**2))
+
+    @cached_property
+    def _sinusoids(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Angular frequencies [rad/s] and phases [rad] of the slow and the fast part, (2, 9) each."""
+        generator = np.random.default_rng([self.seed, 2])
+        frequencies = generator.uniform([[0.14], [0.27]], [[0.23], [0.40]], (2, 9))
+        return 2 * np.pi * self.speed * frequencies, generator.uniform(0, 2 * np.pi, (2, 9))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Oscillations about a rest pose.
+
+    Attributes:
+        seed: of the oscillation, and of the direction that is bent.
         rest: translation at rest [m], shape (3,); the sheet then faces the rig's origin.
         translation: largest displacement along x, y, z [m].
         rotation: largest rotation about x, y, z [rad].
@@ -52,8 +85,7 @@ class Motion:
         width, height: of the sheet [m].
         turn: largest change of the bent direction [rad].
         shift: largest distance of the contact line from the centre [m].
-        speed: factor on all frequencies.
-        hold_s, ramp_s: duration of rest and of the growth [s].
+        speed: factor on all frequencies; with 0 nothing ever moves.
     """
 
     seed: int
@@ -66,12 +98,10 @@ class Motion:
     turn: float
     shift: float
     speed: float = 1.0
-    hold_s: float = 1.0
-    ramp_s: float = 3.0
 
     def at(self, t: float) -> Placement:
         """The placement at time `t` [s] after the start."""
-        channels = self._envelope(t) * self._oscillations(t)
+        channels = self._oscillation.at(t)  # translation, rotation, bend, direction, offset
         translation = np.asarray(self.rest) + np.asarray(self.translation) * channels[0:3]
         direction = float(self._first_direction + self.turn * channels[7])
         extent = np.hypot(self.width * np.cos(direction), self.height * np.sin(direction))
@@ -82,23 +112,10 @@ class Motion:
             offset=float(self.shift * channels[8]),
         )
 
-    def _envelope(self, t: float) -> float:
-        """From 0 to 1 with continuous velocity and acceleration."""
-        x = np.clip((t - self.hold_s) / self.ramp_s, 0.0, 1.0)
-        return float(x**3 * (10 - 15 * x + 6 * x**2))
-
     @cached_property
     def _first_direction(self) -> float:
         return float(np.random.default_rng([self.seed, 1]).uniform(0, np.pi))
 
     @cached_property
-    def _sinusoids(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angular frequencies [rad/s] and phases [rad] of the slow and the fast part of nine channels, (2, 9) each."""
-        generator = np.random.default_rng([self.seed, 2])
-        frequencies = generator.uniform([[0.14], [0.27]], [[0.23], [0.40]], (2, 9))
-        return 2 * np.pi * self.speed * frequencies, generator.uniform(0, 2 * np.pi, (2, 9))
-
-    def _oscillations(self, t: float) -> NDArray[np.float64]:
-        """Nine values in [-1, 1]: translation, rotation, bend, direction, offset."""
-        frequencies, phases = self._sinusoids
-        return np.array([0.7, 0.3]) @ np.sin(frequencies * t + phases)
+    def _oscillation(self) -> Oscillation:
+        return Oscillation(self.seed, self.speed)

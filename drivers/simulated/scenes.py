@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.simulated.body import Surface
 from drivers.simulated.hand import Hand
 from drivers.simulated.motion import Motion
 from drivers.simulated.rectangle import Rectangle
 from drivers.simulated.scene import REST_Z, Scene
+from drivers.simulated.strip import Strip
 from drivers.simulated.texture import Texture, checkerboard, fine_pattern, smooth_pattern
 
 #: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
@@ -25,6 +27,8 @@ class Choices:
         speed: factor on the speed of all motion.
         hand: whether a hand crosses the view.
         fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
+        stiffness: bending stiffness of the strip per width [N·m].
+        weight: mass of the strip per area [kg/m²].
     """
 
     seed: int = 1
@@ -32,6 +36,8 @@ class Choices:
     speed: float = 1.0
     hand: bool = False
     fine: bool = False
+    stiffness: float = 0.01
+    weight: float = 0.3
 
 
 def sheet(choices: Choices) -> Scene:
@@ -70,11 +76,19 @@ def board(choices: Choices) -> Scene:
     return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05)))
 
 
+def strip(choices: Choices) -> Scene:
+    """A strip of 0.30 × 0.05 m that hangs from a gripper towards the viewer and sags under its weight."""
+    length, width = 0.30, 0.05
+    pattern = smooth_pattern(choices.seed, length, width, (0.015, 0.006, 0.003), 1000.0, (0.1, 0.95), (0.5, 0.95))
+    hanging = Strip(choices.seed, length, width, choices.stiffness, choices.weight, pattern, choices.speed)
+    return _scene(choices, hanging)
+
+
 #: The scenes by the name that an address calls them.
-SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board}
+SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board, "strip": strip}
 
 
-def _scene(choices: Choices, *surfaces: Rectangle) -> Scene:
+def _scene(choices: Choices, *surfaces: Surface) -> Scene:
     hands = (Hand(choices.seed, surfaces, choices.speed),) if choices.hand else ()
     return Scene(surfaces, _wall(choices.seed), hands)
 
