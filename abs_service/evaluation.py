@@ -1,6 +1,7 @@
 """How far a tracked mesh is from the surface that really was there."""
 
 from collections import OrderedDict
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,44 +32,62 @@ class TruthComparison:
 
     A vertex belongs to the material point that was nearest to it when the mesh was made. From then on it is compared
     with where that point went (vertex error), and with the surface wherever it is (surface error, never larger).
-    Point-set methods look good on the second and poor on the first.
+    Point-set methods look good on the second and poor on the first. Of several surfaces, the mesh belongs to the one
+    that it was nearest to when it was made.
     """
 
     def __init__(self) -> None:
-        self._truths: OrderedDict[int, Grid] = OrderedDict()
+        self._truths: OrderedDict[int, dict[int, Grid]] = OrderedDict()  # by moment and surface
         self._rest: tuple[int, NDArray[np.float64]] | None = None
-        self._material: NDArray[np.float64] | None = None
+        self._material: tuple[int, NDArray[np.float64]] | None = None  # surface, and places on its grid
 
     def add_topology(self, rest_vertices: NDArray[np.floating], t_host_ns: int) -> None:
         """Takes the undeformed vertices (n, 3) [m] of a mesh that was made from the frames of `t_host_ns`."""
         self._rest, self._material = (t_host_ns, np.asarray(rest_vertices, np.float64)), None
 
-    def add_truth(self, t_host_ns: int, points_r: NDArray[np.floating]) -> None:
-        """Takes the true positions (rows, columns, 3) [m] of material points at `t_host_ns`."""
-        self._truths[t_host_ns] = np.asarray(points_r, np.float64)
+    def add_truth(self, t_host_ns: int, points_r: NDArray[np.floating], surface: int = 0) -> None:
+        """Takes the true positions (rows, columns, 3) [m] of a surface's material points at `t_host_ns`."""
+        self._truths.setdefault(t_host_ns, {})[surface] = np.asarray(points_r, np.float64)
         while len(self._truths) > KEPT:
             self._truths.popitem(last=False)
 
     def compare(self, t_host_ns: int, vertices: NDArray[np.floating]) -> Errors | None:
         """Errors of vertices (n, 3) [m]; None where the truth of the moment, or of the mesh's making, is unknown."""
-        points = self.material_points(t_host_ns)
-        if points is None or len(vertices) != len(points):
+        grid, places = self._own(t_host_ns)
+        if grid is None or len(vertices) != len(places):
             return None
-        error = np.linalg.norm(vertices - points, axis=1)
-        surface = np.linalg.norm(vertices - closest_points(vertices, self._truths[t_host_ns]), axis=1)
+        error = np.linalg.norm(vertices - _bilinear(grid, places)[0], axis=1)
+        surface = np.linalg.norm(vertices - closest_points(vertices, grid), axis=1)
         return Errors(float(error.mean() * 1e3), float(surface.mean() * 1e3))
 
     def material_points(self, t_host_ns: int) -> NDArray[np.float64] | None:
         """Where the vertices' own material points (n, 3) [m] really are; None where that is unknown."""
-        truth = self._truths.get(t_host_ns)
+        grid, places = self._own(t_host_ns)
+        return None if grid is None else _bilinear(grid, places)[0]
+
+    def _own(self, t_host_ns: int) -> tuple[Grid | None, NDArray[np.float64]]:
+        """The grid of the mesh's own surface, None where it is unknown, and the vertices' places (n, 2) on it."""
         if self._material is None and self._rest is not None and self._rest[0] in self._truths:
-            self._material = _closest_parameters(self._rest[1], self._truths[self._rest[0]])
-        return None if truth is None or self._material is None else _bilinear(truth, self._material)[0]
+            self._material = _nearest(self._rest[1], self._truths[self._rest[0]])
+        surface, places = self._material or (0, np.empty((0, 2)))
+        return self._truths.get(t_host_ns, {}).get(surface) if self._material else None, places
 
 
 def closest_points(vertices: NDArray[np.floating], grid: Grid) -> NDArray[np.float64]:
     """Nearest points (n, 3) of the bilinear surface through a grid (rows, columns, 3)."""
     return _bilinear(grid, _closest_parameters(np.asarray(vertices, np.float64), grid))[0]
+
+
+def _nearest(vertices: NDArray[np.float64], grids: Mapping[int, Grid]) -> tuple[int, NDArray[np.float64]]:
+    """The surface that vertices (n, 3) are nearest to, and their places (n, 2) on its grid."""
+    places = {surface: _closest_parameters(vertices, grid) for surface, grid in grids.items()}
+
+    def away(surface: int) -> float:
+        points = _bilinear(grids[surface], places[surface])[0]
+        return float(np.linalg.norm(vertices - points, axis=1).mean())
+
+    nearest = min(grids, key=away)
+    return nearest, places[nearest]
 
 
 def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np.float64]:

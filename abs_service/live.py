@@ -225,7 +225,7 @@ class Live:
     def _take_truth(self, truth: SurfaceTruth) -> None:
         points_r = _points(truth.points_f32).reshape(truth.rows, truth.columns, 3)
         for tracker in self.trackers.values():
-            tracker.truth.add_truth(truth.header.t_host_ns, points_r)
+            tracker.truth.add_truth(truth.header.t_host_ns, points_r, truth.surface)
 
 
 def _take_from(tracker: TrackerLog, sample: Sample) -> Iterator[Report]:

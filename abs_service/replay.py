@@ -60,7 +60,7 @@ class OfflineTracker:
 
     def add_truth(self, truth: Truth) -> None:
         """Takes what the simulated device knew."""
-        self.log.truth.add_truth(truth.t_host_ns, truth.points_r)
+        self.log.truth.add_truth(truth.t_host_ns, truth.points_r, truth.surface)
 
     def add_frame(self, frame: Frame) -> Iterator[Report]:
         """Takes a frame and reports the estimates that it makes possible."""

@@ -155,7 +155,12 @@ def encode_truth(truth: Truth, header: Header) -> bytes:
     """A truth as abs.v1.SurfaceTruth; `header.t_host_ns` is taken from the truth."""
     rows, columns = truth.points_r.shape[:2]
     message = SurfaceTruth(
-        header=header, seq=truth.seq, rows=rows, columns=columns, points_f32=truth.points_r.astype("<f4").tobytes()
+        header=header,
+        seq=truth.seq,
+        rows=rows,
+        columns=columns,
+        points_f32=truth.points_r.astype("<f4").tobytes(),
+        surface=truth.surface,
     )
     message.header.t_host_ns = truth.t_host_ns
     return message.SerializeToString()
@@ -175,7 +180,7 @@ def decode_truth(payload: bytes) -> Truth:
             f"has {len(message.points_f32)}"
         )
     points_r = np.frombuffer(message.points_f32, "<f4").reshape(message.rows, message.columns, 3)
-    return Truth(message.seq, message.header.t_host_ns, points_r)
+    return Truth(message.seq, message.header.t_host_ns, points_r, message.surface)
 
 
 def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:

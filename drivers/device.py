@@ -56,17 +56,19 @@ class DeviceInfo:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What a simulated device knows: where a grid of material points is at the moment of an exposure.
+    """What a simulated device knows: where a grid of a surface's material points is at the moment of an exposure.
 
     Attributes:
         seq: exposure the truth belongs to.
         t_host_ns: its time, CLOCK_MONOTONIC [ns].
         points_r: (rows, columns, 3) rig coordinates [m]; entry (i, j) is the same material point in every frame.
+        surface: which of the device's surfaces, counted from 0; each has a truth of its own.
     """
 
     seq: int
     t_host_ns: int
     points_r: NDArray[np.float32]
+    surface: int = 0
 
 
 class Sink(Protocol):

@@ -40,8 +40,8 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
 
 #: The keys that mean something in some scenes only, and in which.
 SCENES_OF: Mapping[str, frozenset[str]] = {
-    "bend": frozenset({"sheet", "board"}),
-    "texture": frozenset({"sheet"}),
+    "bend": frozenset({"sheet", "board", "pair"}),
+    "texture": frozenset({"sheet", "pair"}),
     "stiffness": frozenset({"strip"}),
     "weight": frozenset({"strip"}),
 }

@@ -66,7 +66,7 @@ class SimulatedDevice:
     def _run(self, sink: Sink, stop: threading.Event) -> None:
         try:
             sink.on_state(DeviceState.OPENING, "preparing the simulation")
-            self._simulation.expose(0)  # compiles the kernels, which must not make the first exposures late
+            self._simulation.frames(0)  # compiles the kernels, which must not make the first exposures late
             sink.on_state(DeviceState.STREAMING, "simulated exposures follow")
             self._stream(sink, stop)
         except Exception as error:
@@ -83,10 +83,11 @@ class SimulatedDevice:
             if behind > 0:
                 self._counters["late"] += behind
                 k += behind
-            frames, truth = self._simulation.expose(k)
-            if self._wait(stop, max(first_ns + truth.t_host_ns - self._clock(), 0) * 1e-9):
+            frames, truths = self._simulation.frames(k), self._simulation.truths(k)
+            if self._wait(stop, max(first_ns + self._simulation.time_ns(k) - self._clock(), 0) * 1e-9):
                 return
-            sink.on_truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
+            for truth in truths:
+                sink.on_truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
             for frame in frames:
                 t_host_ns, t_arrival_ns = first_ns + frame.t_host_ns, self._clock()
                 sink.on_frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=self._epoch))

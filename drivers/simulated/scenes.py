@@ -55,7 +55,7 @@ def sheet(choices: Choices) -> Scene:
         shift=0.02,
         speed=choices.speed,
     )
-    return _scene(choices, Rectangle(width, height, motion, _print(choices, width, height)))
+    return _scene(choices, Rectangle(width, height, motion, _print(choices, choices.seed, width, height)))
 
 
 def board(choices: Choices) -> Scene:
@@ -84,8 +84,30 @@ def strip(choices: Choices) -> Scene:
     return _scene(choices, hanging)
 
 
+def pair(choices: Choices) -> Scene:
+    """Two sheets of 0.20 × 0.15 m side by side, at rest 8 cm apart; each has a motion and a print of its own."""
+    width, height, middle = 0.20, 0.15, 0.14
+    motions = [
+        Motion(
+            seed=choices.seed + number,
+            rest=(side * middle, 0.0, REST_Z),
+            translation=(0.015, 0.03, 0.05),
+            rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(8)),
+            bend=choices.bend,
+            width=width,
+            height=height,
+            turn=np.deg2rad(35),
+            shift=0.015,
+            speed=choices.speed,
+        )
+        for number, side in enumerate((-1, 1))
+    ]
+    sheets = [Rectangle(width, height, motion, _print(choices, motion.seed, width, height)) for motion in motions]
+    return _scene(choices, *sheets)
+
+
 #: The scenes by the name that an address calls them.
-SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board, "strip": strip}
+SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board, "strip": strip, "pair": pair}
 
 
 def _scene(choices: Choices, *surfaces: Surface) -> Scene:
@@ -93,11 +115,11 @@ def _scene(choices: Choices, *surfaces: Surface) -> Scene:
     return Scene(surfaces, _wall(choices.seed), hands)
 
 
-def _print(choices: Choices, width: float, height: float) -> Texture:
+def _print(choices: Choices, seed: int, width: float, height: float) -> Texture:
     color, infrared = (0.1, 0.95), (0.35, 0.9)
     if choices.fine:
-        return fine_pattern(choices.seed, width, height, color, infrared)
-    return smooth_pattern(choices.seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
+        return fine_pattern(seed, width, height, color, infrared)
+    return smooth_pattern(seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
 
 
 def _wall(seed: int) -> Texture:

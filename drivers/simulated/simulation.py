@@ -37,7 +37,11 @@ class Simulation:
         return round(k * 1e9 / self.rate_hz)
 
     def expose(self, k: int) -> tuple[list[Frame], Truth]:
-        """The frames of all heads and the truth at exposure `k`; times count from exposure 0."""
+        """The frames of all heads at exposure `k`, and the truth about the first surface; see `frames` and `truths`."""
+        return self.frames(k), self.truths(k)[0]
+
+    def frames(self, k: int) -> list[Frame]:
+        """The frames of all heads at exposure `k`; times count from exposure 0."""
         t_ns = self.time_ns(k)
         moment = self.scene.at(t_ns * 1e-9)
         frames: list[Frame] = []
@@ -46,5 +50,10 @@ class Simulation:
             generator = np.random.Generator(np.random.SFC64(seeds))
             jitter = round(self.jitter_ns * generator.standard_normal())
             frames += head.expose(Exposure(k, moment, generator, t_ns, jitter, self.jitter_ns))
-        points_r = moment.surfaces[0].grid(*self.truth_size).astype(np.float32)
-        return frames, Truth(k, t_ns, points_r)
+        return frames
+
+    def truths(self, k: int) -> list[Truth]:
+        """The truth about every surface at exposure `k`."""
+        t_ns = self.time_ns(k)
+        surfaces = self.scene.at(t_ns * 1e-9).surfaces
+        return [Truth(k, t_ns, s.grid(*self.truth_size).astype(np.float32), i) for i, s in enumerate(surfaces)]

@@ -154,7 +154,7 @@ def test_arbitrary_bytes_are_a_codec_error(image: bytes, info: bytes) -> None:
 
 @given(hnp.arrays(np.float32, hnp.array_shapes(min_dims=2, max_dims=2).map(lambda s: (*s, 3))), INT64)
 def test_a_truth_survives_the_wire(points_r: np.ndarray, t_host_ns: int) -> None:
-    back = codec.decode_truth(codec.encode_truth(Truth(4, t_host_ns, points_r), Header(rig="demo")))
+    back = codec.decode_truth(codec.encode_truth(Truth(4, t_host_ns, points_r, 3), Header(rig="demo")))
     assert (back.seq, back.t_host_ns) == (4, t_host_ns)
     np.testing.assert_array_equal(back.points_r, points_r)
 

@@ -152,7 +152,7 @@ def test_defaults_are_the_demonstration_rig() -> None:
 @pytest.mark.parametrize(
     ("uri", "complaint"),
     [
-        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'sheet', 'strip'\]"),
+        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'pair', 'sheet', 'strip'\]"),
         ("simulated://", r"scene '' is none of"),
         ("simulated://sheet?sead=1", r"unknown key 'sead'; allowed are \[.*'seed'"),
         ("simulated://sheet?seed=one", r"seed = 'one' must be a number from 0 to"),
@@ -172,10 +172,10 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?lens=", "lens = '' must be 1 to 8 numbers"),
         ("simulated://sheet?lens=-0.9", r"lens = \(-0.9,\) is too strong: .* has no inverse"),
         ("simulated://sheet?order=rgb", r"order = 'rgb' must be one of \['bggr', 'gbrg', 'grbg', 'rggb'\]"),
-        ("simulated://strip?bend=30", r"bend means nothing in 'strip', only in \['board', 'sheet'\]"),
+        ("simulated://strip?bend=30", r"bend means nothing in 'strip', only in \['board', 'pair', 'sheet'\]"),
         ("simulated://sheet?weight=0.1", r"weight means nothing in 'sheet', only in \['strip'\]"),
         ("simulated://strip?stiffness=0", r"stiffness = '0' must be a number from 0.0005 to 10"),
-        ("simulated://board?texture=fine", r"texture means nothing in 'board', only in \['sheet'\]"),
+        ("simulated://board?texture=fine", r"texture means nothing in 'board', only in \['pair', 'sheet'\]"),
         ("simulated://sheet?barrier=64x48", "unknown key 'barrier'"),
         ("simulated://sheet?color=640", r"color = '640' must be WIDTHxHEIGHT"),
         ("simulated://sheet?color=8x8", r"color = '8x8' must be WIDTHxHEIGHT, each from 16 to 2048"),

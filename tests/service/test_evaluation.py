@@ -80,6 +80,19 @@ def test_the_truth_of_the_mesh_may_come_after_the_mesh():
     assert result.compare(1, inner()) is not None
 
 
+def test_of_two_surfaces_the_nearer_one_is_the_truth():
+    result = TruthComparison()
+    for t_ns in (0, 1):
+        result.add_truth(t_ns, grid() + np.array((0.4 + 0.001 * t_ns, 0, 0.1)), surface=0)
+        result.add_truth(t_ns, grid() + np.array((0.002 * t_ns, 0, 0)), surface=1)
+    result.add_topology(inner(), 0)
+    errors = result.compare(1, inner())
+    assert errors is not None
+    assert errors.vertex_mm == pytest.approx(2)
+    result.add_truth(2, grid(), surface=0)
+    assert result.compare(2, inner()) is None
+
+
 def test_what_is_not_known_has_no_error():
     result = comparison(grid())
     assert result.compare(2, inner()) is None  # no truth of that moment

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from abs.v1 import common_pb2 as abs_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1a\x61\x62s/v1/surface_truth.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"n\n\x0cSurfaceTruth\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0b\n\x03seq\x18\x02 \x01(\x04\x12\x0c\n\x04rows\x18\x03 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x04 \x01(\r\x12\x12\n\npoints_f32\x18\x05 \x01(\x0c\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1a\x61\x62s/v1/surface_truth.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"\x7f\n\x0cSurfaceTruth\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0b\n\x03seq\x18\x02 \x01(\x04\x12\x0c\n\x04rows\x18\x03 \x01(\r\x12\x0f\n\x07\x63olumns\x18\x04 \x01(\r\x12\x12\n\npoints_f32\x18\x05 \x01(\x0c\x12\x0f\n\x07surface\x18\x06 \x01(\rb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,5 +33,5 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'abs.v1.surface_truth_pb2', 
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_SURFACETRUTH']._serialized_start=59
-  _globals['_SURFACETRUTH']._serialized_end=169
+  _globals['_SURFACETRUTH']._serialized_end=186
 # @@protoc_insertion_point(module_scope)
