@@ -28,6 +28,11 @@ from drivers.frame import FrameSet
 class ModelSettings(Protocol):
     """`Settings` of a module of `abs_service.tracker.models`."""
 
+    @property
+    def board(self) -> tuple[float, float]:
+        """Width and height [m] of a flat board before the sensor that `build` takes for its object."""
+        ...
+
     def build(self, sighting: Sighting) -> DeformationModel:
         """The model of an object as it is first seen."""
         ...

@@ -18,8 +18,6 @@ from drivers.frame import Frame, FrameSet, Geometry, Kind
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
 #: Stands for every noise of depth: kernels see its texture only, and a map of pixels would not fit the camera.
 _NOISE = GaussianPolynomial(((0.01,),))
-#: Distance of the board that is tracked [m].
-_DISTANCE_M = 1.0
 
 
 def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
@@ -30,7 +28,7 @@ def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
         plan: of the tracker.
     """
     rig = Rig("warm-up", {name: _sensor(name, noise) for name, noise in noises.items()})
-    frames = [_board(head, Kind(stream)) for head, stream in streams(rig.sensors.values())]
+    frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     observation = Observer(rig).observe(FrameSet(0, 0, {frame.key: frame for frame in frames}))
     Tracking(rig, replace(plan, region=nearest.Settings())).track_observation(observation, lambda: False)
 
@@ -39,15 +37,16 @@ def _sensor(name: str, noise: Noise) -> Sensor:
     return Sensor(name, _CAMERA, _NOISE if isinstance(noise, DepthNoise) else noise)
 
 
-def _board(head: str, kind: Kind) -> Frame:
-    """What a head sees of a flat board in the middle of its image; grey pictures, and a beam that is free."""
+def _board(head: str, kind: Kind, size: tuple[float, float]) -> Frame:
+    """What a head sees of a flat board [m] that fills half its image; grey pictures, and a beam that is free."""
     height, width = _CAMERA.height, _CAMERA.width
-    middle = (slice(height // 4, 3 * height // 4), slice(width // 4, 3 * width // 4))
     match kind:
         case Kind.DEPTH:
-            distance = np.full((height, width), np.nan, np.float32)
-            distance[middle] = _DISTANCE_M
-            return Frame(head, kind.value, kind, distance, "32FC1", 0, 0, 0, geometry=Geometry.RADIAL)
+            z = np.full((height, width), np.nan, np.float32)
+            away = 2 * max(size[0] * _CAMERA.fx / width, size[1] * _CAMERA.fy / height)
+            right, down = round(size[0] * _CAMERA.fx / away / 2), round(size[1] * _CAMERA.fy / away / 2)
+            z[height // 2 - down : height // 2 + down, width // 2 - right : width // 2 + right] = away
+            return Frame(head, kind.value, kind, z, "32FC1", 0, 0, 0, geometry=Geometry.Z)
         case Kind.COLOR:
             return Frame(head, kind.value, kind, np.full((height, width, 3), 128, np.uint8), "rgb8", 0, 0, 0)
         case Kind.BAYER:

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 
+#: Width and height [m] of a flat board, for models that any board would do for.
+BOARD = (0.3, 0.2)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import binding, spline
-from abs_service.tracker.models.base import ModelError, Surface
+from abs_service.tracker.models.base import BOARD, ModelError, Surface
 from abs_service.tracker.sighting import Sighting
 from calib.jit import kernel
 
@@ -45,6 +45,11 @@ class Settings:
                 f"weights must be {rows} rows of {columns} numbers, one for each of "
                 f"control_points = [{rows}, {columns}], not rows of {given}"
             )
+
+    @property
+    def board(self) -> tuple[float, float]:
+        """Width and height [m] of a flat board that the model can be built from: any."""
+        return BOARD
 
     def build(self, sighting: Sighting) -> "Nurbs":
         """The surface of an object of any smooth shape.

@@ -8,13 +8,18 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import BOARD, Surface
 from abs_service.tracker.sighting import Sighting
 
 
 @dataclass(frozen=True)
 class Settings:
     """A rigid model has no keys."""
+
+    @property
+    def board(self) -> tuple[float, float]:
+        """Width and height [m] of a flat board that the model can be built from: any."""
+        return BOARD
 
     def build(self, sighting: Sighting) -> "Rigid":
         """The rigid model of an object of any shape.
