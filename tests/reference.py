@@ -5,6 +5,7 @@ Numbers in parentheses are the paper's equations. The service uses nothing of th
 
 import numpy as np
 
+from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 
@@ -67,6 +68,33 @@ def surface_normal(u: float, w: float, control: np.ndarray, weights: np.ndarray,
 def deform(u: float, w: float, offset: float, control: np.ndarray, weights: np.ndarray, degree: int) -> np.ndarray:
     """D_Θ(v) = N((u, w), Θ) + N̂((u, w), Θ) · o (8)."""
     return surface(u, w, control, weights, degree) + surface_normal(u, w, control, weights, degree) * offset
+
+
+def flexpad(theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, least_radius: float) -> np.ndarray:
+    """A sheet's point at `place` = (x, y): bends of eight sides add up, height map z + g z²/half, then the pose."""
+    flat, height = np.array(place, float), 0.0
+    for k in range(8):
+        angle = np.deg2rad(45.0 * (k // 2))
+        side = np.array([np.cos(angle), np.sin(angle)]) * (1 if k % 2 == 0 else -1)
+        q, kappa = max(side @ place, 0.0), min(max(theta[k], -2.0), 2.0) / (2 * least_radius)
+        if kappa != 0:
+            flat += (np.sin(kappa * q) / kappa - q) * side
+            height += (1 - np.cos(kappa * q)) / kappa
+    height += min(max(theta[8], -0.5), 0.5) * height**2 / half
+    turn = pose.from_rotation_vector(theta[9:12], (0, 0, 0))[:3, :3]
+    return turn @ T_rp[:3, :3] @ np.array([*flat, -height]) + T_rp[:3, 3] + theta[12:15]
+
+
+def flexpad_normal(
+    theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, least_radius: float
+) -> np.ndarray:
+    """Unit normal towards the sensor, from numerical tangents."""
+    step = 1e-6 * np.eye(2)
+    ahead, behind = (
+        [flexpad(theta, place + sign * along, T_rp, half, least_radius) for along in step] for sign in (1, -1)
+    )
+    normal = np.cross(ahead[1] - behind[1], ahead[0] - behind[0])
+    return normal / np.linalg.norm(normal)
 
 
 def distort(x: float, y: float, coefficients: np.ndarray) -> tuple[float, float]:

@@ -43,7 +43,7 @@ def grid_mesh(sighting: Sighting) -> Mesh:
     at_grid = _local_planes(pixels, distance, 0.75 * spacing)
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
-    faces = _without_jumps(positions, _triangles(place))
+    faces = _without_jumps(positions, triangles(place))
     chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
     used = np.unique(faces)
     if len(used) < LEAST_VERTICES:
@@ -90,7 +90,7 @@ def _local_planes(pixels: NDArray[np.float64], distance: NDArray[np.float32], ra
     return result
 
 
-def _triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
+def triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles (m, 3) of a grid of vertex indices (rows, columns), −1 where there is none; seen from the camera.
 
     A cell with four vertices gives two triangles, one with three gives one.
