@@ -14,9 +14,10 @@ from calib.noise.pixel_polynomial import PixelPolynomial
 
 #: Tracks real frames after the warm-up and tells which kernels had how many forms before and afterwards.
 PROGRAM = """
-import gc, json, time
+import dataclasses, gc, json, sys
 from numba.core.dispatcher import Dispatcher
-from abs_service import config
+from pathlib import Path
+from abs_service import config, plugins
 from abs_service.commands import plans
 from abs_service.tracking import Tracking, streams
 from abs_service.synchroniser import Synchroniser
@@ -24,7 +25,8 @@ from abs_service.warmup import warm_up
 from drivers.simulated import address
 
 settings = config.load_default()
-plan = plans.plan(settings, "sheet")
+model = plugins.load("abs_service.tracker.models", json.loads(sys.argv[1]), Path())
+plan = dataclasses.replace(plans.plan(settings, "sheet"), model=model)
 warm_up(plans.noises(settings, "sheet"), plan)
 
 simulation = address.parse(settings.devices["sim"].uri).build()
@@ -47,8 +49,18 @@ print(json.dumps([before, forms(), estimate.status]))
 
 
 @pytest.mark.slow
-def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare():
-    out = subprocess.run([sys.executable, "-c", PROGRAM], check=True, capture_output=True, text=True, timeout=200)
+@pytest.mark.parametrize(
+    "model",
+    [
+        {"type": "nurbs", "control_points": [4, 4]},
+        {"type": "flexpad", "width_m": 0.3, "height_m": 0.2},
+        {"type": "posed", "shape": {"type": "flexpad"}},
+    ],
+    ids=lambda model: model["type"],
+)
+def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(model):
+    command = [sys.executable, "-c", PROGRAM, json.dumps(model)]
+    out = subprocess.run(command, check=True, capture_output=True, text=True, timeout=200)
     before, after, status = json.loads(out.stdout)
     assert status == "TRACKING"
     assert before == after

@@ -1,0 +1,121 @@
+"""A pose on top of another model's shape: the object moves as a whole, and deforms."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy  # its parts are imported when they are first used
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.sighting import Sighting
+from calib.jit import kernel
+
+#: Standard deviation of the rigid motion that is left to the shape [m].
+GAUGE_M = 1e-4
+
+#: A shape can do a rigid motion by itself if the cosine between it and the shape's nearest motion is larger.
+CONTAINED = 0.999
+
+#: Surface motion [m] of the central differences that tell the shape's motions.
+STEP_M = 1e-3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the model.
+
+    Attributes:
+        shape: another model, a table with its `type` and keys.
+    """
+
+    shape: Any = field(metadata={"parts": "abs_service.tracker.models"})
+
+    @property
+    def board(self) -> tuple[float, float]:
+        """Width and height [m] of a flat board that the shape can be built from."""
+        return self.shape.board
+
+    def build(self, sighting: Sighting) -> "Posed":
+        """The shape of an object with a pose.
+
+        Raises:
+            ModelError, SightingError: the shape cannot be built.
+        """
+        return Posed(self.shape.build(sighting))
+
+
+class Posed:
+    """Θ = rotation vector [rad] about the centroid of the mesh at rest, translation [m], then the shape's parameters.
+
+    The shape deforms first. If it can move rigidly by itself (all control points of a NURBS together), one surface has
+    many Θ. Which of them is meant is said by the prior: to first order, the rigid part of the shape's motion, in the
+    sense of least squares over the vertices, is normal around zero with a deviation of `GAUGE_M`. No measurement speaks
+    against it, so the pose is the object's pose, and the shape is what remains.
+
+    Attributes:
+        mesh: the shape's mesh.
+        rest: no motion, the shape at rest.
+        scales: the rotation [rad] that moves the farthest vertex by one metre, one metre, the shape's own.
+        prior: the shape's own, then one row per rigid motion that the shape can do by itself.
+    """
+
+    def __init__(self, shape: DeformationModel):
+        self.mesh = shape.mesh
+        self._shape = shape
+        self._centroid = shape.mesh.vertices.mean(axis=0)
+        radius = max(np.linalg.norm(shape.mesh.vertices - self._centroid, axis=1).max(), 1e-3)
+        self.rest = np.concatenate([np.zeros(6), shape.rest])
+        self.scales = np.concatenate([np.full(3, 1 / radius), np.ones(3), shape.scales])
+        self.prior = np.pad(np.concatenate([shape.prior, _gauge(shape)]), ((0, 0), (6, 0)))
+
+    def deform(self, thetas: NDArray[np.float64]) -> Surface:
+        """Deforms the mesh with every row of `thetas` (population, dim)."""
+        surface = self._shape.deform(thetas[:, 6:])
+        rotations = scipy.spatial.transform.Rotation.from_rotvec(thetas[:, :3]).as_matrix()
+        shifts = self._centroid + thetas[:, 3:6]
+        motion = np.concatenate([rotations, shifts[:, :, None]], axis=2).astype(np.float32)
+        _move(motion, self._centroid.astype(np.float32), surface.vertices, surface.normals)
+        return surface
+
+
+def _gauge(shape: DeformationModel) -> NDArray[np.float64]:
+    """Rows (k, dim of the shape) of the prior, one for each of k ≤ 6 rigid motions that the shape can do by itself."""
+    count = len(shape.mesh.vertices)
+    steps = np.diag(STEP_M * shape.scales)
+    moved = shape.deform(np.concatenate([shape.rest + steps, shape.rest - steps])).vertices.astype(np.float64)
+    # Columns: how the vertices move, component by component, when a parameter moves the surface by a metre.
+    motions = ((moved[: len(steps)] - moved[len(steps) :]) / (2 * STEP_M)).reshape(len(steps), -1).T
+    arms = shape.mesh.vertices - shape.mesh.vertices.mean(axis=0)
+    turns = [np.cross(axis, arms).T.ravel() for axis in np.eye(3)]
+    rigid = np.linalg.qr(np.column_stack([np.kron(np.eye(3), np.ones((count, 1))), *turns]))[0]
+    left, sizes, _ = np.linalg.svd(motions, full_matrices=False)
+    mixes, cosines, _ = np.linalg.svd(rigid.T @ left[:, sizes > 1e-3 * sizes[0]])
+    contained = rigid @ mixes[:, : len(cosines)][:, cosines > CONTAINED]
+    return contained.T @ (motions / shape.scales) / (np.sqrt(count) * GAUGE_M)
+
+
+@kernel
+def _move(
+    motion: NDArray[np.float32],
+    center: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+) -> None:
+    """Rotates vertices and normals (population, 3, n) about `center` (3,) and puts it where `motion` (…, 3, 4) says."""
+    n = vertices.shape[2]
+    old = np.empty((2, 3, n), np.float32)
+    for k in range(vertices.shape[0]):
+        old[0], old[1] = vertices[k], normals[k]
+        for i in range(3):
+            r0, r1, r2 = motion[k, i, 0], motion[k, i, 1], motion[k, i, 2]
+            shift = motion[k, i, 3]
+            for v in range(n):
+                vertices[k, i, v] = (
+                    r0 * (old[0, 0, v] - center[0])
+                    + r1 * (old[0, 1, v] - center[1])
+                    + r2 * (old[0, 2, v] - center[2])
+                    + shift
+                )
+            for v in range(n):
+                normals[k, i, v] = r0 * old[1, 0, v] + r1 * old[1, 1, v] + r2 * old[1, 2, v]
