@@ -64,6 +64,12 @@ def test_a_wrong_model_is_named_with_its_factor_and_what_to_do(sensor, variance,
     assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/noise.md)")
 
 
+def test_the_texture_of_a_depth_sensor_has_a_key_of_its_own():
+    message = Watch().see(**{"tof": 1.0, "tof/amplitude": 9.0}).message
+    assert message.startswith("tof/amplitude errs 3.0 times")
+    assert "make the deviation in sensors.tof.texture larger" in message
+
+
 def test_two_wrong_models_are_both_named():
     message = Watch().see(tof=4.0, color=4.0).message
     assert "tof errs" in message
