@@ -120,6 +120,9 @@ def _inlier_share(fits: tuple[SensorFit, ...]) -> float:
 
 
 def _hidden_share(fits: tuple[SensorFit, ...]) -> float:
-    """Share of the vertices that are hidden from the sensor that sees most of them; 0 without a sensor."""
-    shares = [fit.hidden / (fit.hidden + fit.visible) for fit in fits if fit.hidden + fit.visible]
+    """Share of the vertices that are hidden from the sensor that sees most of them; 0 without a sensor.
+
+    A light barrier, whose one sample is no vertex, has no say.
+    """
+    shares = [fit.hidden / (fit.hidden + fit.visible) for fit in fits if fit.hidden + fit.visible > 1]
     return min(shares, default=0.0)

@@ -83,9 +83,10 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
 def _extended(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """An image without its NaNs, each replaced by the nearest value, and how far away that is [px]."""
     known = np.isfinite(values)
-    steps, places = cv2.distanceTransformWithLabels(
+    steps, labels = cv2.distanceTransformWithLabels(
         (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
     )
+    places = np.asarray(labels, np.int32)
     table = np.zeros(int(places.max()) + 1, np.float32)
     table[places[known]] = values[known]
     return table[places], np.asarray(steps, np.float32)

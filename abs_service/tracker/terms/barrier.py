@@ -57,7 +57,7 @@ class BarrierTerm:
 
     def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
         crossing = np.zeros(len(surface.vertices), np.bool_)
-        _crossing(surface.vertices, self._faces, *self._beam, crossing)
+        _crossing(surface.vertices, self._faces, self._beam[0], self._beam[1], crossing)
         return crossing
 
 

@@ -99,8 +99,15 @@ def summarize(
     inlier = measured & (residual < INLIER_DEVIATIONS)
     square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
     spread = deviation_within(square, INLIER_DEVIATIONS, channels)
-    counts = (int(np.count_nonzero(mask)) for mask in (visible, hidden, measured, inlier))
-    return SensorFit(sensor, *counts, mean_log_likelihood, spread)
+    return SensorFit(
+        sensor,
+        visible=int(np.count_nonzero(visible)),
+        hidden=int(np.count_nonzero(hidden)),
+        samples=int(np.count_nonzero(measured)),
+        inliers=int(np.count_nonzero(inlier)),
+        mean_log_likelihood=mean_log_likelihood,
+        normalized_residual=spread,
+    )
 
 
 class Term(Protocol):
