@@ -12,6 +12,7 @@ from calib.lens import COEFFICIENTS, Lens, LensError
 from drivers.device import AddressError
 from drivers.simulated import values
 from drivers.simulated.bayer import ORDERS, Mosaic
+from drivers.simulated.excursion import Excursion
 from drivers.simulated.heads import Equipment
 from drivers.simulated.optics import BEAMS, OPTICS
 from drivers.simulated.scenes import SCENES, Choices
@@ -28,6 +29,8 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
     "occluder": values.one_of("none", "hand"),
+    "turn": values.number(float, 0, 3600),
+    "leave": values.interval(0, 3600),
     "stiffness": values.number(float, 0.0005, 10),
     "weight": values.number(float, 0.001, 2),
     "texture": values.one_of("smooth", "fine"),
@@ -42,6 +45,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
 SCENES_OF: Mapping[str, frozenset[str]] = {
     "bend": frozenset({"sheet", "board", "pair"}),
     "texture": frozenset({"sheet", "pair"}),
+    "turn": frozenset({"sheet", "board", "pair"}),
     "stiffness": frozenset({"strip"}),
     "weight": frozenset({"strip"}),
 }
@@ -63,6 +67,8 @@ class Address:
         speed: factor on the speed of all motion; with 0 nothing ever moves.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
         occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
+        turn: when everything to be tracked turns by 90° in a quarter of a second, and stays so [s].
+        leave: from when until when it is out of view [s]; in the address `leave=3,5`.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
@@ -83,6 +89,8 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
+    turn: float = math.inf
+    leave: tuple[float, float] = (math.inf, math.inf)
     stiffness: float = 0.01
     weight: float = 0.3
     texture: str = "smooth"
@@ -102,6 +110,7 @@ class Address:
             seed=self.seed,
             bend=math.radians(self.bend),
             speed=self.speed,
+            excursion=Excursion(self.turn, self.leave),
             hand=self.occluder == "hand",
             fine=fine,
             stiffness=self.stiffness,

@@ -10,6 +10,12 @@ from calib import pose
 from calib.pose import Pose
 
 
+def smooth_step(x: float) -> float:
+    """From 0 at 0 and below to 1 at 1 and above, with continuous velocity and acceleration."""
+    x = np.clip(x, 0.0, 1.0)
+    return float(x**3 * (10 - 15 * x + 6 * x**2))
+
+
 @dataclass(frozen=True)
 class Placement:
     """Where a surface is and how it is bent at one moment.
@@ -60,9 +66,7 @@ class Oscillation:
         return self._envelope(t) * (np.array([0.7, 0.3]) @ np.sin(frequencies * t + phases))
 
     def _envelope(self, t: float) -> float:
-        """From 0 to 1 with continuous velocity and acceleration."""
-        x = np.clip((t - self.hold_s) / self.ramp_s, 0.0, 1.0) if self.speed > 0 else 0.0
-        return float(x**3 * (10 - 15 * x + 6 * x**2))
+        return smooth_step((t - self.hold_s) / self.ramp_s) if self.speed > 0 else 0.0
 
     @cached_property
     def _sinusoids(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

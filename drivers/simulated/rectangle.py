@@ -1,6 +1,6 @@
 """A rectangle that bends onto a cylinder and moves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.pose import Pose
 from drivers.simulated.body import Appearance
+from drivers.simulated.excursion import Excursion
 from drivers.simulated.motion import Motion, Placement
 from drivers.simulated.raycast import cast, shadowed, soften_edges
 from drivers.simulated.surface import surface_points
@@ -25,16 +26,20 @@ class Rectangle:
         width, height: of the flat rectangle [m].
         motion: where it is, and how it is bent.
         texture: what covers it.
+        excursion: what happens to it on top of the motion.
     """
 
     width: float
     height: float
     motion: Motion
     texture: Texture
+    excursion: Excursion = field(default_factory=Excursion)
 
     def at(self, t: float) -> "PlacedRectangle":
         """The rectangle at time `t` [s] after the start."""
-        return PlacedRectangle(self.width, self.height, self.texture, self.motion.at(t))
+        placement = self.motion.at(t)
+        placement = replace(placement, T_rp=self.excursion.displaced(placement.T_rp, t))
+        return PlacedRectangle(self.width, self.height, self.texture, placement)
 
 
 @dataclass(frozen=True, eq=False)

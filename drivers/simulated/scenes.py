@@ -1,11 +1,12 @@
 """The scenes there are, each before a textured wall; what an address chooses of them."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from drivers.simulated.body import Surface
+from drivers.simulated.excursion import Excursion
 from drivers.simulated.hand import Hand
 from drivers.simulated.motion import Motion
 from drivers.simulated.rectangle import Rectangle
@@ -25,6 +26,7 @@ class Choices:
         seed: of motion and texture.
         bend: largest bend of a sheet from end to end [rad].
         speed: factor on the speed of all motion.
+        excursion: what happens to the surfaces on top of their motion.
         hand: whether a hand crosses the view.
         fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
         stiffness: bending stiffness of the strip per width [N·m].
@@ -34,6 +36,7 @@ class Choices:
     seed: int = 1
     bend: float = np.deg2rad(60)
     speed: float = 1.0
+    excursion: Excursion = field(default_factory=Excursion)
     hand: bool = False
     fine: bool = False
     stiffness: float = 0.01
@@ -55,7 +58,8 @@ def sheet(choices: Choices) -> Scene:
         shift=0.02,
         speed=choices.speed,
     )
-    return _scene(choices, Rectangle(width, height, motion, _print(choices, choices.seed, width, height)))
+    pattern = _print(choices, choices.seed, width, height)
+    return _scene(choices, Rectangle(width, height, motion, pattern, choices.excursion))
 
 
 def board(choices: Choices) -> Scene:
@@ -73,15 +77,15 @@ def board(choices: Choices) -> Scene:
         shift=0.0,
         speed=choices.speed,
     )
-    return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05)))
+    return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05), choices.excursion))
 
 
 def strip(choices: Choices) -> Scene:
     """A strip of 0.30 × 0.05 m that hangs from a gripper towards the viewer and sags under its weight."""
     length, width = 0.30, 0.05
     pattern = smooth_pattern(choices.seed, length, width, (0.015, 0.006, 0.003), 1000.0, (0.1, 0.95), (0.5, 0.95))
-    hanging = Strip(choices.seed, length, width, choices.stiffness, choices.weight, pattern, choices.speed)
-    return _scene(choices, hanging)
+    elastic = (choices.stiffness, choices.weight)
+    return _scene(choices, Strip(choices.seed, length, width, *elastic, pattern, choices.speed, choices.excursion))
 
 
 def pair(choices: Choices) -> Scene:
@@ -102,7 +106,8 @@ def pair(choices: Choices) -> Scene:
         )
         for number, side in enumerate((-1, 1))
     ]
-    sheets = [Rectangle(width, height, motion, _print(choices, motion.seed, width, height)) for motion in motions]
+    patterns = [_print(choices, motion.seed, width, height) for motion in motions]
+    sheets = [Rectangle(width, height, *of_one, choices.excursion) for of_one in zip(motions, patterns)]
     return _scene(choices, *sheets)
 
 

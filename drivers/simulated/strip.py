@@ -1,6 +1,6 @@
 """A thin elastic strip, held at one end, that sags under its weight."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from calib import pose
 from calib.pose import Pose
 from drivers.simulated.body import Appearance
 from drivers.simulated.elastica import Profile, hang
+from drivers.simulated.excursion import Excursion
 from drivers.simulated.motion import Oscillation
 from drivers.simulated.ribbon import cast_ribbon, shadowed_by_ribbon
 from drivers.simulated.soften import cast_softly
@@ -33,6 +34,7 @@ class Strip:
         weight: mass per area [kg/m²].
         texture: what covers it; its x axis is along the strip.
         speed: factor on the speed of the motion.
+        excursion: what happens to it on top of the motion; it must not turn, or gravity would change the shape.
     """
 
     seed: int
@@ -42,6 +44,7 @@ class Strip:
     weight: float
     texture: Texture
     speed: float = 1.0
+    excursion: Excursion = field(default_factory=Excursion)
 
     #: The gripper at rest, and how far it moves [m]; angles of tilt (between strip and vertical) and of turning [rad].
     REST, REACH = (0.0, -0.13, 1.07), (0.03, 0.02, 0.03)
@@ -55,7 +58,7 @@ class Strip:
         T_rp = pose.from_rotation_vector((0, np.pi / 2 + self.TURNING * channels[4], 0), position)
         load = self.weight * GRAVITY / self.stiffness
         profile = hang(self.length, load, float(self.TILT + self.TILTING * channels[3]))
-        return PlacedStrip(self.width, self.texture, T_rp, profile)
+        return PlacedStrip(self.width, self.texture, self.excursion.displaced(T_rp, t), profile)
 
     @cached_property
     def _oscillation(self) -> Oscillation:

@@ -66,6 +66,22 @@ def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, 
     return read
 
 
+def interval(low: float, high: float) -> Callable[[str], tuple[float, float]]:
+    """Reads two numbers from `low` to `high` with a comma in between, the second greater than the first."""
+    read_some = numbers(2, low, high)
+
+    def read(text: str) -> tuple[float, float]:
+        try:
+            begin, end = read_some(text)
+        except ValueError:
+            begin, end = high, low
+        if not begin < end:
+            raise ValueError(f"two numbers from {low:g} to {high:g} with a comma in between, the second greater")
+        return begin, end
+
+    return read
+
+
 def size(text: str) -> tuple[int, int]:
     """Reads width and height of an image [px], such as 640x480."""
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)

@@ -1,4 +1,4 @@
-"""Scenes of several things: two sheets that stay apart, each with a truth of its own."""
+"""Two sheets stay apart, each with a truth of its own; what leaves or turns does so when it is told."""
 
 import numpy as np
 import pytest
@@ -77,3 +77,43 @@ def test_the_device_tells_the_truth_about_both() -> None:
     device.start(log)
     device._thread.join(60)
     assert [(truth.seq, truth.surface) for truth in log.truths] == [(0, 0), (0, 1)]
+
+
+@pytest.mark.parametrize("scene", ["sheet", "board", "pair", "strip"])
+def test_what_leaves_is_out_of_every_view_from_then_to_then(scene: str) -> None:
+    heads = "sensors=tof,structured_light,color,bayer,ir,barrier&noise=0&lens=-0.25,0.06"
+    simulation, usual = build(scene, f"{heads}&leave=3,5"), build(scene, heads)
+    for k in (91, 120, 149):
+        gone = {frame.key: frame.data for frame in simulation.frames(k)}
+        for key, image in gone.items():
+            np.testing.assert_array_equal(image, {f.key: f.data for f in simulation.frames(121)}[key])
+        assert gone["barrier", "binary"] == 0
+        for before, after in zip(usual.truths(k), simulation.truths(k)):
+            np.testing.assert_allclose(
+                after.points_r - before.points_r, np.broadcast_to((1.2, 0, 0), (21, 31, 3)), atol=1e-6
+            )
+    for k in (0, 70, 163, 200):
+        for frame, expected in zip(simulation.frames(k), usual.frames(k)):
+            np.testing.assert_array_equal(frame.data, expected.data)
+
+
+@pytest.mark.parametrize("scene", ["sheet", "board", "pair"])
+def test_what_turns_does_so_by_a_right_angle_in_a_quarter_of_a_second(scene: str) -> None:
+    turning, usual = build(scene, "sensors=tof&turn=4&seed=2"), build(scene, "sensors=tof&seed=2")
+    for t, share in ((3.99, 0), (4.125, 0.5), (4.26, 1), (9, 1)):
+        for surface, expected in zip(turning.scene.at(t).surfaces, usual.scene.at(t).surfaces):
+            grids = surface.grid(3, 3), expected.grid(3, 3)
+            right, before = (grid[1, 2] - grid[1, 0] for grid in grids)
+            cosine = right @ before / np.linalg.norm(right) / np.linalg.norm(before)
+            assert np.arccos(np.clip(cosine, -1, 1)) == pytest.approx(share * np.pi / 2, abs=0.02 if share < 1 else 0.2)
+            np.testing.assert_allclose(grids[0][1, 1], grids[1][1, 1], atol=0.02)
+    right = turning.scene.at(9).surfaces[0].grid(3, 3)[1]
+    assert (right[2] - right[0])[1] > 0.1  # clockwise: what was on the right is below
+
+
+def test_a_sheet_that_turned_fits_into_the_view() -> None:
+    simulation = build("sheet", "sensors=tof&turn=4")
+    for t in np.arange(4.25, 20, 0.5):
+        points = simulation.heads["tof"].camera.project(simulation.scene.at(t).surfaces[0].grid(9, 13))
+        assert points.min() > -0.5
+        assert points[..., 1].max() < 143.5
