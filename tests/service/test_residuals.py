@@ -32,6 +32,10 @@ class Watch:
 
     def see(self, seconds=2.0, share=0.9, inliers=250, **variances):
         """Estimates for so long, whose residuals have these variances by sensor; tells what health says then."""
+        return self.see_sensors(variances, seconds, share, inliers)
+
+    def see_sensors(self, variances, seconds=2.0, share=0.9, inliers=250):
+        """The same for sensors whose names are not Python's."""
         fits = tuple(SensorFit(name, 300, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
         for _ in range(int(seconds * 1e9 / PERIOD_NS)):
             self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, inlier_share=share, fits=fits))
@@ -58,14 +62,14 @@ def test_the_variance_of_every_sensor_is_a_gauge():
     [("tof", 4.0, "2.0", "larger"), ("tof", 0.25, "0.5", "smaller"), ("color", 9.0, "3.0", "larger")],
 )
 def test_a_wrong_model_is_named_with_its_factor_and_what_to_do(sensor, variance, factor, change):
-    said = Watch().see(**{"tof": 1.0, "color": 1.0, sensor: variance})
+    said = Watch().see_sensors({"tof": 1.0, "color": 1.0, sensor: variance})
     assert said.level == WARNING
     assert said.message.startswith(f"{sensor} errs {factor} times as much as its noise model says")
     assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/noise.md)")
 
 
 def test_the_texture_of_a_depth_sensor_has_a_key_of_its_own():
-    message = Watch().see(**{"tof": 1.0, "tof/amplitude": 9.0}).message
+    message = Watch().see_sensors({"tof": 1.0, "tof/amplitude": 9.0}).message
     assert message.startswith("tof/amplitude errs 3.0 times")
     assert "make the deviation in sensors.tof.texture larger" in message
 
