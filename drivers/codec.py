@@ -11,13 +11,10 @@ from typing import TypeVar
 import numpy as np
 from abs.v1.common_pb2 import Header
 from abs.v1.frame_info_pb2 import FrameInfo
-from abs.v1.sensor_model_pb2 import SensorModel
 from abs.v1.surface_truth_pb2 import SurfaceTruth
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.message import DecodeError, Message
 
-from calib.camera import Camera
-from calib.lens import Lens
 from drivers.device import Truth
 from drivers.frame import ENCODINGS, Frame, FrameError, Geometry, Kind, Reference
 
@@ -238,17 +235,3 @@ def _check(name: str, image: RawImage, info: FrameInfo) -> None:
         raise CodecError(f"{name}: tick_hz must be finite and 0 or more, not {info.tick_hz}")
     if info.t_sigma_ns < 0:
         raise CodecError(f"{name}: t_sigma_ns must be 0 or more, not {info.t_sigma_ns}")
-
-
-def decode_camera(model: SensorModel) -> Camera:
-    """The camera that a sensor model describes.
-
-    Raises:
-        CodecError: its numbers describe none.
-    """
-    try:
-        matrix = (model.fx, model.fy, model.cx, model.cy)
-        T_rs = np.array(model.T_rs, float).reshape(4, 4)
-        return Camera(model.width, model.height, *matrix, Lens(np.array(model.lens)), T_rs)
-    except ValueError as error:
-        raise CodecError(f"the model of sensor {model.sensor!r} is no camera: {error}") from error

@@ -27,8 +27,8 @@ from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
 from calib.camera import Camera
 from calib.rig import Noise, Rig
-from drivers import codec
 from drivers.frame import Kind
+from drivers.sensor_model import decode_camera
 
 #: How long one question for calibrations waits for answers [s].
 ASK_S = 0.5
@@ -107,7 +107,7 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     while not stop.is_set():
         for sensor in set(sensors) - set(cameras):
             for sample in bus.ask(keys.model(sensor), ASK_S):
-                cameras[sensor] = codec.decode_camera(SensorModel.FromString(sample.payload))
+                cameras[sensor] = decode_camera(SensorModel.FromString(sample.payload))
         missing = [sensor for sensor in sensors if sensor not in cameras]
         if not missing:
             break

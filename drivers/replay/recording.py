@@ -17,6 +17,7 @@ from drivers.codec import CodecError
 from drivers.device import Truth
 from drivers.frame import Frame
 from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, survey
+from drivers.sensor_model import decode_camera
 
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
@@ -132,7 +133,7 @@ class Recording:
 
     def _camera(self, model: SensorModel) -> Camera:
         try:
-            return codec.decode_camera(model)
+            return decode_camera(model)
         except CodecError as error:
             raise RecordingError(f"{self.path}: {error}") from error
 

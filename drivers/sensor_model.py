@@ -1,0 +1,22 @@
+"""Cameras out of `abs.v1.SensorModel`, in which recordings and the wire tell of them."""
+
+import numpy as np
+from abs.v1.sensor_model_pb2 import SensorModel
+
+from calib.camera import Camera
+from calib.lens import Lens
+from drivers.codec import CodecError
+
+
+def decode_camera(model: SensorModel) -> Camera:
+    """The camera that a sensor model describes.
+
+    Raises:
+        CodecError: its numbers describe none.
+    """
+    try:
+        matrix = (model.fx, model.fy, model.cx, model.cy)
+        T_rs = np.array(model.T_rs, float).reshape(4, 4)
+        return Camera(model.width, model.height, *matrix, Lens(np.array(model.lens)), T_rs)
+    except ValueError as error:
+        raise CodecError(f"the model of sensor {model.sensor!r} is no camera: {error}") from error
