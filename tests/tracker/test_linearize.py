@@ -108,7 +108,7 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
         assert np.abs(predicted).max() > 0.4
 
 
-def test_only_inliers_with_a_measurement_are_linearized():
+def test_only_inliers_and_what_is_in_free_space_are_linearized():
     mesh = MESH
     distance = plane_distance(FINE, NORMAL, 1.0)
     distance[:, :320] = np.nan
@@ -119,7 +119,9 @@ def test_only_inliers_with_a_measurement_are_linearized():
     linear = term.linearize(surface, np.zeros((len(mesh.vertices), 3, 2)))
     pixels = FINE.project(mesh.vertices) + 0.5
     inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))
-    assert len(linear.residual) == inliers
+    free = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] < 240))
+    assert len(linear.residual) == inliers + free
+    assert np.abs(linear.residual[:inliers]).max() < 0.2
     fit = term.fit(surface)
     assert fit.inliers == inliers
     assert fit.visible + fit.hidden == len(mesh.vertices)

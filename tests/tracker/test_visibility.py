@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from abs_service.images import ColorImage
+from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.depth import FREE_SCALE_M, DepthTerm
 from abs_service.tracker.terms.shadow import Shadow
 from abs_service.tracker.visibility import classify
 from calib import pose
@@ -188,6 +189,26 @@ def test_free_space_pushes_back_the_more_the_farther():
     assert (growth > 0).all()
     assert growth[1] / 0.03 > growth[0] / 0.03
     assert growth[2] / 0.04 > growth[1] / 0.03
+
+
+@pytest.mark.parametrize("x", [-0.06, 0.04])
+def test_the_search_is_told_the_way_back_from_free_space(x):
+    """The slope of what is linearised is that of the cost; depth itself says nothing about sliding along a plane."""
+    term, model = term_before(board(STRAIGHT)), Rigid(MESH)
+    theta = np.array([0, 0, 0, x, 0, 0])
+    jacobian = vertex_jacobian(model, theta)
+    linear = term.linearize(model.deform(theta[None]), jacobian)
+    ahead, behind = (
+        np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)
+    )
+    steps = np.count_nonzero(np.abs(MESH.vertices[:, 0] + x) > 0.15)
+    slope = linear.jacobian[:, 3] @ linear.residual
+    assert steps > 0
+    assert slope * x > 0
+    assert slope == pytest.approx(np.sign(x) * steps / FREE_SCALE_M, rel=0.25)
+    assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
+    within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
+    assert term.linearize(within, jacobian).residual.size == np.count_nonzero(term._residuals(within)[2])
 
 
 def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import depth_rows
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, stack, summarize
+from abs_service.tracker.terms.gradients import channel_rows, depth_rows
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.jit import kernel
@@ -16,6 +16,9 @@ from calib.noise.base import WINDOW_M, DepthNoise, render_texture
 #: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
 #: errs by a Laplace distribution of this scale.
 FREE_SCALE_M = 0.01
+
+#: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
+LEAST_FREE_M = 0.005
 
 
 class DepthTerm:
@@ -33,7 +36,7 @@ class DepthTerm:
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._texture = np.zeros((0, 8), np.float32)
         self._obscured = np.zeros(0, np.bool_)
-        self._free = np.zeros(0, np.bool_)
+        self._free_m = np.zeros((0, 0), np.float32)
         self._foreground = np.zeros((0, 0), np.float32)
 
     def observe(self, image: Image, predicted: Surface) -> None:
@@ -47,7 +50,7 @@ class DepthTerm:
         seen = classify(distance, self._view.render(predicted), self._view.camera.fx)
         self._foreground = np.where(seen.foreground, distance, np.nan)
         self._obscured = np.pad(seen.foreground | seen.hole, 1).ravel()
-        self._free = np.pad(seen.free_m > 0, 1).ravel()
+        self._free_m = np.pad(seen.free_m, 1)
         self._texture = self._classified(texture, seen).reshape(-1, 8)
 
     def foreground(self) -> NDArray[np.float64]:
@@ -86,7 +89,11 @@ class DepthTerm:
         return out
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
-        """The inliers' normalised residuals, and how they change with the parameters."""
+        """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""
+        parts = [self._linearize_measured(surface, jacobian), self._linearize_free(surface, jacobian)]
+        return stack(parts, jacobian.shape[2])
+
+    def _linearize_measured(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         residual, inverse_deviation, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
         vertices, normals, change = (
@@ -96,11 +103,25 @@ class DepthTerm:
         rows = depth_rows(vertices, normals, self._view.camera.center) * inverse_deviation[use, None]
         return Linearization(residual[use], np.einsum("ni,nid->nd", rows, change))
 
+    def _linearize_free(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+        """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
+
+        The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
+        """
+        pixel = self._view.synthesize(surface).pixel[0]
+        away = self._free_m.ravel()[pixel].astype(np.float64)
+        out = (pixel > 0) & (away > 0)
+        vertices, change = (self._view.spread(surface, values)[out] for values in (surface.vertices[0].T, jacobian))
+        distances = self._free_m[1:-1, 1:-1]
+        slope = channel_rows(distances, np.zeros_like(distances), self._view.camera, vertices)
+        weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
+        return Linearization(away[out] * weight, np.einsum("ni,nid->nd", slope * weight[:, None], change))
+
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
         residual, _, measured = self._residuals(surface)
         pixel = self._view.synthesize(surface).pixel[0]
-        free = self._free[pixel] & (pixel > 0)
+        free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
         hidden = (pixel < 0) | self._obscured[pixel]
         mean = -float(self.cost(surface)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
