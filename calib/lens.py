@@ -67,7 +67,11 @@ class Lens:
             residual = self.distort(ideal) - target
             if np.all(np.abs(residual) < tolerance) and np.all(self._is_before_fold(ideal)):
                 return ideal.reshape(np.shape(xy))
-            ideal -= np.einsum("nij,nj->ni", np.linalg.inv(self._jacobian(ideal)), residual)
+            try:
+                inverse = np.linalg.inv(self._jacobian(ideal))
+            except np.linalg.LinAlgError:  # the iteration has left the range of numbers
+                break
+            ideal -= np.einsum("nij,nj->ni", inverse, residual)
         error = np.where(self._is_before_fold(ideal), np.abs(self.distort(ideal) - target).max(axis=1), np.inf)
         worst = target[error.argmax()]
         raise LensError(f"the distortion {self.coefficients.tolist()} has no inverse at normalised {worst.tolist()}")

@@ -75,7 +75,8 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
         before = ~shown & (distance < near - AGREEMENT_M)
         behind = ~shown & (distance > near + AGREEMENT_M)
     foreground = before & (cv2.dilate(((labels > 0) & before).astype(np.uint8), np.ones((3, 3))) > 0)
-    hole = ~np.isfinite(distance) & (_depth_inside(expected) * near / focal > RIM_M)
+    with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
+        hole = ~np.isfinite(distance) & (_depth_inside(expected) * near / focal > RIM_M)
     away, steps = _extended(np.where(shown, near, np.nan))
     return Visibility(shown, foreground, hole, np.where(behind, steps * away / focal, 0).astype(np.float32))
 

@@ -238,3 +238,10 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
 def test_points_behind_a_camera_cast_no_shadow():
     points = np.array([[0.0, 0, -1], [0, 0, 0], [5, 0, 0.5]])
     assert not Shadow(STRAIGHT).mask(points).any()
+
+
+def test_missing_returns_of_an_object_that_fills_the_image_are_holes():
+    distance = np.full((48, 64), 1.0, np.float32)
+    distance[10:14, 20:30] = np.nan
+    seen = classify(distance, np.full((48, 64), 1.0, np.float32), 150.0)
+    assert np.array_equal(seen.hole, np.isnan(distance))
