@@ -159,10 +159,14 @@ class Tracking:
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
         plan = self._plan
         model = plan.model.build(sight(observation, self._rig, plan.reference, self._region, plan.vertices))
-        mesh = dressed(model.mesh, observation.images, self._rig)
+        synthesizer = plan.synthesis.build(self._rig, model.mesh)
+        mesh = replace(
+            dressed(model.mesh, observation.images, self._rig),
+            appearance=dressed(synthesizer.canvas, observation.images, self._rig).appearance,
+        )
         tracker = Tracker(
             model,
-            plan.objective.build(self._rig, mesh, plan.synthesis.build(self._rig, mesh)),
+            plan.objective.build(self._rig, mesh, synthesizer),
             StretchPrior(mesh, plan.priors.stretch),
             ShapePrior(model.rest, model.prior),
             MotionPrior(model.rest, model.scales, plan.priors),

@@ -9,32 +9,35 @@ from abs_service.observation import Observer
 from abs_service.tracker.regions import nearest
 from abs_service.tracking import Plan, Tracking, streams
 from calib.camera import Camera
+from calib.lens import Lens
 from calib.noise.base import DepthNoise
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Noise, Rig, Sensor
 from drivers.frame import Frame, FrameSet, Geometry, Kind
 
-#: Stands for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
+#: Stand for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
+_DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
 #: Stands for every noise of depth: kernels see its texture only, and a map of pixels would not fit the camera.
 _NOISE = GaussianPolynomial(((0.01,),))
 
 
 def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
-    """Tracks a flat board that no sensor ever saw, once, with the parts of the plan.
+    """Tracks a flat board that no sensor ever saw, without and with distortion, with the parts of the plan.
 
     Args:
         noises: noise model of every sensor that the tracker uses, by name; tells what kind of image it takes.
         plan: of the tracker.
     """
-    rig = Rig("warm-up", {name: _sensor(name, noise) for name, noise in noises.items()})
-    frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
-    observation = Observer(rig).observe(FrameSet(0, 0, {frame.key: frame for frame in frames}))
-    Tracking(rig, replace(plan, region=nearest.Settings())).track_observation(observation, lambda: False)
+    for camera in (_CAMERA, _DISTORTED):
+        rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
+        frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
+        observation = Observer(rig).observe(FrameSet(0, 0, {frame.key: frame for frame in frames}))
+        Tracking(rig, replace(plan, region=nearest.Settings())).track_observation(observation, lambda: False)
 
 
-def _sensor(name: str, noise: Noise) -> Sensor:
-    return Sensor(name, _CAMERA, _NOISE if isinstance(noise, DepthNoise) else noise)
+def _sensor(name: str, camera: Camera, noise: Noise) -> Sensor:
+    return Sensor(name, camera, _NOISE if isinstance(noise, DepthNoise) else noise)
 
 
 def _board(head: str, kind: Kind, size: tuple[float, float]) -> Frame:

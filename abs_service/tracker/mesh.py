@@ -17,8 +17,9 @@ class Mesh:
         colors: red, green, blue (n, 3) in 0…255 from a colour sensor; NaN where none saw the vertex.
         chart: flat coordinates (n, 2) of the vertices, in any unit, in which the mesh does not fold; first axis along
             the object's long side.
-        appearance: what sensors that make pictures see on the vertices, by sensor, (n, channels) in the sensor's unit;
-            for those with a light of their own, per unit of light. NaN where unknown.
+        appearance: what sensors that make pictures see, by sensor, (k, channels) in the sensor's unit; for those with a
+            light of their own, per unit of light. On the points that the synthesis asks for, mostly the vertices; NaN
+            where unknown.
     """
 
     vertices: NDArray[np.float64]
@@ -28,7 +29,7 @@ class Mesh:
     appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
 
     def looks(self, sensor: str) -> NDArray[np.float32]:
-        """What a sensor sees on the vertices (n, channels): their colours if nothing else is known."""
+        """What a sensor sees on the points of its synthesis: the vertices' colours if nothing else is known."""
         return self.appearance.get(sensor, self.colors)
 
     @property

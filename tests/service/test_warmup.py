@@ -25,11 +25,13 @@ from abs_service.warmup import warm_up
 from drivers.simulated import address
 
 settings = config.load_default()
-model = plugins.load("abs_service.tracker.models", json.loads(sys.argv[1]), Path())
-plan = dataclasses.replace(plans.plan(settings, "sheet"), model=model)
+table = json.loads(sys.argv[1])
+parts = {key: plugins.load(f"abs_service.tracker.{package}", table[key], Path())
+         for key, package in [("model", "models"), ("synthesis", "synthesis")] if key in table}
+plan = dataclasses.replace(plans.plan(settings, "sheet"), **parts)
 warm_up(plans.noises(settings, "sheet"), plan)
 
-simulation = address.parse(settings.devices["sim"].uri).build()
+simulation = address.parse(settings.devices["sim"].uri + table.get("keys", "")).build()
 exposures = [simulation.expose(k)[0] for k in range(3)]
 
 def forms():
@@ -50,16 +52,20 @@ print(json.dumps([before, forms(), estimate.status]))
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "model",
+    "parts",
     [
-        {"type": "nurbs", "control_points": [4, 4]},
-        {"type": "flexpad", "width_m": 0.3, "height_m": 0.2},
-        {"type": "posed", "shape": {"type": "flexpad"}},
+        {"model": {"type": "nurbs", "control_points": [4, 4]}},
+        {"model": {"type": "flexpad", "width_m": 0.3, "height_m": 0.2}},
+        {"model": {"type": "posed", "shape": {"type": "flexpad"}}},
+        {"synthesis": {"type": "sparse"}, "keys": "&lens=0.25"},
+        {"synthesis": {"type": "undistorted"}, "keys": "&lens=0.25"},
+        {"synthesis": {"type": "warped"}, "keys": "&lens=0.25"},
+        {"synthesis": {"type": "dense", "step": 2}, "keys": "&lens=0.25"},
     ],
-    ids=lambda model: model["type"],
+    ids=lambda parts: next(iter(parts.values()))["type"],
 )
-def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(model):
-    command = [sys.executable, "-c", PROGRAM, json.dumps(model)]
+def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(parts):
+    command = [sys.executable, "-c", PROGRAM, json.dumps(parts)]
     out = subprocess.run(command, check=True, capture_output=True, text=True, timeout=200)
     before, after, status = json.loads(out.stdout)
     assert status == "TRACKING"

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,6 +68,19 @@ def test_synthesis_is_eqs_10_11_and_20(seed):
     assert synthesis.pixel[0].tolist() == expected
     distances = [reference.distance(CAMERA, vertex) for vertex in vertices.astype(float)]
     np.testing.assert_allclose(synthesis.distance[0], distances, rtol=1e-5)
+
+
+@few
+@given(seeds)
+def test_without_distortion_a_shorter_kernel_says_the_same(seed):
+    """A lens too weak to move anything by a thousandth of a pixel chooses the other kernel."""
+    vertices, normals = decided(np.random.default_rng(seed), 40)
+    plain, weak = (replace(CAMERA, lens=Lens(np.array([k1]))) for k1 in (0.0, 1e-9))
+    keep = ~undecided(plain, vertices, normals)
+    surface = as_surface((vertices[keep], normals[keep]))
+    one, other = seen(plain, surface), seen(weak, surface)
+    assert np.array_equal(one.pixel, other.pixel)
+    np.testing.assert_allclose(one.distance, other.distance, rtol=1e-6)
 
 
 def test_what_is_behind_the_camera_or_faces_away_is_pixel_0():

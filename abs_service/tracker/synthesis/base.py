@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
+from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from calib.camera import Camera
 
@@ -52,20 +53,41 @@ class View(Protocol):
         """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
         ...
 
+    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (population, n) of the vertices at the samples (population, m)."""
+        ...
+
+    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+        """Costs (population,), made comparable between members that have more samples and such that have fewer.
+
+        Args:
+            costs: sums over the samples (population,).
+            surface: the population.
+            unseen: what a sample costs that the sensor does not see.
+        """
+        ...
+
     def render(self, surface: Surface) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
         ...
 
 
 class Synthesizer(Protocol):
-    """Views of all sensors of a rig, and their images as these views need them."""
+    """Views of all sensors of a rig, and their images as these views need them.
+
+    Attributes:
+        canvas: the mesh on whose vertices the views want to be given the appearance: the deformed mesh itself, or a
+            finer one.
+    """
+
+    canvas: Mesh
 
     def observe(self, observation: Observation) -> None:
         """Takes the images that the following calls refer to."""
         ...
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The mesh with attributes (n, channels) through one sensor's camera."""
+        """The mesh with attributes of the canvas (vertices, channels) through one sensor's camera."""
         ...
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -28,18 +28,22 @@ class Settings:
 
 
 class Sparse:
-    """Projects the vertices into the sensors' own images, which stay as they are."""
+    """Projects the vertices into the sensors' own images, which stay as they are.
+
+    Attributes:
+        canvas: the mesh.
+    """
 
     def __init__(self, rig: Rig, mesh: Mesh):
+        self.canvas = mesh
         self._rig = rig
-        self._mesh = mesh
 
     def observe(self, observation: Observation) -> None:
         """Nothing depends on the images."""
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """The vertices with attributes (n, channels) through one sensor's camera."""
-        return SparseView(self._rig.sensors[sensor].camera, self._mesh.faces, attributes)
+        return SparseView(self._rig.sensors[sensor].camera, self.canvas.faces, attributes)
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texture itself."""
@@ -65,6 +69,7 @@ class SparseView:
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
+        self._kernel = _synthesize_pinhole if camera.lens.is_pinhole else _synthesize
         self._size = (camera.height, camera.width)
         self._limit = field_radius(camera) ** 2
 
@@ -83,7 +88,7 @@ class SparseView:
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
-        _synthesize(
+        self._kernel(
             surface.vertices,
             surface.normals,
             self._hidden,
@@ -100,6 +105,14 @@ class SparseView:
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values
+
+    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The values themselves."""
+        return values
+
+    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+        """The costs themselves: every member has as many samples as the mesh has vertices."""
+        return costs
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
@@ -147,6 +160,48 @@ def _synthesize(
             radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
             column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx + half
             row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy + half
+            inside = column >= 0 and column < right and row >= 0 and row < bottom
+            seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
+            place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
+            pixel[k, v] = -1 if hidden[v] else place
+            distance[k, v] = np.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def _synthesize_pinhole(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    hidden: NDArray[np.bool_],
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    height: int,
+    width: int,
+    pixel: NDArray[np.int32],
+    distance: NDArray[np.float32],
+) -> None:
+    """Eqs. 11, 12 and 20: what `_synthesize` is without distortion, whose coefficients are ignored."""
+    half, one = np.float32(0.5), np.float32(1)
+    fx, fy, cx, cy = matrix
+    stride = width + 2
+    right, bottom, farthest = np.float32(width), np.float32(height), np.float32(limit)
+    for k in range(vertices.shape[0]):
+        for v in range(vertices.shape[2]):
+            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
+            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
+            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
+            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
+            a, b, c = normals[k, 0, v], normals[k, 1, v], normals[k, 2, v]
+            nx = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
+            ny = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
+            nz = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
+            inverse = one / z
+            u, w = x * inverse, y * inverse
+            r2 = u * u + w * w
+            facing = nx * x + ny * y + nz * z < 0
+            column = fx * u + cx + half
+            row = fy * w + cy + half
             inside = column >= 0 and column < right and row >= 0 and row < bottom
             seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
             place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0

@@ -84,11 +84,11 @@ class ChannelTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured values (population,)."""
-        seen = self._illumination.shine(self._view.synthesize(surface), surface)
+        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         out = np.empty(len(seen.pixel))
         uniform = self._bounds.inlier + self._bounds.uniform
         _channel_cost(seen.pixel, self._texture, seen.attributes, self._bounds.outlier, uniform, out)
-        return out
+        return self._view.balance(out, surface, uniform)
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The inliers' normalised residuals, and how they change with the parameters.
@@ -112,7 +112,7 @@ class ChannelTerm:
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
-        seen = self._illumination.shine(self._view.synthesize(surface), surface)
+        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         texels = self._texture[seen.pixel[0]].astype(np.float64)
         own = seen.attributes[0][np.arange(len(texels)), texels[:, CHANNEL].astype(int)]
         residual = (texels[:, VALUE] - own) * texels[:, INVERSE]
@@ -135,6 +135,7 @@ def _channel_cost(
     of what an agreeing value costs on average. Texels are [value, channel, inverse deviation, normaliser].
     """
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
+    farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     for k in range(pixel.shape[0]):
         total = np.float32(0)
         own = k % appearance.shape[0]
@@ -143,8 +144,6 @@ def _channel_cost(
                 continue
             texel = texture[pixel[k, v]]
             e = (texel[0] - appearance[own, v, np.int32(texel[1])]) * texel[2]
-            if np.isfinite(e):
-                total += min(half * e * e + texel[3], most)
-            else:
-                total += unknown if np.isnan(e) else half + texel[3]
+            agreeing = half + texel[3] if abs(e) > farthest else min(half * e * e + texel[3], most)
+            total += unknown if np.isnan(e) else agreeing
         out[k] = total

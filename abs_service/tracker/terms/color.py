@@ -63,7 +63,7 @@ class ColorTerm:
             self._normalizer + 1.5,
         )
         _color_cost(seen.pixel, self._texture, seen.attributes, *constants, out)
-        return out
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""

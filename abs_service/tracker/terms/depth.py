@@ -86,7 +86,7 @@ class DepthTerm:
         seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
         _depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
-        return out
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""

@@ -35,15 +35,17 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
     """Derivatives (n, 3 channels, 3) of the measured colour at a vertex's pixel by the vertex, in levels per metre.
 
     Args:
-        image: colour image (height, width, 3), 0…255.
+        image: colour image (height, width, 3), 0…255, NaN where nothing is known: there it is taken to be level.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
     pixels, projection = _projected(camera, vertices)
     column, row = _neighborhood(pixels, image.shape[:2])
+    patches = image[row, column].astype(np.float64)
+    patches = np.where(np.isfinite(patches), patches, patches[:, RADIUS_PX : RADIUS_PX + 1, RADIUS_PX : RADIUS_PX + 1])
     weights = _bell()
     slopes = np.stack([weights * _STEPS, weights * _STEPS[:, None]], axis=-1) / np.sum(weights * _STEPS**2)
-    return np.einsum("nrkc,rkd->ncd", image[row, column].astype(np.float64), slopes) @ projection
+    return np.einsum("nrkc,rkd->ncd", patches, slopes) @ projection
 
 
 def channel_rows(

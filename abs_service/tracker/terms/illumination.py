@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.base import Synthesis
+from abs_service.tracker.synthesis.base import Synthesis, View
 from calib.jit import kernel
 
 
 class Illumination(Protocol):
     """Turns reflectivities into what a sensor sees."""
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis of a population with its attributes as they look in this light."""
         ...
 
@@ -22,7 +22,7 @@ class Illumination(Protocol):
 class Passive:
     """The light of the room: a vertex looks the same wherever it is."""
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis itself."""
         return seen
 
@@ -37,10 +37,10 @@ class Active:
     def __init__(self, center: NDArray[np.float64]):
         self._center = center.astype(np.float32)
 
-    def shine(self, seen: Synthesis, surface: Surface) -> Synthesis:
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""
         shade = lambert(surface, self._center)
-        return replace(seen, attributes=seen.attributes * shade[..., None])
+        return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[..., None])
 
 
 def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -1,0 +1,158 @@
+"""Dense synthesis: the mesh is rendered into every image, forward distortion included, and compared per pixel."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Interval
+from numpy.typing import NDArray
+
+from abs_service.observation import Observation
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.raster import Raster, field_radius
+from abs_service.tracker.synthesis.texturing import lattice, paint
+from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
+from calib.camera import Camera
+from calib.rig import Rig
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the dense synthesis.
+
+    Attributes:
+        step: every how many pixels, in rows and columns, one is compared.
+        detail: the appearance is so many times finer than the mesh.
+    """
+
+    step: Annotated[int, Interval(ge=1, le=16)] = 1
+    detail: Annotated[int, Interval(ge=1, le=16)] = 4
+
+    def build(self, rig: Rig, mesh: Mesh) -> "Dense":
+        """The synthesis of a mesh for the sensors of a rig."""
+        return Dense(rig, mesh, self.step, self.detail)
+
+
+#: At least so much of the predicted mesh is taken to be in sight when its pixels are counted.
+LEAST_SHARE = 0.1
+
+#: What nothing covers.
+_NONE = Samples(
+    np.zeros((0, 0), np.int32),
+    np.zeros((0, 0), np.float32),
+    np.zeros((0, 0), np.int32),
+    np.zeros((0, 0, 3), np.float32),
+)
+
+
+class Dense:
+    """Renders into the sensors' own images, which stay as they are.
+
+    Attributes:
+        canvas: the points of the lattice that the appearance is given on.
+    """
+
+    def __init__(self, rig: Rig, mesh: Mesh, step: int, detail: int):
+        self.canvas = lattice(mesh, detail)
+        self._rig = rig
+        self._mesh = mesh
+        self._step = step
+        self._detail = detail
+
+    def observe(self, observation: Observation) -> None:
+        """Nothing depends on the images."""
+
+    def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
+        """The mesh with attributes of the lattice (k, channels) through one sensor's camera."""
+        camera = self._rig.sensors[sensor].camera
+        return DenseView(camera, self._mesh.faces, attributes, self._step, self._detail)
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The texture itself."""
+        return texture
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The image itself."""
+        return image
+
+
+class DenseView:
+    """The pixels that a mesh covers in one camera's image.
+
+    Attributes:
+        camera: the camera.
+    """
+
+    def __init__(
+        self, camera: Camera, faces: NDArray[np.int32], attributes: NDArray[np.float32], step: int, detail: int
+    ):
+        self.camera = camera
+        self._faces = np.ascontiguousarray(faces, np.int32)
+        self._attributes = np.ascontiguousarray(attributes, np.float32)
+        self._raster = Raster(camera, faces)
+        self._step = step
+        self._detail = detail
+        self._limit = field_radius(camera)
+        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)
+        self._expected = 0.0
+        self._last: tuple[Surface | None, Samples, NDArray[np.float64]] = (None, _NONE, np.zeros(0))
+
+    def look(self, predicted: Surface) -> None:
+        """Counts pixels; the z-buffer tells for every candidate anew what it hides of itself."""
+        samples, share = self._render(predicted)
+        self._expected = np.count_nonzero(samples.pixel >= 0) / max(float(share[0]), LEAST_SHARE)
+
+    def synthesize(self, surface: Surface) -> Synthesis:
+        """Synthesises a population; members that cover fewer pixels than others have samples of pixel −1 at the end."""
+        samples, _ = self._render(surface)
+        return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
+
+    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values (n, …) of the vertices, interpolated at the samples (m, …) of a population of one."""
+        samples, _ = self._render(surface)
+        return np.einsum("mi,mi...->m...", samples.weights[0], values[self._faces[samples.face[0]]])
+
+    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (population, n) of the vertices, interpolated at the samples (population, m)."""
+        return interpolate(values[..., None], self._faces, self._render(surface)[0])[..., 0]
+
+    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+        """The mean over a member's pixels, times the predicted mesh's pixels, for the share of it that is in sight.
+
+        The mesh ends where it was found to, not where the object ends, and a member that covers more of the object's
+        pixels explains no more of it. So covering is neither rewarded nor punished, but leaving the image is.
+        """
+        samples, share = self._render(surface)
+        count = np.count_nonzero(samples.pixel >= 0, axis=1)
+        mean = np.where(count > 0, costs / np.maximum(count, 1), unseen)
+        return self._expected * (share * mean + (1 - share) * unseen)
+
+    def render(self, surface: Surface) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
+        return self._raster.render(surface.vertices[0])
+
+    def _render(self, surface: Surface) -> tuple[Samples, NDArray[np.float64]]:
+        """The covered pixels of a population, and the share (population,) of its vertices that is in sight.
+
+        Asked again for the last population, it answers at once.
+        """
+        last, samples, share = self._last
+        if last is not surface:
+            place, inverse_z = self._project(surface)
+            inside = np.all((place >= -0.5) & (place < (self.camera.width - 0.5, self.camera.height - 0.5)), axis=-1)
+            share = np.mean(inside & np.isfinite(inverse_z), axis=1)
+            samples = render(place, inverse_z, self._faces, self._ray_length, self._step)
+            self._last = (surface, samples, share)
+        return samples, share
+
+    def _project(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Pixel coordinates (population, n, 2) and 1/z (population, n), NaN for what the camera cannot see."""
+        points = surface.vertices.transpose(0, 2, 1).astype(np.float64)
+        local = (points - self.camera.center) @ self.camera.T_rs[:3, :3]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            aside = np.linalg.norm(local[..., :2], axis=-1) / local[..., 2]
+            seen = (local[..., 2] > 1e-6) & (aside < self._limit)
+            inverse_z = np.where(seen, 1 / local[..., 2], np.nan).astype(np.float32)
+        return np.where(seen[..., None], self.camera.project(points), 0.0).astype(np.float32), inverse_z

@@ -1,0 +1,44 @@
+"""A camera without distortion that sees all that another one sees, and where its pixels are in the other's image."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.raster import field_radius
+from calib.camera import Camera
+
+#: The image of the camera without distortion is at most so many times as wide and as high as the original.
+MOST_GROWTH = 2.0
+
+
+def pinhole_of(camera: Camera) -> Camera:
+    """The pinhole at the same place, with the same focal lengths, whose image covers the camera's field of view.
+
+    Where a wide lens would need more than twice the size, the rim is left out.
+    """
+    if camera.lens.is_pinhole:
+        return camera
+    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
+    rim = (columns % (camera.width - 1 or 1) == 0) | (rows % (camera.height - 1 or 1) == 0)
+    directions = camera.directions(np.stack([columns[rim], rows[rim]], axis=-1))
+    ideal = directions[:, :2] / directions[:, 2:] * (camera.fx, camera.fy)
+    half = np.array([camera.width, camera.height]) * MOST_GROWTH / 2
+    low, high = np.maximum(ideal.min(axis=0), -half), np.minimum(ideal.max(axis=0), half)
+    width, height = (np.ceil(high - low - 1e-6).astype(int) + 1).tolist()
+    return Camera(width, height, camera.fx, camera.fy, float(-low[0]), float(-low[1]), T_rs=camera.T_rs)
+
+
+def lookup(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
+    """For every pixel of a pinhole with the same centre, the nearest one of the camera: the backward distortion.
+
+    Returns:
+        Indices (height + 2, width + 2) into the camera's flattened image with a border of one pixel, 0 where the camera
+        sees nothing; the result has a border as well.
+    """
+    directions = pinhole.directions(np.stack(np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height)), axis=-1))
+    ideal = directions[..., :2] / directions[..., 2:]
+    place = camera.lens.distort(ideal) * (camera.fx, camera.fy) + (camera.cx, camera.cy)
+    pixel = np.floor(place + 0.5)
+    inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=-1)
+    inside &= np.linalg.norm(ideal, axis=-1) < field_radius(camera)  # beyond, the polynomial may fold back
+    column, row = np.where(inside[..., None], pixel, -1).astype(np.int32).transpose(2, 0, 1)
+    return np.pad((row + 1) * (camera.width + 2) + column + 1, 1).astype(np.int32) * np.pad(inside, 1)

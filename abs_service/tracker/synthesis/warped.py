@@ -1,0 +1,179 @@
+"""Sparse synthesis on warped input (section 3.2): all images in one common projection without distortion (eq. 12)."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.images import DepthImage
+from abs_service.observation import Observation
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import ModelError, Surface
+from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.pinhole import pinhole_of
+from abs_service.tracker.synthesis.reprojection import Reprojection
+from abs_service.tracker.synthesis.sparse import SparseView
+from calib import pose
+from calib.camera import Camera
+from calib.noise.base import DepthNoise, without_offset
+from calib.rig import Rig
+
+#: A colour pixel shows what is nearest to its camera; a point farther away by more than this is hidden from it [m].
+HIDING_M = 0.02
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the warping.
+
+    Attributes:
+        sensor: depth sensor into whose view, without its distortion, everything is warped; its distances also tell
+            where the pixels of cameras without distances belong. "" is the tracker's first depth sensor.
+    """
+
+    sensor: str = ""
+
+    def build(self, rig: Rig, mesh: Mesh) -> "Warped":
+        """The synthesis of a mesh for the sensors of a rig.
+
+        Raises:
+            ModelError: the sensor does not exist or measures no distances.
+        """
+        depth = [name for name, sensor in rig.sensors.items() if isinstance(sensor.noise, DepthNoise)]
+        if not depth or self.sensor not in ("", *depth):
+            raise ModelError(
+                f'synthesis.sensor = "{self.sensor}" must be a depth sensor of the tracker, one of {depth}'
+            )
+        return Warped(rig, mesh, self.sensor or depth[0])
+
+
+class Warped:
+    """One projection serves all sensors.
+
+    Attributes:
+        canvas: the mesh.
+    """
+
+    def __init__(self, rig: Rig, mesh: Mesh, reference: str):
+        self.canvas = mesh
+        self._rig = rig
+        self._reference = reference
+        self._camera = pinhole_of(rig.sensors[reference].camera)
+        self._rays = self._camera.rays()
+        self._projection = _Projection(self._camera, mesh)
+        self._warps = {
+            name: Reprojection(sensor.camera, self._camera)
+            for name, sensor in rig.sensors.items()
+            if isinstance(sensor.noise, DepthNoise)
+        }
+        self._points = np.full((*self._rays.shape[:2], 3), np.nan)
+
+    def observe(self, observation: Observation) -> None:
+        """Finds the points that the common view's pixels show, from the reference sensor's distances."""
+        image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
+        self._points = np.full_like(self._points, np.nan)
+        if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
+            measured = without_offset(sensor.noise, image.distance, image.amplitude)
+            _, distance = self._warps[self._reference].warp(measured)
+            self._points = pose.transform(self._camera.T_rs, self._rays * distance[..., None])
+
+    def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
+        """The vertices with attributes (n, channels) through the common camera."""
+        return _SharedView(self._projection, attributes)
+
+    def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
+        """A rendered noise model (height + 2, width + 2, 8) in the common view.
+
+        Distances are those from the common camera; the deviations along the old line of sight are taken for those along
+        the new one, which is right to the cosine of the angle between them.
+        """
+        inner = texture[1:-1, 1:-1]
+        measured = np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan))
+        index, distance = self._warps[sensor].warp(measured)
+        warped = texture.reshape(-1, texture.shape[2])[np.pad(index, 1)]
+        warped[1:-1, 1:-1, 0] = np.where(index > 0, distance, 0)
+        return warped
+
+    def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
+        """An image (height, width, channels) in the common view; NaN where no distance tells what it shows."""
+        camera = self._rig.sensors[sensor].camera
+        pixel, seen = _visible(camera, self._points, self._camera.fx)
+        warped = np.full((*self._rays.shape[:2], image.shape[2]), np.nan, np.float32)
+        warped[seen] = image[pixel[seen, 1], pixel[seen, 0]]
+        return warped
+
+
+def _visible(
+    camera: Camera, points: NDArray[np.float64], focal: float
+) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
+    """Pixel (height, width, 2) = (column, row) of rig points in a camera, and which of them it sees.
+
+    What hides a point is found by a z-buffer whose cells are as wide as the gaps between the points.
+    """
+    known = np.isfinite(points[..., 0])
+    pixel = np.floor(camera.project(points) + 0.5)
+    with np.errstate(invalid="ignore"):
+        known &= np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=-1)
+    pixel = np.where(known[..., None], pixel, 0).astype(int)
+    distance = np.where(known, camera.distance(points), np.inf).astype(np.float32)
+    cell = int(np.ceil(camera.fx / focal)) + 1
+    nearest = np.full((camera.height // cell + 1, camera.width // cell + 1), np.inf, np.float32)
+    np.minimum.at(nearest, (pixel[..., 1] // cell, pixel[..., 0] // cell), distance)
+    nearest = np.asarray(cv2.erode(nearest, np.ones((3, 3), np.uint8)), np.float32)
+    return pixel, known & (distance < nearest[pixel[..., 1] // cell, pixel[..., 0] // cell] + HIDING_M)
+
+
+class _Projection:
+    """The common view's synthesis of the last population, which all sensors of a frame ask for in turn."""
+
+    def __init__(self, camera: Camera, mesh: Mesh):
+        self.view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
+        self._asked: tuple[Surface | None, Synthesis | None] = (None, None)
+
+    def look(self, predicted: Surface) -> None:
+        """Decides what is hidden in this frame."""
+        self.view.look(predicted)
+        self._asked = (None, None)
+
+    def synthesize(self, surface: Surface) -> Synthesis:
+        """Pixels and distances of a population, computed once."""
+        last, synthesis = self._asked
+        if last is not surface or synthesis is None:
+            synthesis = self.view.synthesize(surface)
+            self._asked = (surface, synthesis)
+        return synthesis
+
+
+class _SharedView:
+    """One sensor's attributes in the common view."""
+
+    def __init__(self, projection: _Projection, attributes: NDArray[np.float32]):
+        self.camera = projection.view.camera
+        self._projection = projection
+        self._attributes = np.ascontiguousarray(attributes, np.float32)[None]
+
+    def look(self, predicted: Surface) -> None:
+        """Decides what is hidden in this frame, alike for all sensors."""
+        self._projection.look(predicted)
+
+    def synthesize(self, surface: Surface) -> Synthesis:
+        """The common synthesis with this sensor's attributes."""
+        common = self._projection.synthesize(surface)
+        return Synthesis(common.pixel, common.distance, self._attributes)
+
+    def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The values themselves: the samples are the vertices."""
+        return values
+
+    def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The values themselves."""
+        return values
+
+    def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
+        """The costs themselves: every member has as many samples as the mesh has vertices."""
+        return costs
+
+    def render(self, surface: Surface) -> NDArray[np.float32]:
+        """Radial distances (height, width) [m] of a population of one in the common view, infinite beside it."""
+        return self._projection.view.render(surface)

@@ -1,0 +1,132 @@
+"""Every synthesis serves every sensor: gradients are those of the cost, and the sheet is tracked through a lens."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from abs_service.images import ChannelImage, ColorImage
+from abs_service.tracker.curvature import vertex_jacobian
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.channel import ChannelTerm
+from abs_service.tracker.terms.color import ColorTerm
+from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.illumination import Active
+from abs_service.tracking import Tracking
+from calib import pose
+from calib.camera import Camera
+from calib.lens import Lens
+from calib.noise.color import GaussianColor
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.intensity import GaussianIntensity
+from calib.rig import Rig, Sensor
+from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
+from tests.tracker.scenes import as_surface, depth_image, flat, observation, plane_distance, sheet
+
+ALL = pytest.mark.parametrize(
+    "kind",
+    [sparse.Settings(), undistorted.Settings(), warped.Settings(), dense.Settings()],
+    ids=["sparse", "undistorted", "warped", "dense"],
+)
+LENS = Lens(np.array([-0.15, 0.03, 1e-3, -1e-3]))
+TOF = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, LENS)
+COLOR = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, LENS, pose.look_at([0.05, 0, 0], [0.03, 0, 1.0]))
+WALL = np.array([0.0, 0.0, 1.0])
+MESH = sheet(21, 31, flat)
+SIGMA = 0.01
+LEVELS = 10.0
+BOUNDS = Bounds(0.0, 5.0, 20.0)
+
+
+def built(kind, mesh: Mesh = MESH) -> Synthesizer:
+    """The synthesis of a sheet for two distorted sensors, after an observation of a wall where the sheet is."""
+    sensors = [Sensor("tof", TOF, GaussianPolynomial(((SIGMA,),))), Sensor("color", COLOR, GaussianColor(LEVELS))]
+    synthesizer = kind.build(Rig("r", {sensor.name: sensor for sensor in sensors}), mesh)
+    synthesizer.observe(observation(tof=depth_image(plane_distance(TOF, WALL, 1.0))))
+    return synthesizer
+
+
+def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) -> tuple[float, float]:
+    """Derivative of the cost by a parameter of the pose, numerically and as the linearisation says."""
+    offset = step * np.eye(6)[parameter]
+    ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
+    linear = term.linearize(model.deform(theta[None]), vertex_jacobian(model, theta))
+    return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
+
+
+@ALL
+def test_the_depth_gradient_is_that_of_the_cost(kind):
+    mesh = sheet(21, 31, flat, size=(0.2, 0.14))
+    term = DepthTerm("tof", built(kind, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), as_surface((mesh.vertices, mesh.normals)))
+    for theta in ([0, 0, 0, 0, 0, 0.006], [0.02, -0.02, 0, 0, 0, -0.004]):
+        numerical, linear = slope(term, Rigid(mesh), np.array(theta), 5, 5e-4)
+        assert linear == pytest.approx(numerical, rel=0.1)
+        assert abs(linear) > 1000
+
+
+def gradient_colors(points: np.ndarray) -> np.ndarray:
+    """A colour that changes evenly over the wall, two levels per pixel; points (…, 3)."""
+    x, y = points[..., 0], points[..., 1]
+    return np.stack([128 + 400 * x, 128 + 400 * y, 128 - 400 * x], axis=-1).astype(np.float32)
+
+
+@ALL
+def test_the_colour_gradient_is_that_of_the_cost(kind):
+    mesh = sheet(21, 31, flat, size=(0.2, 0.14))
+    synthesizer = built(kind, mesh)
+    term = ColorTerm("color", synthesizer, gradient_colors(synthesizer.canvas.vertices), GaussianColor(LEVELS), BOUNDS)
+    wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0)))
+    term.observe(ColorImage(np.rint(wall).astype(np.uint8)), as_surface((mesh.vertices, mesh.normals)))
+    for parameter in (3, 4):
+        theta = 0.01 * np.eye(6)[parameter]
+        numerical, linear = slope(term, Rigid(mesh), theta, parameter, 0.01)
+        assert linear == pytest.approx(numerical, rel=0.1)
+        assert abs(linear) > 1000
+    fit = term.fit(Rigid(mesh).deform(np.zeros((1, 6))))
+    assert fit.inliers == fit.samples > 0.8 * fit.visible
+
+
+@ALL
+def test_a_lamp_of_its_own_lights_the_samples(kind):
+    """Of a wall of even reflectivity, every sample has the brightness that the law of the lamp says."""
+    reflectivity = 3000.0
+    synthesizer = built(kind)
+    looks = np.full((len(synthesizer.canvas.vertices), 1), reflectivity, np.float32)
+    wall = plane_distance(TOF, WALL, 1.0)
+    law = reflectivity * (1.0 / wall) / wall**2  # the cosine of incidence on a wall at 1 m is 1 over the distance
+    term = ChannelTerm("tof", synthesizer, looks, GaussianIntensity("amplitude", 50.0), Active(TOF.center), BOUNDS)
+    surface = as_surface((MESH.vertices, MESH.normals))
+    term.observe(ChannelImage(law.astype(np.float32), np.zeros(law.shape, np.uint8)), surface)
+    fit = term.fit(surface)
+    assert fit.inliers == fit.samples > 0.9 * len(MESH.vertices)
+    assert fit.normalized_residual < 0.5
+
+
+@ALL
+def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
+    """Wherever else it goes, it costs as much as a mesh without any measurement."""
+    term = DepthTerm("tof", built(kind), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
+    surface = as_surface((MESH.vertices, MESH.normals))
+    term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), surface)
+    there, away, behind = term.cost(
+        Rigid(MESH).deform(np.array([np.zeros(6), [0, 0, 0, 2, 0, 0], [0, 0, 0, 0, 0, -3]]))
+    )
+    assert away == pytest.approx(behind)
+    assert there < away - 1000
+
+
+@ALL
+def test_a_bending_sheet_is_tracked_through_a_lens(kind):
+    simulation = simulate("simulated://sheet?seed=4&lens=0.25")
+    tracking = Tracking(rig_of(simulation), dataclasses.replace(default_plan(), synthesis=kind))
+    steps = list(drive(tracking, simulation, range(0, 64, 4)))
+    assert {step.estimate.status for step in steps} == {Status.TRACKING}
+    vertex_mm, surface_mm = mean_errors(steps)
+    assert vertex_mm < 1.8
+    assert surface_mm < 1.4
