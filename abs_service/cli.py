@@ -33,6 +33,10 @@ COMMANDS = {
 #: Modules whose name cannot be that of the command.
 MODULES = {"import": "import_images"}
 
+#: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
+#: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+
 EPILOG = """\
 examples:
   abs-service run                        a simulated sheet of paper, nothing to connect or configure
@@ -46,8 +50,8 @@ abs-service COMMAND --help says more about each command.
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
-    # Read when NumPy is first imported. Its matrices are small here: more threads cost time, and order of summation.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for variable in THREADS:
+        os.environ.setdefault(variable, "1")
     lifeline.hold()
     given = list(sys.argv[1:] if argv is None else argv)
     if not given:

@@ -21,7 +21,7 @@ from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
-from calib.rig import Rig, Sensor
+from calib.rig import PictureNoise, Rig, Sensor
 from drivers.frame import FrameSet
 
 
@@ -115,6 +115,7 @@ class Tracking:
         self._tracker: Tracker | None = None
         self._watch = loss.LossWatch(plan.reinitialization)
         self._told = False
+        self._unseen: frozenset[str] = frozenset()
 
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for a frame set; the search goes on while `in_time` allows.
@@ -131,7 +132,7 @@ class Tracking:
         try:
             if self._tracker is None:
                 self._adopt(*self._begin(observation), observation)
-            elif told or self._watch.overdue(observation.t_host_ns):
+            elif told or self._watch.overdue(observation.t_host_ns) or self._unseen.difference(observation.missing):
                 self._look_again(self._tracker.model.mesh, told, observation)
         except (SightingError, ModelError) as error:
             notes = (str(error),)
@@ -154,6 +155,9 @@ class Tracking:
 
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
         self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
+        # What these see of the surface is not known: as soon as one of them delivers, it is time to begin anew.
+        sensors = self._rig.sensors
+        self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, PictureNoise))
         self.mesh_version += 1
 
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:

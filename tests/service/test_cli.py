@@ -95,6 +95,28 @@ def test_help_imports_no_command_and_nothing_heavy():
     assert "examples:" in done.stdout
 
 
+def test_a_command_computes_with_one_thread_unless_the_user_says_otherwise():
+    """So that as many trackers as a rig has get equal shares of the cores."""
+    program = """
+import contextlib, os, sys
+from abs_service import cli
+with contextlib.suppress(SystemExit):
+    cli.main(["--version"])
+import cv2, numpy, scipy.linalg
+numpy.ones((500, 500)) @ numpy.ones((500, 500)), scipy.linalg.inv(numpy.eye(300))
+cv2.GaussianBlur(numpy.zeros((1000, 1000), numpy.uint8), (0, 0), 3.0)
+print(cv2.getNumThreads(), len(os.listdir("/proc/self/task")), os.environ["OMP_NUM_THREADS"])
+"""
+    free = {name: value for name, value in os.environ.items() if name not in cli.THREADS}
+    free["PYTHONPATH"] = os.pathsep.join(sys.path)
+    one, three = (
+        subprocess.run([sys.executable, "-c", program], env=env, check=True, capture_output=True, text=True).stdout
+        for env in (free, free | {"OMP_NUM_THREADS": "3"})
+    )
+    assert one.splitlines()[-1] == "1 1 1"
+    assert three.splitlines()[-1].endswith(" 3")
+
+
 def test_a_reader_that_goes_away_ends_the_command_quietly(tmp_path):
     (tmp_path / "talk.py").write_text(
         "import sys, types\nfrom abs_service import cli\n"

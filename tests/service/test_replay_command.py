@@ -5,57 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
-from abs.v1.sensor_model_pb2 import SensorModel
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import cli, config
 from abs_service.exits import Exit
 from abs_service.replay import free_path
-from drivers import codec
-from drivers.device import Truth
-from drivers.mcap_file import McapFile
 from drivers.simulated.address import parse
+from tests.service.takes import WALL_NS, write_take
 
 COUNT = 20
 SIMULATION = parse("simulated://sheet?seed=1").build()
 #: Enough generations to exercise the search, few enough to be quick.
 TOML = config.to_toml(config.load_default()).replace("generations = 20", "generations = 3")
-WALL_NS = 1_700_000_000_000_000_000
 FIRST = 30  # the sheet begins to move
 
 
 def write(path: Path, *, toml: str = TOML, finish: bool = True, sensors: tuple[str, ...] = ("tof", "color")) -> Path:
-    with path.open("wb") as stream:
-        file = McapFile(stream, chunk_size=400_000)
-        if toml:
-            file.attach("rig.toml", "text/toml", toml.encode(), WALL_NS)
-        for name in sensors:
-            camera = SIMULATION.heads[name].camera
-            model = SensorModel(sensor=name, width=camera.width, height=camera.height, fx=camera.fx, fy=camera.fy)
-            model.cx, model.cy = camera.cx, camera.cy
-            model.lens.extend(camera.lens.coefficients.tolist())
-            model.T_rs.extend(camera.T_rs.ravel().tolist())
-            file.write(f"/{name}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
-        for k in range(FIRST, FIRST + COUNT):
-            frames, truth = SIMULATION.expose(k)
-            write_truth(file, truth)
-            for frame in frames:
-                if frame.sensor in sensors:
-                    wall_ns, base = WALL_NS + frame.t_host_ns, f"/{frame.sensor}/{frame.stream}"
-                    header = Header(rig="demo", seq=frame.seq)
-                    file.write(
-                        f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq
-                    )
-                    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(frame, header), wall_ns, frame.seq)
-        file.finish() if finish else file.flush()
-    return path
-
-
-def write_truth(file: McapFile, truth: Truth) -> None:
-    payload = codec.encode_truth(truth, Header(rig="demo", seq=truth.seq))
-    file.write("/sim/truth", codec.TRUTH_SCHEMA, payload, WALL_NS + truth.t_host_ns, truth.seq)
+    return write_take(path, SIMULATION, range(FIRST, FIRST + COUNT), {name: name for name in sensors}, toml, finish)
 
 
 def decoded(path: Path):

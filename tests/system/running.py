@@ -48,9 +48,9 @@ class Heard:
 class Ear:
     """A client of the rig that keeps everything that was published, images without their pixels."""
 
-    def __init__(self, endpoint: str, pattern: str = "**"):
+    def __init__(self, endpoint: str, pattern: str = "**", rig: str = "demo"):
         self.heard: list[Heard] = []
-        self._bus = _connect(endpoint)
+        self._bus = _connect(endpoint, rig)
         self._bus.subscribe(pattern, self._take)
 
     def _take(self, sample: Sample) -> None:
@@ -101,14 +101,14 @@ def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any
     return result
 
 
-def _connect(endpoint: str) -> ZenohBus:
+def _connect(endpoint: str, rig: str) -> ZenohBus:
     """A client session, as soon as the router listens."""
     for _ in range(9):
         try:
-            return ZenohBus.open("demo", endpoint, Role.CLIENT)
+            return ZenohBus.open(rig, endpoint, Role.CLIENT)
         except BusError:
             continue  # after three seconds
-    return ZenohBus.open("demo", endpoint, Role.CLIENT)
+    return ZenohBus.open(rig, endpoint, Role.CLIENT)
 
 
 def children(pid: int) -> dict[str, int]:

@@ -59,7 +59,7 @@ def stretches(theta: np.ndarray, model: FlexPad = MODEL) -> np.ndarray:
 
 def test_without_bends_the_sheet_is_flat_and_where_it_was():
     surface = MODEL.deform(MODEL.rest[None])
-    np.testing.assert_allclose(surface.vertices[0].T, MESH.vertices, atol=1e-7)
+    np.testing.assert_allclose(surface.vertices[0].T, MESH.vertices, rtol=0, atol=1e-7)
     np.testing.assert_allclose(surface.normals[0].T, np.tile(-T_RP[:3, 2], (len(PLACES), 1)), atol=1e-6)
 
 
@@ -91,6 +91,7 @@ def test_the_tables_are_as_fine_as_they_promise_and_not_much_finer(radius):
     between = bends.tabulate(places, (kappa[1:] + kappa[:-1]) / 2).astype(float)
     error = np.abs((tables[:, 1:] + tables[:, :-1]) / 2 - between)[:, :, :2].max(axis=1)
     total = np.linalg.norm(error.sum(axis=0), axis=0).max()
+    print(f"least radius {radius} m: {len(kappa)} rows, error {total * 1e3:.3f} mm")
     assert 0.2 * bends.TABLE_ERROR_M < total < bends.TABLE_ERROR_M
 
 

@@ -1,0 +1,73 @@
+"""Recordings of any simulated rig, written without processes and clocks."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from abs.v1.common_pb2 import Header
+from abs.v1.sensor_model_pb2 import SensorModel
+
+from calib.camera import Camera
+from drivers import codec
+from drivers.device import Truth
+from drivers.frame import Frame
+from drivers.mcap_file import McapFile
+from drivers.simulated.simulation import Simulation
+
+#: Wall-clock time at which the simulation starts [ns].
+WALL_NS = 1_700_000_000_000_000_000
+
+
+def write_take(
+    path: Path,
+    simulation: Simulation,
+    exposures: Iterable[int],
+    names: Mapping[str, str],
+    toml: str = "",
+    finish: bool = True,
+) -> Path:
+    """Records exposures of a simulation.
+
+    Args:
+        path: file to write.
+        simulation: what is recorded.
+        exposures: numbers of the exposures.
+        names: heads that are recorded, and what their sensors are called.
+        toml: configuration of the rig; none is attached if it is empty.
+        finish: whether the recording ends as it should.
+    """
+    with path.open("wb") as stream:
+        file = McapFile(stream, chunk_size=400_000)
+        if toml:
+            file.attach("rig.toml", "text/toml", toml.encode(), WALL_NS)
+        for head, name in names.items():
+            _write_camera(file, name, simulation.heads[head].camera)
+        for k in exposures:
+            frames, truths = simulation.frames(k), simulation.truths(k)
+            for truth in truths:
+                _write_truth(file, truth)
+            for frame in frames:
+                if frame.sensor in names:
+                    _write_frame(file, replace(frame, sensor=names[frame.sensor]))
+        file.finish() if finish else file.flush()
+    return path
+
+
+def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
+    model = SensorModel(sensor=name, width=camera.width, height=camera.height, fx=camera.fx, fy=camera.fy)
+    model.cx, model.cy = camera.cx, camera.cy
+    model.lens.extend(camera.lens.coefficients.tolist())
+    model.T_rs.extend(camera.T_rs.ravel().tolist())
+    file.write(f"/{name}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
+
+
+def _write_truth(file: McapFile, truth: Truth) -> None:
+    payload = codec.encode_truth(truth, Header(rig="demo", seq=truth.seq))
+    file.write("/sim/truth", codec.TRUTH_SCHEMA, payload, WALL_NS + truth.t_host_ns, truth.seq)
+
+
+def _write_frame(file: McapFile, frame: Frame) -> None:
+    wall_ns, base = WALL_NS + frame.t_host_ns, f"/{frame.sensor}/{frame.stream}"
+    header = Header(rig="demo", seq=frame.seq)
+    file.write(f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+    file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(frame, header), wall_ns, frame.seq)

@@ -1,0 +1,82 @@
+"""Everything that a rig file can choose runs: as `track` prepares it, and as `replay` tracks it."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from abs_service import cli, config, plugins
+from abs_service.commands import plans
+from abs_service.exits import Exit
+from abs_service.warmup import warm_up
+from calib.noise.pixel_polynomial import PixelPolynomial
+from calib.noise.region_polynomial import RegionPolynomial, blocks
+from drivers.simulated.address import parse
+from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
+from tests.service.options import OPTIONS, PACKAGES
+from tests.service.takes import write_take
+
+#: From the last moment of rest until everything moves.
+EXPOSURES = range(28, 40)
+#: Of the time-of-flight image of the options' rigs.
+WIDTH, HEIGHT = 88, 72
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the files that parts read: noise of every pixel and region, and a mask of the sheet at rest."""
+    made = tmp_path_factory.mktemp("rigs")
+    sigma = np.array(SIGMA_POLYNOMIAL)
+    domain = np.array([0.1, 5.0]), np.array([400.0, 10_000.0])
+    labels = blocks(HEIGHT, WIDTH, 16)
+    tables = np.repeat(sigma[..., None], int(labels.max()) + 1, axis=-1)
+    RegionPolynomial(labels, tables, 0 * tables, *domain).save(made / "regions.npz")
+    maps = np.tile(sigma[..., None, None], (1, 1, HEIGHT, WIDTH))
+    PixelPolynomial(maps, 0 * maps, *domain).save(made / "pixels.npz")
+    depth = parse(f"simulated://sheet?seed=3&sensors=tof&tof={WIDTH}x{HEIGHT}").build().frames(28)[0]
+    cv2.imwrite(str(made / "mask.png"), np.where(depth.si() < 1.2, 255, 0).astype(np.uint8))
+    return made
+
+
+@pytest.fixture(scope="module")
+def take(folder):
+    """Makes the recording of a rig's device, once for all rigs with the same one."""
+
+    @cache
+    def made(uri: str, heads: tuple[tuple[str, str], ...]) -> Path:
+        path = folder / f"{len(list(folder.glob('*.mcap')))}.mcap"
+        return write_take(path, parse(uri).build(), EXPOSURES, dict(heads))
+
+    return made
+
+
+def test_every_part_has_a_rig_in_which_it_runs():
+    """A new module with `Settings` belongs into `tests/service/options.py`."""
+    there = {f"{package}.{name}" for package in PACKAGES.values() for name in plugins.available(package)}
+    assert {option.module for option in OPTIONS.values()} == there
+
+
+def parts(rig):
+    """`Settings` of all exchangeable parts."""
+    tracker = rig.trackers["object"]
+    chosen = [getattr(tracker, name) for name in ("model", "region", "synthesis", "objective", "optimizer")]
+    return [*chosen, *(sensor.noise for sensor in rig.sensors.values())]
+
+
+@pytest.mark.parametrize("part", OPTIONS)
+def test_a_part_is_prepared_and_tracks_what_was_recorded(part, folder, take, tmp_path, capsys):
+    rig_file = folder / "rig.toml"
+    rig_file.write_text(OPTIONS[part].toml, encoding="utf-8")
+    rig = config.load(rig_file)
+    assert OPTIONS[part].module in {type(settings).__module__ for settings in parts(rig)}
+    warm_up(plans.noises(rig, "object"), plans.plan(rig, "object"))
+    recording = take(rig.devices["sim"].uri, tuple(rig.heads("sim").items()))
+    arguments = ["replay", recording, "--config", rig_file, "--out", tmp_path / "out.mcap", "--json"]
+    assert cli.main(list(map(str, arguments))) == Exit.OK
+    estimates = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert len(estimates) == len(EXPOSURES)
+    assert {estimate["status"] for estimate in estimates} == {"TRACKING"}
+    assert max(estimate["error_mm"] for estimate in estimates) < 6  # half a pixel of these small images

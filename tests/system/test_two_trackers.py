@@ -1,0 +1,65 @@
+"""Two trackers in one rig, each on a sheet of its own, get the same images and equal shares of the cores."""
+
+import json
+import signal
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from abs.v1.deformation_state_pb2 import DeformationState
+
+from abs_service import keys
+from tests.system.running import START_S, TRACKING, Ear, wait_until
+
+pytestmark = pytest.mark.slow
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "two_trackers.toml"
+NAMES = ("left", "right")
+#: How long both are watched [s]: some hundred estimates each.
+WATCHED_S = 15.0
+
+
+def states(ear, name):
+    """Every estimate of one tracker so far."""
+    topic = keys.state(name)
+    return [DeformationState.FromString(one.sample.payload) for one in ear.heard if one.sample.topic == topic]
+
+
+def both_track(ear):
+    return all(Counter(state.status for state in states(ear, name))[TRACKING] > 10 for name in NAMES)
+
+
+def test_both_track_their_own_sheet_equally_often(endpoint, launch, tmp_path):
+    rig_file = tmp_path / "pair.toml"
+    rig_file.write_text(f'{EXAMPLE.read_text("utf-8")}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
+    output = tmp_path / "output.jsonl"
+    with output.open("w", encoding="utf-8") as stream:
+        process = launch("run", rig_file, "--json", "--no-record", stdout=stream)
+        with Ear(endpoint, rig="pair") as ear:
+            wait_until(lambda: both_track(ear), START_S, "TRACKING of both")
+            begin = {name: len(states(ear, name)) for name in NAMES}
+            time.sleep(WATCHED_S)
+            watched = {name: states(ear, name)[begin[name] :] for name in NAMES}
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(10) == 0
+    errors: dict[str, list[float]] = {name: [] for name in NAMES}
+    for line in output.read_text("utf-8").splitlines():
+        estimate = json.loads(line)
+        errors[estimate["tracker"]].append(np.nan if estimate["error_mm"] is None else estimate["error_mm"])
+    for name in NAMES:
+        solve_ms = np.mean([state.solve_ms for state in watched[name]])
+        print(
+            f"{name}: {len(watched[name])} estimates, {solve_ms:.1f} ms each, error {np.nanmedian(errors[name]):.2f} mm"
+        )
+        assert {state.status for state in watched[name]} == {TRACKING}
+        assert np.nanmedian(errors[name]) < 2
+        assert np.nanpercentile(errors[name], 90) < 4
+    counts = [len(watched[name]) for name in NAMES]
+    assert min(counts) > WATCHED_S  # more than one in a second, on whatever machine
+    assert max(counts) <= 1.1 * min(counts)
+    centers = [
+        np.median([np.reshape(state.theta, (-1, 3)).mean(axis=0)[0] for state in watched[name]]) for name in NAMES
+    ]
+    assert centers[0] < -0.08 < 0.08 < centers[1]
