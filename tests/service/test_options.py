@@ -59,6 +59,12 @@ def test_every_part_has_a_rig_in_which_it_runs():
     assert {option.module for option in OPTIONS.values()} == there
 
 
+def test_the_readme_names_every_part():
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    rows = "".join(line for line in readme.splitlines() if line.startswith("| `"))
+    assert [option.module for option in OPTIONS.values() if f"`{option.part.partition('.')[2]}`" not in rows] == []
+
+
 def parts(rig):
     """`Settings` of all exchangeable parts."""
     tracker = rig.trackers["object"]
