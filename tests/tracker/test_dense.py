@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.dense import DenseView
+from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.texturing import lattice, paint
 from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
+from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
 from tests.tracker.scenes import CAMERA, as_surface, sheet
@@ -52,6 +54,7 @@ def test_the_z_buffer_is_what_its_definition_says(seed, step):
     ray_length = generator.uniform(1, 1.3, (12, 16)).astype(np.float32)
     samples = render(place[None], inverse_z[None], faces, ray_length, step)
     assert np.all(np.diff(samples.pixel[0]) > 0)
+    assert samples.count.tolist() == [len(samples.pixel[0])]
     found = {divmod(int(pixel), 18): i for i, pixel in enumerate(samples.pixel[0])}
     for y in range(0, 12, step):
         for x in range(0, 16, step):
@@ -64,6 +67,34 @@ def test_the_z_buffer_is_what_its_definition_says(seed, step):
                 assert samples.distance[0, i] == pytest.approx(ray_length[y, x] / near, rel=1e-4)
                 if samples.face[0, i] == face:  # where faces cross each other, either one is right
                     np.testing.assert_allclose(samples.weights[0, i], weights, atol=2e-3)
+
+
+@settings(max_examples=20)
+@given(seeds)
+def test_the_projection_is_eq_10(seed):
+    generator = np.random.default_rng(seed)
+    vertices = generator.uniform((-0.4, -0.3, -0.5), (0.5, 0.3, 1.6), (60, 3)).astype(np.float32)
+    place, inverse_z = Projection(CAMERA).project(np.ascontiguousarray(vertices.T[None]))
+    seen = np.isfinite(inverse_z[0])
+    local = pose.transform(CAMERA.T_sr, vertices)
+    inside = reference_inside(vertices)
+    assert np.all(seen[inside])
+    assert not seen[local[:, 2] <= 0].any()
+    np.testing.assert_allclose(place[0, seen], CAMERA.project(vertices)[seen], atol=2e-3)
+    np.testing.assert_allclose(inverse_z[0, seen], 1 / local[seen, 2], rtol=1e-4)
+    assert not place[0, ~seen].any()
+    low, high = -0.5, np.array([CAMERA.width, CAMERA.height]) - 0.5
+    inside = seen & np.all((place[0] >= low) & (place[0] < high), axis=1)
+    assert in_sight(place, inverse_z, (CAMERA.height, CAMERA.width))[0] == pytest.approx(np.mean(inside))
+
+
+def reference_inside(vertices: np.ndarray) -> np.ndarray:
+    """Whether points are before the camera and project into its image from within its field of view."""
+    local = pose.transform(CAMERA.T_sr, vertices)
+    pixel = CAMERA.project(vertices)
+    with np.errstate(invalid="ignore"):
+        inside = np.all((pixel >= 0) & (pixel <= (CAMERA.width - 1, CAMERA.height - 1)), axis=1)
+    return inside & (local[:, 2] > 0.05) & (np.linalg.norm(local[:, :2], axis=1) < 0.3 * local[:, 2])
 
 
 def facing(face: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -182,7 +213,7 @@ def test_the_lattice_is_linear_between_its_points(seed, detail):
     face = generator.integers(0, len(MESH.faces), (1, 30)).astype(np.int32)
     weights = generator.dirichlet((1.0, 1.0, 1.0), (1, 30)).astype(np.float32)
     weights[0, :4] = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0.5, 0.5]]
-    painted = paint(values, detail, Samples(face, np.ones_like(weights[..., 0]), face, weights))
+    painted = paint(values, detail, Samples(face, np.ones_like(weights[..., 0]), face, weights, np.array([30])))
     per_face = (detail + 1) * (detail + 2) // 2
     for s in range(30):
         corners = MESH.vertices[MESH.faces[face[0, s]]]

@@ -11,7 +11,8 @@ from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
-from abs_service.tracker.synthesis.raster import Raster, field_radius
+from abs_service.tracker.synthesis.projection import Projection, in_sight
+from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.texturing import lattice, paint
 from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
 from calib.camera import Camera
@@ -44,6 +45,7 @@ _NONE = Samples(
     np.zeros((0, 0), np.float32),
     np.zeros((0, 0), np.int32),
     np.zeros((0, 0, 3), np.float32),
+    np.zeros(0, np.int64),
 )
 
 
@@ -94,7 +96,7 @@ class DenseView:
         self._raster = Raster(camera, faces)
         self._step = step
         self._detail = detail
-        self._limit = field_radius(camera)
+        self._projection = Projection(camera)
         self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)
         self._expected = 0.0
         self._last: tuple[Surface | None, Samples, NDArray[np.float64]] = (None, _NONE, np.zeros(0))
@@ -102,7 +104,7 @@ class DenseView:
     def look(self, predicted: Surface) -> None:
         """Counts pixels; the z-buffer tells for every candidate anew what it hides of itself."""
         samples, share = self._render(predicted)
-        self._expected = np.count_nonzero(samples.pixel >= 0) / max(float(share[0]), LEAST_SHARE)
+        self._expected = float(samples.count[0]) / max(float(share[0]), LEAST_SHARE)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population; members that cover fewer pixels than others have samples of pixel −1 at the end."""
@@ -125,8 +127,7 @@ class DenseView:
         pixels explains no more of it. So covering is neither rewarded nor punished, but leaving the image is.
         """
         samples, share = self._render(surface)
-        count = np.count_nonzero(samples.pixel >= 0, axis=1)
-        mean = np.where(count > 0, costs / np.maximum(count, 1), unseen)
+        mean = np.where(samples.count > 0, costs / np.maximum(samples.count, 1), unseen)
         return self._expected * (share * mean + (1 - share) * unseen)
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
@@ -140,19 +141,8 @@ class DenseView:
         """
         last, samples, share = self._last
         if last is not surface:
-            place, inverse_z = self._project(surface)
-            inside = np.all((place >= -0.5) & (place < (self.camera.width - 0.5, self.camera.height - 0.5)), axis=-1)
-            share = np.mean(inside & np.isfinite(inverse_z), axis=1)
+            place, inverse_z = self._projection.project(surface.vertices)
+            share = in_sight(place, inverse_z, self._ray_length.shape)
             samples = render(place, inverse_z, self._faces, self._ray_length, self._step)
             self._last = (surface, samples, share)
         return samples, share
-
-    def _project(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Pixel coordinates (population, n, 2) and 1/z (population, n), NaN for what the camera cannot see."""
-        points = surface.vertices.transpose(0, 2, 1).astype(np.float64)
-        local = (points - self.camera.center) @ self.camera.T_rs[:3, :3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            aside = np.linalg.norm(local[..., :2], axis=-1) / local[..., 2]
-            seen = (local[..., 2] > 1e-6) & (aside < self._limit)
-            inverse_z = np.where(seen, 1 / local[..., 2], np.nan).astype(np.float32)
-        return np.where(seen[..., None], self.camera.project(points), 0.0).astype(np.float32), inverse_z

@@ -18,12 +18,14 @@ class Samples:
         distance: radial distance (population, m) [m].
         face: index (population, m) of the face.
         weights: of the face's three corners (population, m, 3), right in perspective.
+        count: number of samples (population,).
     """
 
     pixel: NDArray[np.int32]
     distance: NDArray[np.float32]
     face: NDArray[np.int32]
     weights: NDArray[np.float32]
+    count: NDArray[np.int64]
 
 
 def render(
@@ -43,16 +45,18 @@ def render(
         step: only every so many rows and columns.
     """
     population = len(place)
-    shape = (population, *(-(-side // step) for side in ray_length.shape))
-    nearness, face = np.zeros(shape, np.float32), np.full(shape, -1, np.int32)
-    for k in range(population):
-        _rasterize(place[k], inverse_z[k], faces, step, nearness[k], face[k])
-    most = int(np.count_nonzero(face >= 0, axis=(1, 2)).max(initial=0))
+    top, left, rows, columns = _box(place, inverse_z, ray_length.shape, step)
+    nearness = np.empty((population, rows, columns), np.float32)
+    face = np.empty((population, rows, columns), np.int32)
+    count = np.zeros(population, np.int64)
+    _rasterize(place, inverse_z, faces, step, top, left, nearness, face, count)
+    most = int(count.max(initial=0))
     samples = Samples(
         np.full((population, most), -1, np.int32),
         np.ones((population, most), np.float32),
         np.zeros((population, most), np.int32),
         np.zeros((population, most, 3), np.float32),
+        count,
     )
     _collect(
         nearness,
@@ -62,6 +66,8 @@ def render(
         faces,
         ray_length,
         step,
+        top,
+        left,
         samples.pixel,
         samples.distance,
         samples.face,
@@ -77,41 +83,75 @@ def interpolate(values: NDArray[np.float32], faces: NDArray[np.int32], samples: 
     return result
 
 
+def _box(
+    place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...], step: int
+) -> tuple[int, int, int, int]:
+    """First row and column, and number of both, in steps, of what a population covers of an image."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    _extent(place, inverse_z, low, high)
+    if high[0] < low[0]:
+        return 0, 0, 0, 0
+    most = -(-np.array(shape) // step) - 1
+    first = np.clip(np.ceil(low / step), 0, most).astype(int)
+    last = np.clip(np.floor(high / step), -1, most).astype(int)
+    return (*first.tolist(), *np.maximum(last + 1 - first, 0).tolist())
+
+
+@kernel
+def _extent(
+    place: NDArray[np.float32], inverse_z: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64]
+) -> None:
+    """Least and greatest (row, column) of all vertices that the camera can see."""
+    for k in range(place.shape[0]):
+        for v in range(place.shape[1]):
+            if not np.isnan(inverse_z[k, v]):
+                for axis in range(2):
+                    low[1 - axis] = min(low[1 - axis], place[k, v, axis])
+                    high[1 - axis] = max(high[1 - axis], place[k, v, axis])
+
+
 @kernel
 def _rasterize(
     place: NDArray[np.float32],
     inverse_z: NDArray[np.float32],
     faces: NDArray[np.int32],
     step: int,
+    top: int,
+    left: int,
     nearness: NDArray[np.float32],
     face: NDArray[np.int32],
+    count: NDArray[np.int64],
 ) -> None:
-    """Nearest face and its 1/z at every `step`-th pixel of one mesh; `nearness` begins at 0, `face` at −1."""
-    height, width = nearness.shape
-    for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if np.isnan(inverse_z[a] + inverse_z[b] + inverse_z[c]):
-            continue
-        ax, ay, bx, by = place[a, 0], place[a, 1], place[b, 0], place[b, 1]
-        cx, cy = place[c, 0], place[c, 1]
-        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0:
-            continue
-        first_row = max(int(np.ceil(min(ay, by, cy) / step)), 0)
-        last_row = min(int(np.floor(max(ay, by, cy) / step)), height - 1)
-        first_column = max(int(np.ceil(min(ax, bx, cx) / step)), 0)
-        last_column = min(int(np.floor(max(ax, bx, cx) / step)), width - 1)
-        for row in range(first_row, last_row + 1):
-            for column in range(first_column, last_column + 1):
-                x, y = np.float32(column * step), np.float32(row * step)
-                at_b = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
-                at_c = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
-                at_a = 1 - at_b - at_c
-                if at_a >= 0 and at_b >= 0 and at_c >= 0:
-                    near = at_a * inverse_z[a] + at_b * inverse_z[b] + at_c * inverse_z[c]
-                    if near > nearness[row, column]:
-                        nearness[row, column] = near
-                        face[row, column] = f
+    """Nearest face, −1 if none, and its 1/z at every `step`-th pixel from (top, left) · step on; counts the faces."""
+    height, width = nearness.shape[1:]
+    one = np.float32(1)
+    for k in range(nearness.shape[0]):
+        nearness[k] = 0
+        face[k] = -1
+        for f in range(faces.shape[0]):
+            a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+            near_a, near_b, near_c = inverse_z[k, a], inverse_z[k, b], inverse_z[k, c]
+            ax, ay = place[k, a, 0], place[k, a, 1]
+            bx, by = place[k, b, 0] - ax, place[k, b, 1] - ay
+            cx, cy = place[k, c, 0] - ax, place[k, c, 1] - ay
+            area = bx * cy - by * cx
+            if np.isnan(near_a + near_b + near_c) or area == 0:
+                continue
+            inverse = one / area
+            first_row = max(int(np.ceil((ay + min(by, cy, 0)) / step)) - top, 0)
+            last_row = min(int(np.floor((ay + max(by, cy, 0)) / step)) - top, height - 1)
+            first_column = max(int(np.ceil((ax + min(bx, cx, 0)) / step)) - left, 0)
+            last_column = min(int(np.floor((ax + max(bx, cx, 0)) / step)) - left, width - 1)
+            for row in range(first_row, last_row + 1):
+                for column in range(first_column, last_column + 1):
+                    x, y = np.float32((column + left) * step) - ax, np.float32((row + top) * step) - ay
+                    at_b, at_c = (x * cy - y * cx) * inverse, (bx * y - by * x) * inverse
+                    at_a = one - at_b - at_c
+                    near = at_a * near_a + at_b * near_b + at_c * near_c
+                    if at_a >= 0 and at_b >= 0 and at_c >= 0 and near > nearness[k, row, column]:
+                        count[k] += 1 if face[k, row, column] < 0 else 0
+                        nearness[k, row, column] = near
+                        face[k, row, column] = f
 
 
 @kernel
@@ -123,6 +163,8 @@ def _collect(
     faces: NDArray[np.int32],
     ray_length: NDArray[np.float32],
     step: int,
+    top: int,
+    left: int,
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
     index: NDArray[np.int32],
@@ -142,13 +184,14 @@ def _collect(
                 ax, ay = place[k, a, 0], place[k, a, 1]
                 bx, by = place[k, b, 0] - ax, place[k, b, 1] - ay
                 cx, cy = place[k, c, 0] - ax, place[k, c, 1] - ay
-                x, y = np.float32(column * step) - ax, np.float32(row * step) - ay
+                y, x = (row + top) * step, (column + left) * step
+                right, down = np.float32(x) - ax, np.float32(y) - ay
                 area = bx * cy - by * cx
-                at_b, at_c = (x * cy - y * cx) / area, (bx * y - by * x) / area
+                at_b, at_c = (right * cy - down * cx) / area, (bx * down - by * right) / area
                 z = 1 / nearness[k, row, column]
                 # The image's y axis points down: faces that turn clockwise in it show their front.
-                pixel[k, i] = (row * step + 1) * stride + column * step + 1 if area < 0 else 0
-                distance[k, i] = ray_length[row * step, column * step] * z
+                pixel[k, i] = (y + 1) * stride + x + 1 if area < 0 else 0
+                distance[k, i] = ray_length[y, x] * z
                 index[k, i] = f
                 weights[k, i, 0] = (1 - at_b - at_c) * inverse_z[k, a] * z
                 weights[k, i, 1] = at_b * inverse_z[k, b] * z

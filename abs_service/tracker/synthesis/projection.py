@@ -1,0 +1,81 @@
+"""Where the vertices of a population are in one camera's image."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.raster import field_radius
+from calib.camera import Camera
+from calib.jit import kernel
+
+
+class Projection:
+    """Eq. 10 for populations, in single precision."""
+
+    def __init__(self, camera: Camera):
+        self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+        self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+        self._lens = camera.lens.coefficients.astype(np.float32)
+        self._limit = field_radius(camera) ** 2
+
+    def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
+
+        What the camera cannot see, beside its field of view or behind it, has the coordinates 0 and the 1/z NaN.
+        """
+        population, _, n = vertices.shape
+        place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
+        _project(vertices, self._pose, self._matrix, self._lens, self._limit, place, inverse_z)
+        return place, inverse_z
+
+
+def in_sight(place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Share (population,) of projected vertices that are within an image of a shape (height, width)."""
+    count = np.zeros(len(place), np.int64)
+    _count_inside(place, inverse_z, shape[0], shape[1], count)
+    return count / place.shape[1]
+
+
+@kernel
+def _count_inside(
+    place: NDArray[np.float32], inverse_z: NDArray[np.float32], height: int, width: int, count: NDArray[np.int64]
+) -> None:
+    """Vertices of every member that the camera can see and that fall into its image."""
+    half = np.float32(0.5)
+    right, bottom = np.float32(width) - half, np.float32(height) - half
+    for k in range(place.shape[0]):
+        for v in range(place.shape[1]):
+            x, y = place[k, v, 0], place[k, v, 1]
+            inside = x >= -half and x < right and y >= -half and y < bottom
+            count[k] += 1 if inside and not np.isnan(inverse_z[k, v]) else 0
+
+
+@kernel
+def _project(
+    vertices: NDArray[np.float32],
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+) -> None:
+    """Eq. 10; pose (3, 4) = T_sr, limit of r²."""
+    one, two, farthest = np.float32(1), np.float32(2), np.float32(limit)
+    fx, fy, cx, cy = matrix
+    k1, k2, p1, p2, k3, k4, k5, k6 = lens
+    for k in range(vertices.shape[0]):
+        for v in range(vertices.shape[2]):
+            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
+            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
+            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
+            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
+            inverse = one / z
+            u, w = x * inverse, y * inverse
+            r2 = u * u + w * w
+            radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
+            seen = z > np.float32(1e-6) and r2 < farthest
+            column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx
+            row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy
+            place[k, v, 0] = column if seen else np.float32(0)
+            place[k, v, 1] = row if seen else np.float32(0)
+            inverse_z[k, v] = inverse if seen else np.float32(np.nan)
