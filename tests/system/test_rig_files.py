@@ -13,7 +13,7 @@ from abs_service import config
 from drivers.replay import Recording
 from drivers.simulated.address import parse
 from tests.service.takes import write_take
-from tests.system.running import START_S, abs_service
+from tests.system.running import START_S, abs_service, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -98,10 +98,12 @@ def test_it_tracks_images_that_were_imported(example, tmp_path):
     assert max(one["error_mm"] for one in estimates) < 4
 
 
-def test_it_records_without_tracking(example, tmp_path):
+def test_it_records_without_tracking(example, launch, tmp_path):
     folder = tmp_path / "takes"
-    done = abs_service("run", example("record_only"), "--duration", 6, "--out", folder)
-    assert done.returncode == 0, done.stderr
+    process = launch("run", example("record_only"), "--out", folder)
+    wait_until(lambda: sum(path.stat().st_size for path in folder.glob("*")) > 1e7, START_S, "a growing file")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
     (path,) = folder.glob("*.mcap")
     counts = Recording(path).counts
-    assert min(counts["tof", "depth"], counts["color", "color"]) > 30
+    assert min(counts["tof", "depth"], counts["color", "color"]) > 10

@@ -50,6 +50,17 @@ def test_the_shape_deforms_and_then_moves_about_the_centroid(seed):
     np.testing.assert_allclose(surface.normals[0].T, shape.normals[0].T @ R.T, atol=1e-6)
 
 
+@given(seeds)
+def test_a_pose_changes_no_lengths(seed):
+    generator = np.random.default_rng(seed)
+    theta = MODEL.rest + generator.normal(0, 0.01, 54)
+    theta[:6] = generator.uniform(-1, 1, 6)
+    (i, j), posed_at = MODEL.mesh.edges.T, MODEL.deform(theta[None]).vertices[0].T.astype(float)
+    shape = SHAPE.deform(theta[None, 6:]).vertices[0].T.astype(float)
+    lengths, expected = (np.linalg.norm(v[i] - v[j], axis=1) for v in (posed_at, shape))
+    np.testing.assert_allclose(lengths, expected, rtol=0, atol=2e-6)
+
+
 def test_at_rest_it_is_the_shape_at_rest():
     surface = MODEL.deform(MODEL.rest[None])
     np.testing.assert_allclose(surface.vertices[0].T, SHAPE.mesh.vertices, rtol=0, atol=1e-7)
