@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from abs.v1 import common_pb2, deformation_state_pb2, deformed_mesh_pb2
+from numpy.typing import NDArray
 
 from abs_service.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
@@ -90,7 +91,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         mesh_version=identity.mesh_version,
         inlier_share=estimate.inlier_share,
         covariance=estimate.covariance[np.triu_indices(len(estimate.theta))].tolist(),
-        covariance_valid=estimate.status in (Status.TRACKING, Status.DEGRADED),
+        covariance_valid=_is_known(estimate),
         samples=sum(fit.samples for fit in estimate.fits),
         clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
     )
@@ -119,6 +120,7 @@ def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> d
         tracker=identity.tracker,
         mesh_version=identity.mesh_version,
         vertices_f32=estimate.vertices.astype("<f4").tobytes(),
+        covariance_f32=_upper(estimate.vertex_covariance) if _is_known(estimate) else b"",
     )
 
 
@@ -134,3 +136,14 @@ def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) ->
         faces_u32=undeformed.faces.astype("<u4").tobytes(),
         colors_u8=colors,
     )
+
+
+def _is_known(estimate: Estimate) -> bool:
+    """Whether the covariances say anything: what is lost has a curvature like everything else."""
+    return estimate.status in (Status.TRACKING, Status.DEGRADED)
+
+
+def _upper(covariance: NDArray[np.float64]) -> bytes:
+    """The six different entries of symmetric matrices (n, 3, 3), row by row."""
+    rows, columns = np.triu_indices(3)
+    return covariance[:, rows, columns].astype("<f4").tobytes()

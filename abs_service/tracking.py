@@ -194,6 +194,7 @@ def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimat
         theta=np.zeros(0),
         covariance=np.zeros((0, 0)),
         vertices=np.zeros((0, 3), np.float32),
+        vertex_covariance=np.zeros((0, 3, 3)),
         cost=float("nan"),
         deviation=float("nan"),
         generations=0,

@@ -30,9 +30,11 @@ class Estimate:
         status: how far to trust it.
         reasons: why it is not TRACKING, in plain words.
         theta: parameters (dim,) of the model; empty while INITIALIZING.
-        covariance: of theta (dim, dim), the inverse curvature of the cost where the search began; an approximation that
-            trusts the noise models and knows nothing of other minima.
+        covariance: of theta (dim, dim), the inverse curvature of the cost at theta; an approximation that trusts the
+            noise models and knows nothing of other minima.
         vertices: deformed mesh (n, 3) [m] in the rig's frame.
+        vertex_covariance: of every vertex around its material point (n, 3, 3) [m²]: what is unknown of theta, and what
+            was unknown of the mesh when it was made.
         cost: negative logarithm of likelihood times priors at theta, up to constants.
         deviation: step size of the search when it ended.
         generations, evaluations: effort of the search.
@@ -49,6 +51,7 @@ class Estimate:
     theta: NDArray[np.float64]
     covariance: NDArray[np.float64]
     vertices: NDArray[np.float32]
+    vertex_covariance: NDArray[np.float64]
     cost: float
     deviation: float
     generations: int

@@ -1,5 +1,7 @@
 """The mesh of an object of unknown shape: a grid laid over it in the depth image."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +42,7 @@ def grid_mesh(sighting: Sighting) -> Mesh:
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
-    at_grid = _local_planes(pixels, distance, 0.75 * spacing)
+    at_grid, deviation = _local_planes(pixels, distance, 0.75 * spacing)
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
     faces = _without_jumps(positions, triangles(place))
@@ -53,7 +55,9 @@ def grid_mesh(sighting: Sighting) -> Mesh:
     position_of = np.full(rows * columns, -1, np.int32)
     position_of[used] = np.arange(len(used), dtype=np.int32)
     unknown = np.full((len(used), 3), np.nan, np.float32)
-    return Mesh(positions[used], position_of[faces], unknown, chart[used])
+    mesh = Mesh(positions[used], position_of[faces], unknown, chart[used])
+    sight = (positions[used] - camera.center) / at_grid[used, None]
+    return replace(mesh, deviation=deviation[used] * np.abs(np.einsum("ni,ni->n", mesh.normals, sight)))
 
 
 def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
@@ -70,12 +74,19 @@ def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
     return np.asarray(center) + across[None, :, None] * right + along[:, None, None] * down
 
 
-def _local_planes(pixels: NDArray[np.float64], distance: NDArray[np.float32], radius: float) -> NDArray[np.float64]:
-    """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each; NaN where the object is not."""
+def _local_planes(
+    pixels: NDArray[np.float64], distance: NDArray[np.float32], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each, and its standard deviation [m].
+
+    Both are NaN where the object is not. How far a single pixel deviates is told from the residuals of all planes
+    together, because one plane alone may have no more pixels than coefficients.
+    """
     height, width = distance.shape
     reach = int(np.ceil(radius))
     steps = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
-    result = np.full(len(pixels), np.nan)
+    result, share = np.full((2, len(pixels)), np.nan)
+    squares, freedom = 0.0, 0
     for g, pixel in enumerate(pixels):
         around = np.floor(pixel + 0.5).astype(int) + steps
         around = around[np.linalg.norm(around - pixel, axis=1) <= max(radius, 1.0)]
@@ -86,8 +97,12 @@ def _local_planes(pixels: NDArray[np.float64], distance: NDArray[np.float32], ra
         if np.count_nonzero(near) < max(LEAST_COVER * len(around), 3):
             continue
         plane = np.column_stack([np.ones(np.count_nonzero(near)), around[near] - pixel])
-        result[g] = np.linalg.lstsq(plane, values[near], rcond=None)[0][0]
-    return result
+        inverse = np.linalg.pinv(plane)
+        fitted = inverse @ values[near]
+        result[g], share[g] = fitted[0], np.linalg.norm(inverse[0])
+        squares += float(np.sum((values[near] - plane @ fitted) ** 2))
+        freedom += len(plane) - 3
+    return result, share * np.sqrt(squares / max(freedom, 1))
 
 
 def triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -20,6 +20,8 @@ class Mesh:
         appearance: what sensors that make pictures see, by sensor, (k, channels) in the sensor's unit; for those with a
             light of their own, per unit of light. On the points that the synthesis asks for, mostly the vertices; NaN
             where unknown.
+        deviation: standard deviation (n,) [m] of the vertices along their normals, from the noise of the measurement
+            that they were made from; one number () if it is the same for all.
     """
 
     vertices: NDArray[np.float64]
@@ -27,6 +29,7 @@ class Mesh:
     colors: NDArray[np.float32]
     chart: NDArray[np.float64]
     appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(()))
 
     def looks(self, sensor: str) -> NDArray[np.float32]:
         """What a sensor sees on the points of its synthesis: the vertices' colours if nothing else is known."""
@@ -60,4 +63,7 @@ class Mesh:
         place = np.empty(len(order), np.int32)
         place[order] = np.arange(len(order), dtype=np.int32)
         appearance = {sensor: values[order] for sensor, values in self.appearance.items()}
-        return Mesh(self.vertices[order], place[self.faces], self.colors[order], self.chart[order], appearance)
+        deviation = np.broadcast_to(self.deviation, len(order))[order]
+        return Mesh(
+            self.vertices[order], place[self.faces], self.colors[order], self.chart[order], appearance, deviation
+        )

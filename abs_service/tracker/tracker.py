@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
-from abs_service.tracker import status
+from abs_service.tracker import status, uncertainty
 from abs_service.tracker.curvature import newton_step, search_metric, vertex_jacobian
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
-from abs_service.tracker.terms.base import SensorFit, stack
+from abs_service.tracker.terms.base import Linearization, SensorFit, stack
 
 
 class Tracker:
@@ -56,21 +56,25 @@ class Tracker:
             evaluations += len(candidates)
         theta = self._better(start, start + metric @ self._optimizer.mean)
         self._motion.update(theta)
-        return self._estimate(observation, theta, metric @ metric.T, generations, evaluations)
+        return self._estimate(observation, theta, generations, evaluations)
 
     def _start(self, predicted: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Where the search begins, the prediction or a Newton step from it, and the metric of its coordinates."""
-        surface, jacobian = self.model.deform(predicted[None]), vertex_jacobian(self.model, predicted)
-        parts = [
-            self._objective.linearize(surface, jacobian),
-            self._stretch.linearize(surface, jacobian),
-            self._shape.linearize(predicted),
-            self._motion.linearize(),
-        ]
-        linear = stack(parts, len(predicted))
+        linear = self._linearize(predicted)
         metric = search_metric(linear.jacobian)
         step = newton_step(linear, metric)
         return self._better(predicted, predicted + step / 2, predicted + step), metric
+
+    def _linearize(self, theta: NDArray[np.float64]) -> Linearization:
+        """Likelihood and priors around theta (dim,); the motion's residuals are those of the prediction."""
+        surface, jacobian = self.model.deform(theta[None]), vertex_jacobian(self.model, theta)
+        parts = [
+            self._objective.linearize(surface, jacobian),
+            self._stretch.linearize(surface, jacobian),
+            self._shape.linearize(theta),
+            self._motion.linearize(),
+        ]
+        return stack(parts, len(theta))
 
     def _better(self, *thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """The parameters (dim,) of least cost."""
@@ -86,11 +90,12 @@ class Tracker:
         self,
         observation: Observation,
         theta: NDArray[np.float64],
-        covariance: NDArray[np.float64],
         generations: int,
         evaluations: int,
     ) -> Estimate:
         surface = self.model.deform(theta[None])
+        metric = search_metric(self._linearize(theta).jacobian)
+        covariance = metric @ metric.T
         fits = tuple(self._objective.fits(surface))
         share = _inlier_share(fits)
         verdict, reasons = status.judge(share, _hidden_share(fits), observation.missing, self._verdict)
@@ -102,6 +107,7 @@ class Tracker:
             theta=theta,
             covariance=covariance,
             vertices=np.ascontiguousarray(surface.vertices[0].T),
+            vertex_covariance=uncertainty.of_vertices(self.model, theta, surface, covariance),
             cost=float(self._cost(theta[None])[0]),
             deviation=self._optimizer.deviation,
             generations=generations,

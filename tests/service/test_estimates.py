@@ -21,6 +21,7 @@ ESTIMATE = Estimate(
     theta=np.array([1.0, 2.0, 3.0]),
     covariance=np.array([[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]]),
     vertices=np.arange(6, dtype=np.float32).reshape(2, 3),
+    vertex_covariance=np.array([[[1.0, 2, 3], [2, 4, 5], [3, 5, 6]], [[7.0, 0, 0], [0, 8, 0], [0, 0, 9]]]),
     cost=12.5,
     deviation=0.5,
     generations=3,
@@ -45,6 +46,14 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
 def test_the_covariance_of_what_is_not_tracked_says_nothing(status):
     lost = replace(ESTIMATE, status=status)
     assert not estimates.state(Header(), lost, IDENTITY, Effort(1.0, 2.0, 0, {})).covariance_valid
+    assert estimates.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
+
+
+def test_the_covariance_of_every_vertex_travels_as_its_six_different_entries():
+    sent = estimates.mesh(Header(), ESTIMATE, IDENTITY)
+    entries = np.frombuffer(sent.covariance_f32, "<f4").reshape(-1, 6)
+    matrices = entries[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    np.testing.assert_array_equal(matrices, ESTIMATE.vertex_covariance)
 
 
 def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():

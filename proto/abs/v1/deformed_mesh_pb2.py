@@ -25,15 +25,15 @@ _sym_db = _symbol_database.Default()
 from abs.v1 import common_pb2 as abs_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1a\x61\x62s/v1/deformed_mesh.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"k\n\x0c\x44\x65\x66ormedMesh\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x14\n\x0cvertices_f32\x18\x04 \x01(\x0c\"\x96\x01\n\x0cMeshTopology\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x19\n\x11rest_vertices_f32\x18\x04 \x01(\x0c\x12\x11\n\tfaces_u32\x18\x05 \x01(\x0c\x12\x11\n\tcolors_u8\x18\x06 \x01(\x0c\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1a\x61\x62s/v1/deformed_mesh.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"\x83\x01\n\x0c\x44\x65\x66ormedMesh\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x14\n\x0cvertices_f32\x18\x04 \x01(\x0c\x12\x16\n\x0e\x63ovariance_f32\x18\x05 \x01(\x0c\"\x96\x01\n\x0cMeshTopology\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\x12\x14\n\x0cmesh_version\x18\x03 \x01(\x04\x12\x19\n\x11rest_vertices_f32\x18\x04 \x01(\x0c\x12\x11\n\tfaces_u32\x18\x05 \x01(\x0c\x12\x11\n\tcolors_u8\x18\x06 \x01(\x0c\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'abs.v1.deformed_mesh_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_DEFORMEDMESH']._serialized_start=59
-  _globals['_DEFORMEDMESH']._serialized_end=166
-  _globals['_MESHTOPOLOGY']._serialized_start=169
-  _globals['_MESHTOPOLOGY']._serialized_end=319
+  _globals['_DEFORMEDMESH']._serialized_start=60
+  _globals['_DEFORMEDMESH']._serialized_end=191
+  _globals['_MESHTOPOLOGY']._serialized_start=194
+  _globals['_MESHTOPOLOGY']._serialized_end=344
 # @@protoc_insertion_point(module_scope)

@@ -1,0 +1,86 @@
+"""How well vertices are known: exact where everything is linear, calibrated where it is not."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from abs_service.tracker import uncertainty
+from abs_service.tracker.curvature import search_metric
+from abs_service.tracker.grid import grid_mesh
+from abs_service.tracker.models import nurbs
+from abs_service.tracker.sighting import Sighting
+from tests.tracker.scenes import CAMERA, plane_distance, sheet
+from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@given(SEEDS)
+def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
+    """y = JΘ + noise of known deviation, solved by least squares: the covariance is that of the solutions."""
+    generator = np.random.default_rng(seed)
+    rows = generator.standard_normal((12, 4))
+    metric = search_metric(rows)
+    jacobian = generator.standard_normal((5, 3, 4))
+    found = uncertainty.propagated(jacobian, metric @ metric.T)
+    solutions = jacobian @ np.linalg.pinv(rows)  # what unit noise of every measurement does to a vertex
+    np.testing.assert_allclose(found, solutions @ solutions.transpose(0, 2, 1), rtol=1e-6, atol=1e-9 * found.max())
+
+
+@given(SEEDS)
+def test_covariances_are_those_of_the_definition(seed):
+    generator = np.random.default_rng(seed)
+    jacobian, normals = generator.standard_normal((7, 3, 6)), generator.standard_normal((7, 3))
+    deviation, half = generator.uniform(0, 1, 7), generator.standard_normal((6, 6))
+    found = uncertainty.propagated(jacobian, half @ half.T) + uncertainty.along(normals, deviation)
+    for v in range(7):
+        expected = jacobian[v] @ half @ half.T @ jacobian[v].T + deviation[v] ** 2 * np.outer(normals[v], normals[v])
+        np.testing.assert_allclose(found[v], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_a_mesh_that_is_exact_adds_nothing():
+    assert not uncertainty.along(np.eye(3), np.zeros(())).any()
+
+
+def test_what_the_mesh_did_not_know_stays_with_its_vertices_when_they_are_sorted():
+    mesh = sheet()
+    model = nurbs.Settings().of_mesh(mesh)
+    assert model.mesh.deviation.shape == (len(mesh.vertices),)
+    order = np.random.default_rng(0).permutation(len(mesh.vertices))
+    known = type(mesh)(mesh.vertices, mesh.faces, mesh.colors, mesh.chart, deviation=mesh.vertices[:, 0])
+    np.testing.assert_array_equal(known.reordered(order).deviation, mesh.vertices[order, 0])
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.6])
+def test_a_mesh_knows_how_far_noise_put_its_vertices_from_the_surface(tilt):
+    normal = np.array([np.sin(tilt), 0.0, np.cos(tilt)])
+    true = plane_distance(CAMERA, normal, float(normal @ [0.0, 0.0, 1.0]))
+    far, said = [], []
+    for seed in range(6):
+        noise = np.random.default_rng(seed).normal(0, 4e-3, true.shape)
+        mesh = grid_mesh(Sighting((true + noise).astype(np.float32), CAMERA, 150))
+        far.append((mesh.vertices @ normal - normal @ [0.0, 0.0, 1.0]) ** 2)
+        said.append(mesh.deviation**2)
+    scatter, expected = np.sqrt(np.mean(np.concatenate(far))), np.sqrt(np.mean(np.concatenate(said)))
+    assert scatter == pytest.approx(expected, rel=0.12)
+    assert 0.2e-3 < expected < 2e-3
+
+
+def test_estimates_say_how_well_each_vertex_is_known():
+    *_, step = drive(tracking(), SHEET, MOVING)
+    covariance = step.estimate.vertex_covariance
+    assert covariance.shape == (len(step.estimate.vertices), 3, 3)
+    np.testing.assert_allclose(covariance, covariance.transpose(0, 2, 1), rtol=1e-6, atol=1e-15)
+    assert np.linalg.eigvalsh(covariance).min() > 0
+    assert 0.5e-3 < np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) < 5e-3
+
+
+def test_without_color_it_is_unknown_where_along_the_sheet_a_vertex_is():
+    def depth_only(k, frames):
+        return [frame for frame in frames if frame.sensor == "tof"]
+
+    *_, both = drive(tracking(), SHEET, MOVING)
+    *_, alone = drive(tracking(), SHEET, MOVING, depth_only)
+    spread = [np.linalg.eigvalsh(step.estimate.vertex_covariance).mean(axis=0) for step in (both, alone)]
+    assert spread[1][2] > 4 * spread[0][2]
