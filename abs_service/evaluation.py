@@ -1,4 +1,4 @@
-"""How far a tracked mesh is from the surface that really was there."""
+"""How far a tracked mesh is from the surface that really was there, and how far it says it might be."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -71,6 +71,16 @@ class TruthComparison:
             self._material = _nearest(self._rest[1], self._truths[self._rest[0]])
         surface, places = self._material or (0, np.empty((0, 2)))
         return self._truths.get(t_host_ns, {}).get(surface) if self._material else None, places
+
+
+def expected_mm(covariance_f32: bytes) -> float | None:
+    """What a mesh's own covariances say of its vertex errors: their root mean square [mm]; None where they say nothing.
+
+    Args:
+        covariance_f32: six numbers [m²] per vertex, as in `DeformedMesh`.
+    """
+    entries = np.frombuffer(covariance_f32, "<f4").reshape(-1, 6)
+    return float(np.sqrt(entries[:, [0, 3, 5]].sum(axis=1).mean()) * 1e3) if len(entries) else None
 
 
 def closest_points(vertices: NDArray[np.floating], grid: Grid) -> NDArray[np.float64]:

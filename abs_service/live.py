@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from abs_service import keys
 from abs_service.bus.contract import Sample
-from abs_service.evaluation import TruthComparison
+from abs_service.evaluation import TruthComparison, expected_mm
 
 #: The topics that `Live.take` understands.
 PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.truth("*"))
@@ -35,6 +35,7 @@ class Report:
         theta: parameters of the deformation, SI units.
         error_mm: mean distance of the vertices from where they truly are [mm].
         surface_mm: mean distance of the vertices from the true surface [mm].
+        vertex_sigma_mm: root mean square of the vertex errors that the tracker expects [mm]; needs no truth.
         solve_ms: from the frame set to theta [ms].
         age_ms: from the exposure to the publication [ms]; None offline.
         generations, evaluations: what the search needed.
@@ -49,6 +50,7 @@ class Report:
     theta: tuple[float, ...]
     error_mm: float | None
     surface_mm: float | None
+    vertex_sigma_mm: float | None
     solve_ms: float
     age_ms: float | None
     generations: int
@@ -104,7 +106,7 @@ class TrackerLog:
     def take_state(self, state: DeformationState) -> Iterator[Report]:
         """Takes an estimate; it is reported when its mesh has come, or at the latest with the next estimate."""
         if self._pending is not None:
-            yield self._report(self._pending, None)
+            yield self._report(self._pending, DeformedMesh())
         self._pending = state
         self.seen_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
         yield from self._pair()
@@ -118,7 +120,7 @@ class TrackerLog:
         state, mesh = self._pending, self._mesh
         if state is not None and mesh is not None and state.header.t_host_ns == mesh.header.t_host_ns:
             self._pending = self._mesh = None
-            yield self._report(state, _points(mesh.vertices_f32))
+            yield self._report(state, mesh)
 
     def summary(self) -> list[str]:
         """What it did so far, in a line or two."""
@@ -135,8 +137,8 @@ class TrackerLog:
             f"surface error mean {surface.mean:.2f} mm, max {surface.max:.2f} mm",
         ]
 
-    def _report(self, state: DeformationState, vertices: NDArray[np.float32] | None) -> Report:
-        errors = None if vertices is None else self.truth.compare(state.header.t_host_ns, vertices)
+    def _report(self, state: DeformationState, mesh: DeformedMesh) -> Report:
+        errors = self.truth.compare(state.header.t_host_ns, _points(mesh.vertices_f32))
         report = Report(
             tracker=state.tracker,
             seq=state.header.seq,
@@ -146,6 +148,7 @@ class TrackerLog:
             theta=tuple(state.theta),
             error_mm=errors.vertex_mm if errors else None,
             surface_mm=errors.surface_mm if errors else None,
+            vertex_sigma_mm=expected_mm(mesh.covariance_f32),
             solve_ms=state.solve_ms,
             age_ms=None if math.isnan(state.age_ms) else state.age_ms,
             generations=state.generations,

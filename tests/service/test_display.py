@@ -29,6 +29,7 @@ def report(**changes):
             "theta": tuple(0.125 * i for i in range(48)),
             "error_mm": 2.345,
             "surface_mm": 0.987,
+            "vertex_sigma_mm": 2.5,
             "solve_ms": 17.3,
             "age_ms": 45.2,
             "generations": 20,

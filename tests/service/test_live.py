@@ -86,6 +86,18 @@ def test_without_truth_the_error_is_not_known(live):
     assert math.isnan(live.trackers["sheet"].error_mm.mean)
 
 
+def test_the_error_that_the_tracker_expects_needs_no_truth(live):
+    message = DeformedMesh(tracker="sheet", vertices_f32=grid(1.0).tobytes())
+    message.header.t_host_ns = 2
+    message.covariance_f32 = (
+        np.tile([4e-6, 1e-6, 1e-6, 4e-6, 1e-6, 1e-6], (grid(1.0).size // 3, 1)).astype("<f4").tobytes()
+    )
+    (report,) = take(live, state(2, 1), sample("sheet/mesh", message))
+    assert report.vertex_sigma_mm == pytest.approx(3.0)
+    (report,) = take(live, state(3, 2), mesh(3))
+    assert report.vertex_sigma_mm is None
+
+
 def test_totals_are_kept_over_all_estimates(live):
     take(live, truth(1), topology(1))
     for t in (2, 3, 4):

@@ -10,6 +10,7 @@ from abs_service.tracker.curvature import search_metric
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.sighting import Sighting
+from tests.evaluation.posterior import coverage
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
 from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
 
@@ -84,3 +85,20 @@ def test_without_color_it_is_unknown_where_along_the_sheet_a_vertex_is():
     *_, alone = drive(tracking(), SHEET, MOVING, depth_only)
     spread = [np.linalg.eigvalsh(step.estimate.vertex_covariance).mean(axis=0) for step in (both, alone)]
     assert spread[1][2] > 4 * spread[0][2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [11, 12, 13])
+def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be(seed):
+    found = coverage(f"simulated://sheet?seed={seed}", 120)
+    print(f"seed {seed}: {found}")
+    assert 0.9 <= found.vertices <= 0.99
+    assert 0.9 <= found.sensed <= 0.99
+    assert found.directions > 12
+    assert found.theta >= 0.9  # cautious: where the priors speak alone, they allow more than this sheet does
+    assert found.said_mm == pytest.approx(found.true_mm, rel=0.15)
+
+
+def test_a_vertex_without_the_noise_of_its_mesh_would_claim_too_much():
+    found = coverage("simulated://sheet?seed=14", 8)
+    assert found.bare < 0.92 < found.vertices
