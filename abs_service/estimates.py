@@ -1,7 +1,7 @@
 """What a tracker tells the world: its estimates and its mesh as messages."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from abs_service.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.optimizers.base import Stop
 
 State = deformation_state_pb2.DeformationState
 
@@ -23,6 +24,13 @@ _STATUS = {
     Status.TRACKING: State.STATUS_TRACKING,
     Status.DEGRADED: State.STATUS_DEGRADED,
     Status.LOST: State.STATUS_LOST,
+}
+_STOP = {
+    Stop.NOTHING: State.STOP_UNSPECIFIED,
+    Stop.CONVERGED: State.STOP_CONVERGED,
+    Stop.GENERATIONS: State.STOP_GENERATIONS,
+    Stop.EVALUATIONS: State.STOP_EVALUATIONS,
+    Stop.TIME: State.STOP_TIME,
 }
 
 
@@ -51,12 +59,14 @@ class Effort:
 
     Attributes:
         solve_ms: time from frame set to Θ [ms].
+        budget_ms: time that the search was allowed [ms]; 0 if it was in no hurry.
         age_ms: time from exposure to now [ms].
         skipped: frame sets passed over since the last estimate.
         dropped: frames so far that are in no estimate, by sensor.
     """
 
     solve_ms: float
+    budget_ms: float
     age_ms: float
     skipped: int
     dropped: Mapping[str, int]
@@ -72,7 +82,7 @@ def with_mesh(identity: Identity, mesh: Mesh, version: int) -> Identity:
 
 def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
     """An estimate as a message."""
-    message = State(
+    return State(
         header=header,
         tracker=identity.tracker,
         status=_STATUS[estimate.status],
@@ -85,6 +95,10 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         search_deviation=estimate.deviation,
         generations=estimate.generations,
         evaluations=estimate.evaluations,
+        searcher=estimate.searcher,
+        stop=_STOP[estimate.stop],
+        budget_evaluations=estimate.budget,
+        budget_ms=effort.budget_ms,
         solve_ms=effort.solve_ms,
         age_ms=effort.age_ms,
         skipped=effort.skipped,
@@ -94,10 +108,15 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         covariance_valid=_is_known(estimate),
         samples=sum(fit.samples for fit in estimate.fits),
         clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
+        sensors=_sensors(estimate, effort.dropped),
     )
+
+
+def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.Sensor]:
+    """How every sensor contributed, and which ones did not."""
     for fit in estimate.fits:
         source = estimate.sources.get(fit.sensor, Source(0, 0))
-        message.sensors.add(
+        yield State.Sensor(
             sensor=fit.sensor,
             seq=source.seq,
             t_host_ns=source.t_host_ns,
@@ -106,11 +125,10 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
             hidden=fit.hidden,
             mean_log_likelihood=fit.mean_log_likelihood,
             normalized_residual=fit.normalized_residual,
-            dropped=effort.dropped.get(fit.sensor, 0),
+            dropped=dropped.get(fit.sensor, 0),
         )
     for sensor in estimate.missing:
-        message.sensors.add(sensor=sensor, missing=True, dropped=effort.dropped.get(sensor, 0))
-    return message
+        yield State.Sensor(sensor=sensor, missing=True, dropped=dropped.get(sensor, 0))
 
 
 def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> deformed_mesh_pb2.DeformedMesh:

@@ -19,6 +19,8 @@ from drivers.replay import Recording
 
 #: Offline there is no exposure to be late for.
 NO_AGE = float("nan")
+#: And no time that the search must not exceed.
+NO_BUDGET_MS = 0.0
 
 
 class OfflineTracker:
@@ -78,7 +80,7 @@ class OfflineTracker:
         solve_ms = (self._clock() - begin_ns) * 1e-6
         self._write_new_topology()
         header = self._speaker.header(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
-        state = estimates.state(header, estimate, self._identity, Effort(solve_ms, NO_AGE, 0, {}))
+        state = estimates.state(header, estimate, self._identity, Effort(solve_ms, NO_BUDGET_MS, NO_AGE, 0, {}))
         mesh = estimates.mesh(header, estimate, self._identity)
         self._write(keys.state(self._name), estimates.STATE, state, estimate)
         self._write(keys.mesh(self._name), estimates.MESH, mesh, estimate)

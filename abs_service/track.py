@@ -148,7 +148,8 @@ class LiveTracker:
         skipped = self._sets.skipped - self._reported
         self._reported = self._sets.skipped
         age_ms = (self._clock() - estimate.t_host_ns) * 1e-6
-        self._publisher.publish(estimate, self._tracking, Effort(solve_ms, age_ms, skipped, self._sets.dropped))
+        effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, skipped, self._sets.dropped)
+        self._publisher.publish(estimate, self._tracking, effort)
         self._report(estimate, solve_ms)
 
     def report(self) -> None:

@@ -15,7 +15,8 @@ from abs_service.tracker.initialization import sight
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.objectives.base import Objective
-from abs_service.tracker.optimizers.base import Optimizer
+from abs_service.tracker.optimizers.base import Optimizer, Stop
+from abs_service.tracker.posterior import Posterior
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.regions.base import Region
 from abs_service.tracker.sighting import Sighting, SightingError
@@ -77,6 +78,7 @@ class Plan:
     Attributes:
         reference: sensor whose depth image gives the initial mesh.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
+        evaluations: how often a frame may compute the cost of a candidate.
         vertices: about how many vertices the mesh is to have.
         priors, status, reinitialization: settings of the fixed parts.
         seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
@@ -88,6 +90,7 @@ class Plan:
     synthesis: SynthesisSettings
     objective: ObjectiveSettings
     optimizer: OptimizerSettings
+    evaluations: int
     vertices: int
     priors: priors.Settings
     status: status.Settings
@@ -168,15 +171,15 @@ class Tracking:
             dressed(model.mesh, observation.images, self._rig),
             appearance=dressed(synthesizer.canvas, observation.images, self._rig).appearance,
         )
-        tracker = Tracker(
+        posterior = Posterior(
             model,
             plan.objective.build(self._rig, mesh, synthesizer),
             StretchPrior(mesh, plan.priors.stretch),
             ShapePrior(model.rest, model.prior),
             MotionPrior(model.rest, model.scales, plan.priors),
-            plan.optimizer.build(len(model.rest), np.random.default_rng(plan.seed)),
-            plan.status,
         )
+        optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
+        tracker = Tracker(model, posterior, optimizer, plan.evaluations, plan.status)
         return tracker, mesh
 
 
@@ -197,8 +200,11 @@ def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimat
         vertex_covariance=np.zeros((0, 3, 3)),
         cost=float("nan"),
         deviation=float("nan"),
+        searcher="",
+        stop=Stop.NOTHING,
         generations=0,
         evaluations=0,
+        budget=0,
         inlier_share=0.0,
         fits=(),
         sources=observation.sources,

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.observation import Observer
 from abs_service.tracker.regions import nearest
 from abs_service.tracking import Plan, Tracking, streams
 from calib.camera import Camera
@@ -23,7 +22,7 @@ _NOISE = GaussianPolynomial(((0.01,),))
 
 
 def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
-    """Tracks a flat board that no sensor ever saw, without and with distortion, with the parts of the plan.
+    """Tracks and loses a flat board that no sensor ever saw, without and with distortion, with the parts of the plan.
 
     Args:
         noises: noise model of every sensor that the tracker uses, by name; tells what kind of image it takes.
@@ -32,12 +31,17 @@ def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
     for camera in (_CAMERA, _DISTORTED):
         rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
         frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
-        observation = Observer(rig).observe(FrameSet(0, 0, {frame.key: frame for frame in frames}))
-        Tracking(rig, replace(plan, region=nearest.Settings())).track_observation(observation, lambda: False)
+        tracking = Tracking(rig, replace(plan, region=nearest.Settings()))
+        for seq, seen in enumerate((frames, [_without_object(frame) for frame in frames])):
+            tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
 def _sensor(name: str, camera: Camera, noise: Noise) -> Sensor:
     return Sensor(name, camera, _NOISE if isinstance(noise, DepthNoise) else noise)
+
+
+def _without_object(frame: Frame) -> Frame:
+    return replace(frame, data=np.full_like(frame.data, np.nan)) if frame.kind == Kind.DEPTH else frame
 
 
 def _board(head: str, kind: Kind, size: tuple[float, float]) -> Frame:

@@ -42,6 +42,7 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         synthesis=table.synthesis,
         objective=table.objective,
         optimizer=table.optimizer,
+        evaluations=table.budget_evaluations,
         vertices=table.mesh.vertices,
         priors=table.priors,
         status=table.status,

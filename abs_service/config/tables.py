@@ -85,6 +85,7 @@ class TrackerTable(Table):
         mesh: the triangle mesh.
         priors, status, reinitialization: `Settings` of `abs_service.tracker.priors`, `.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
+        budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
     """
 
     sensors: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -97,8 +98,9 @@ class TrackerTable(Table):
     priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
     reinitialization: Annotated[Any, SettingsOf("abs_service.tracker.loss")] = Field(default={})
-    optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "cma"})
+    optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
     budget_ms: Positive = 24.0
+    budget_evaluations: Annotated[int, Field(ge=1)] = 100_000
 
 
 class RecordTable(Table):

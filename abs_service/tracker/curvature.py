@@ -1,4 +1,7 @@
-"""Curvature of the cost around a prediction: the coordinates in which the search is easy."""
+"""The cost near one Θ as a quadratic: the coordinates in which a search is easy, the Newton step, the covariance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,26 +13,52 @@ from abs_service.tracker.terms.base import Linearization
 STEP_M = 1e-3
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Quadratic:
+    """The cost near Θ: cost(Θ + δ) ≈ cost(Θ) + gradient · δ + ½ δᵀ curvature δ.
+
+    Attributes:
+        gradient: (dim,).
+        curvature: (dim, dim), symmetric; positive definite if each parameter has a prior.
+    """
+
+    gradient: NDArray[np.float64]
+    curvature: NDArray[np.float64]
+
+
 def vertex_jacobian(model: DeformationModel, theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """Derivatives (n, 3, dim) of the vertices by the parameters, by central differences."""
     steps = STEP_M * model.scales
     offsets = np.diag(steps)
     vertices = model.deform(np.concatenate([theta + offsets, theta - offsets])).vertices.astype(np.float64)
     plus, minus = vertices[: len(steps)], vertices[len(steps) :]
-    return ((plus - minus) / (2 * steps)[:, None, None]).transpose(2, 1, 0)
+    return np.asarray((plus - minus) / (2 * steps)[:, None, None], np.float64).transpose(2, 1, 0)
 
 
-def search_metric(jacobian: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix A (dim, dim) such that Θ = prediction + A ξ makes the curvature of the cost the identity.
+def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
+    """The sum of linearised parts as a quadratic: gradient Jᵀr and curvature JᵀJ of all rows."""
+    gradient, curvature = np.zeros(dimension), np.zeros((dimension, dimension))
+    for part in parts:
+        gradient += part.jacobian.T @ part.residual
+        curvature += part.jacobian.T @ part.jacobian
+    return Quadratic(gradient, curvature)
 
-    With J the derivatives (m, dim) of all normalised residuals, JᵀJ is the Gauss–Newton curvature of the negative
-    log-likelihood and its inverse A Aᵀ the posterior covariance. The search is invariant under such a change of
-    coordinates in principle; in practice it saves CMA-ES the generations that it would spend on learning them.
+
+def search_metric(quadratic: Quadratic) -> NDArray[np.float64]:
+    """Matrix A (dim, dim) such that Θ = start + A ξ makes the curvature of the cost the identity.
+
+    The search is invariant under such a change of coordinates in principle; in practice it saves CMA-ES the generations
+    that it would spend on learning them.
     """
-    lower = np.linalg.cholesky(jacobian.T @ jacobian)
-    return np.asarray(np.linalg.inv(lower).T, np.float64)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(quadratic.curvature)).T, np.float64)
 
 
-def newton_step(linear: Linearization, metric: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Change of Θ (dim,) that minimises the linearised cost, for the metric of the same linearisation."""
-    return -metric @ (metric.T @ (linear.jacobian.T @ linear.residual))
+def newton_step(quadratic: Quadratic, metric: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Change of Θ (dim,) that minimises the quadratic whose metric is given."""
+    return -metric @ (metric.T @ quadratic.gradient)
+
+
+def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of Θ given the measurements: the inverse of the curvature at the estimate (Laplace)."""
+    metric = search_metric(quadratic)
+    return metric @ metric.T

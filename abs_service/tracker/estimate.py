@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Source
+from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.terms.base import SensorFit
 
 
@@ -36,8 +37,11 @@ class Estimate:
         vertex_covariance: of every vertex around its material point (n, 3, 3) [m²]: what is unknown of theta, and what
             was unknown of the mesh when it was made.
         cost: negative logarithm of likelihood times priors at theta, up to constants.
-        deviation: step size of the search when it ended.
-        generations, evaluations: effort of the search.
+        deviation: step size of the search when it ended, in deviations of the posterior; 0 after a descent.
+        searcher: what found theta: "levenberg_marquardt", "cma", "cma_es"; "" while INITIALIZING.
+        stop: why the search ended.
+        generations, evaluations: what the frame took: generations or steps, and how often the cost was computed.
+        budget: how often the cost was allowed to be computed.
         inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
         fits: how every sensor agrees.
         sources: exposure of every sensor that contributed.
@@ -54,8 +58,11 @@ class Estimate:
     vertex_covariance: NDArray[np.float64]
     cost: float
     deviation: float
+    searcher: str
+    stop: Stop
     generations: int
     evaluations: int
+    budget: int
     inlier_share: float
     fits: tuple[SensorFit, ...]
     sources: Mapping[str, Source]

@@ -107,9 +107,10 @@ class MotionPrior:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
         return 0.5 * np.sum(((thetas - self.predicted) * self._inverse_deviation) ** 2, axis=1)
 
-    def linearize(self) -> Linearization:
-        """The normalised residuals at the predicted parameters, all zero, and their derivatives."""
-        return Linearization(np.zeros(len(self._scales)), np.diag(self._inverse_deviation))
+    def linearize(self, theta: NDArray[np.float64]) -> Linearization:
+        """The normalised residuals of parameters (dim,), and their derivatives."""
+        inverse_deviation = self._inverse_deviation
+        return Linearization((theta - self.predicted) * inverse_deviation, np.diag(inverse_deviation))
 
     @property
     def _inverse_deviation(self) -> NDArray[np.float64]:

@@ -42,7 +42,7 @@ def test_what_a_configuration_describes(checked, tmp_path):
         'describes rig "bench"',
         "device   sim: simulated://sheet?seed=1&sensors=tof",
         "sensor   tof: depth 176×144 16UC1 30 Hz, amplitude 176×144 16UC1 30 Hz; noise gaussian_polynomial",
-        "tracker  sheet: rigid from tof, 300 vertices; likelihood, cma, paced by tof/depth",
+        "tracker  sheet: rigid from tof, 300 vertices; likelihood, hybrid, paced by tof/depth",
         "publishes abs/bench/sheet/state",
         "connect to tcp/127.0.0.1:7447",
         f"records to {tmp_path / 'recordings'}",

@@ -11,6 +11,7 @@ from abs_service.estimates import Effort, Identity
 from abs_service.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.terms.base import SensorFit
 
 ESTIMATE = Estimate(
@@ -24,8 +25,11 @@ ESTIMATE = Estimate(
     vertex_covariance=np.array([[[1.0, 2, 3], [2, 4, 5], [3, 5, 6]], [[7.0, 0, 0], [0, 8, 0], [0, 0, 9]]]),
     cost=12.5,
     deviation=0.5,
+    searcher="cma_es",
+    stop=Stop.TIME,
     generations=3,
     evaluations=45,
+    budget=1000,
     inlier_share=0.9,
     fits=(SensorFit("tof", 280, 10, 270, 260, 1.5, 1.1),),
     sources={"tof": Source(42, 10**9, 25_000)},
@@ -36,7 +40,7 @@ MESH = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32), np.full((3, 3), n
 
 
 def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
-    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 2.0, 0, {}))
+    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
     assert list(state.covariance) == pytest.approx([1.0, 0.1, 0.2, 2.0, 0.3, 3.0])
     assert state.covariance_valid
     assert state.log_likelihood == -12.5
@@ -45,7 +49,7 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
 @pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])
 def test_the_covariance_of_what_is_not_tracked_says_nothing(status):
     lost = replace(ESTIMATE, status=status)
-    assert not estimates.state(Header(), lost, IDENTITY, Effort(1.0, 2.0, 0, {})).covariance_valid
+    assert not estimates.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {})).covariance_valid
     assert estimates.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
 
 
@@ -57,11 +61,25 @@ def test_the_covariance_of_every_vertex_travels_as_its_six_different_entries():
 
 
 def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
-    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 2.0, 3, {"tof": 4, "color": 5}))
+    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 3, {"tof": 4, "color": 5}))
     tof, color = state.sensors
     assert (tof.sensor, tof.seq, tof.samples, tof.dropped, tof.missing) == ("tof", 42, 270, 4, False)
     assert (color.sensor, color.dropped, color.missing) == ("color", 5, True)
     assert (state.samples, state.clock_sigma_ns, state.skipped) == (270, 25_000, 3)
+
+
+def test_what_the_search_took_and_was_allowed_is_told():
+    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    assert (state.searcher, state.stop) == ("cma_es", estimates.State.STOP_TIME)
+    assert (state.generations, state.evaluations) == (3, 45)
+    assert (state.budget_evaluations, state.budget_ms) == (1000, 24.0)
+
+
+@pytest.mark.parametrize("stop", Stop)
+def test_every_reason_to_stop_has_its_word(stop):
+    state = estimates.state(Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    word = estimates.State.Stop.Name(state.stop).removeprefix("STOP_").lower()
+    assert word == ("unspecified" if stop == Stop.NOTHING else stop.value)
 
 
 def test_theta_of_another_mesh_or_model_has_another_id():

@@ -16,8 +16,8 @@ from tests.service.takes import WALL_NS, write_take
 
 COUNT = 20
 SIMULATION = parse("simulated://sheet?seed=1").build()
-#: Enough generations to exercise the search, few enough to be quick.
-TOML = config.to_toml(config.load_default()).replace("generations = 20", "generations = 3")
+#: Another number than the default, which the replay must not take.
+TOML = config.to_toml(config.load_default()).replace("\nsteps = 3\n", "\nsteps = 2\n")
 FIRST = 30  # the sheet begins to move
 
 
@@ -69,7 +69,7 @@ def test_every_topic_can_be_decoded_by_its_schema(replayed):
         "/sheet/topology": ("abs.v1.MeshTopology", 1),
     }
     replayed_with = config.loads(attachments["rig.toml"].decode(), "rig.toml", Path("/"))
-    assert replayed_with.trackers["sheet"].optimizer.generations == 3
+    assert replayed_with.trackers["sheet"].optimizer.steps == 2
     check_times(topics)
     check_mesh(topics)
 
@@ -112,8 +112,8 @@ def test_one_json_object_per_estimate(recording, tmp_path, capsys):
         assert line["error_mm"] / 2 < line["vertex_sigma_mm"] < 4
         assert line["solve_ms"] > 0
         assert line["age_ms"] is None  # offline there is no such thing
-        assert line["generations"] == 3
-        assert line["evaluations"] % 3 == 0
+        assert line["generations"] <= 2
+        assert line["evaluations"] >= 1
     assert "20 estimates" in captured.err
     assert "vertex error mean" in captured.err
 

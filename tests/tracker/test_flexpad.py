@@ -244,7 +244,8 @@ def test_the_truth_is_likelier_than_a_collapsed_sheet(value, collapse):
     assert parts is not None
     truth = bend(e=value, w=value)
     surface = parts.model.deform(np.stack([truth, truth + collapse * COLLAPSED]))
-    costs = parts._objective.cost(surface) + parts._stretch.cost(surface)
+    posterior = parts._posterior
+    costs = posterior._objective.cost(surface) + posterior._stretch.cost(surface)
     assert costs[0] < costs[1] - 100
 
 

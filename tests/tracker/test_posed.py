@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from abs_service import config
 from abs_service.commands import plans
-from abs_service.tracker.curvature import search_metric, vertex_jacobian
+from abs_service.tracker.curvature import gauss_newton, search_metric, vertex_jacobian
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
@@ -23,6 +23,7 @@ from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.priors import MotionPrior, StretchPrior
 from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.sheet import Sheet
+from abs_service.tracker.terms.base import Linearization
 from abs_service.tracking import Tracking
 from calib import pose
 from drivers.simulated.rectangle import Rectangle
@@ -131,8 +132,8 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     jacobian = vertex_jacobian(MODEL, MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
     stretch = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), jacobian).jacobian
-    rows = np.concatenate([measured, stretch, MODEL.prior, motion.linearize().jacobian])
-    metric = search_metric(rows)
+    rows = np.concatenate([measured, stretch, MODEL.prior, motion.linearize(MODEL.rest).jacobian])
+    metric = search_metric(gauss_newton([Linearization(np.zeros(len(rows)), rows)], 54))
     np.testing.assert_allclose(metric.T @ rows.T @ rows @ metric, np.eye(54), atol=1e-6)
     deviation = np.sqrt(np.diag(metric @ metric.T))
     assert np.all(deviation[3:5] > 5e-3)  # along the sheet, nothing but the motion prior tells where it is

@@ -6,10 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker import uncertainty
-from abs_service.tracker.curvature import search_metric
+from abs_service.tracker.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.terms.base import Linearization
 from tests.evaluation.posterior import coverage
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
 from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
@@ -22,9 +23,9 @@ def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
     """y = JΘ + noise of known deviation, solved by least squares: the covariance is that of the solutions."""
     generator = np.random.default_rng(seed)
     rows = generator.standard_normal((12, 4))
-    metric = search_metric(rows)
+    covariance = posterior_covariance(gauss_newton([Linearization(np.zeros(12), rows)], 4))
     jacobian = generator.standard_normal((5, 3, 4))
-    found = uncertainty.propagated(jacobian, metric @ metric.T)
+    found = uncertainty.propagated(jacobian, covariance)
     solutions = jacobian @ np.linalg.pinv(rows)  # what unit noise of every measurement does to a vertex
     np.testing.assert_allclose(found, solutions @ solutions.transpose(0, 2, 1), rtol=1e-6, atol=1e-9 * found.max())
 

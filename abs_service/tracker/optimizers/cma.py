@@ -1,12 +1,15 @@
-"""CMA-ES by its authors' library, pycma: the reference search."""
+"""CMA-ES by its authors' library, pycma: the reference search; too slow to be live in more than a few dimensions."""
 
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
+
+from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
 
 
 @dataclass(frozen=True)
@@ -18,36 +21,49 @@ class Settings:
         generations: generations per frame at most.
         step: standard deviation of the first candidates, in posterior deviations of the parameters.
         least_step: the step size never starts a frame below this, so that the search can follow motion.
+        tolerance: the search has converged when costs differ by less than this [nats], within a generation and between
+            the best ones of five.
+        restarts: how often the population may double in the first frame, where the object is searched for widely.
     """
 
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 20
     step: Annotated[float, Gt(0)] = 1.0
     least_step: Annotated[float, Gt(0)] = 0.5
+    tolerance: Annotated[float, Gt(0)] = 0.5
+    restarts: Annotated[int, Ge(0)] = 3
 
-    def build(self, dimension: int, generator: np.random.Generator) -> "Cma":
+    def build(self, dimension: int, generator: np.random.Generator) -> Evolution:
         """A search in `dimension` dimensions that draws from `generator`."""
-        return Cma(self, dimension, generator)
+        make = partial(Cma, dimension, generator, self.least_step)
+        population = self.population or usual_population(dimension)
+        return Evolution(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
 
 
 class Cma:
-    """Mean, step size and covariance of one frame start the next; see `Optimizer` for the interface."""
+    """Mean, step size and covariance of one frame start the next; see `Strategy` for the interface.
 
-    def __init__(self, settings: Settings, dimension: int, generator: np.random.Generator):
+    Args:
+        dimension: of ξ.
+        generator: source of all randomness.
+        least_step: the step size never starts a frame below this.
+        population: candidates per generation.
+        step: standard deviation of the first candidates.
+    """
+
+    def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
         with warnings.catch_warnings():  # pycma regrets that it cannot plot
             warnings.simplefilter("ignore")
             from cma import CMAEvolutionStrategy  # noqa: PLC0415  # imports a second's worth of statistics
-        self.generations = settings.generations
-        self._settings = settings
+        self._steps = least_step, step
         options = {
             "randn": lambda *shape: generator.standard_normal(shape),
             "seed": np.nan,
             "verbose": -9,
             "verb_log": 0,
+            "popsize": population,
         }
-        if settings.population:
-            options["popsize"] = settings.population
-        self._search = CMAEvolutionStrategy(np.zeros(dimension), settings.step, options)
+        self._search = CMAEvolutionStrategy(np.zeros(dimension), step, options)
 
     @property
     def deviation(self) -> float:
@@ -62,7 +78,7 @@ class Cma:
     def restart(self) -> None:
         """Moves the mean to the prediction, ξ = 0; covariance and step size continue from the last frame."""
         self._search.mean = np.zeros_like(self._search.mean)
-        self._search.sigma = float(np.clip(self._search.sigma, self._settings.least_step, self._settings.step))
+        self._search.sigma = float(np.clip(self._search.sigma, *self._steps))
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""

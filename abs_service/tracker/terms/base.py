@@ -110,6 +110,12 @@ def summarize(
     )
 
 
+def inlier_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
+    visible = sum(fit.visible for fit in fits)
+    return sum(fit.inliers for fit in fits) / visible if visible else 0.0
+
+
 class Term(Protocol):
     """One sensor's part of an objective.
 

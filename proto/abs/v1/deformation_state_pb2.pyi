@@ -9,7 +9,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class DeformationState(_message.Message):
-    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns")
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms")
     class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
@@ -22,6 +22,18 @@ class DeformationState(_message.Message):
     STATUS_TRACKING: DeformationState.Status
     STATUS_DEGRADED: DeformationState.Status
     STATUS_LOST: DeformationState.Status
+    class Stop(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
+        __slots__ = ()
+        STOP_UNSPECIFIED: _ClassVar[DeformationState.Stop]
+        STOP_CONVERGED: _ClassVar[DeformationState.Stop]
+        STOP_GENERATIONS: _ClassVar[DeformationState.Stop]
+        STOP_EVALUATIONS: _ClassVar[DeformationState.Stop]
+        STOP_TIME: _ClassVar[DeformationState.Stop]
+    STOP_UNSPECIFIED: DeformationState.Stop
+    STOP_CONVERGED: DeformationState.Stop
+    STOP_GENERATIONS: DeformationState.Stop
+    STOP_EVALUATIONS: DeformationState.Stop
+    STOP_TIME: DeformationState.Stop
     class Sensor(_message.Message):
         __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "hidden")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
@@ -67,6 +79,10 @@ class DeformationState(_message.Message):
     COVARIANCE_VALID_FIELD_NUMBER: _ClassVar[int]
     SAMPLES_FIELD_NUMBER: _ClassVar[int]
     CLOCK_SIGMA_NS_FIELD_NUMBER: _ClassVar[int]
+    SEARCHER_FIELD_NUMBER: _ClassVar[int]
+    STOP_FIELD_NUMBER: _ClassVar[int]
+    BUDGET_EVALUATIONS_FIELD_NUMBER: _ClassVar[int]
+    BUDGET_MS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
     status: DeformationState.Status
@@ -89,4 +105,8 @@ class DeformationState(_message.Message):
     covariance_valid: bool
     samples: int
     clock_sigma_ns: int
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ...) -> None: ...
+    searcher: str
+    stop: DeformationState.Stop
+    budget_evaluations: int
+    budget_ms: float
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ...) -> None: ...

@@ -1,0 +1,52 @@
+"""The descent of Levenberg and Marquardt, as Nielsen damps it; no search by itself, because it only goes downhill."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.curvature import Quadratic
+from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Stop
+
+NAME = "levenberg_marquardt"
+
+#: Damping after the first step that failed, and its growth with each further one, as a share of the curvature.
+FIRST_DAMPING = 0.1
+GROWTH = 10.0
+MOST_DAMPING = 1e3
+
+
+def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Outcome:
+    """Goes downhill from start (dim,), one linearisation per step.
+
+    Args:
+        problem: the cost.
+        start: where to begin (dim,).
+        iterations: steps at most.
+        tolerance: a step that promises a smaller decrease [nats] is not taken: it has converged.
+        budget: evaluations and time; one step is tried at least.
+    """
+    theta, cost = start, float(problem.cost(start[None])[0])
+    budget.spend(1)
+    stop, damping, steps, tries = None, 0.0, 0, 0
+    quadratic = problem.linearize(theta)
+    while stop is None and steps < iterations:
+        step, promise = _step(quadratic, damping)
+        if promise < tolerance:
+            stop = Stop.CONVERGED
+            break
+        moved = float(problem.cost((theta + step)[None])[0])
+        better, tries = moved < cost, tries + 1
+        budget.spend(1, generations=int(better))
+        if better:
+            theta, cost, damping, steps = theta + step, moved, damping / GROWTH, steps + 1
+            quadratic = problem.linearize(theta)
+        else:
+            damping = max(damping * GROWTH, FIRST_DAMPING)
+        stop = budget.exhausted()
+    return Outcome(theta, cost, NAME, stop or Stop.GENERATIONS, 0.0)
+
+
+def _step(quadratic: Quadratic, damping: float) -> tuple[NDArray[np.float64], float]:
+    """The damped step (dim,) and the decrease of cost that the quadratic promises for it [nats]."""
+    curvature = quadratic.curvature + np.diag(damping * np.diag(quadratic.curvature))
+    step = np.asarray(-np.linalg.solve(curvature, quadratic.gradient), np.float64)
+    return step, float(-step @ (quadratic.gradient + 0.5 * quadratic.curvature @ step))

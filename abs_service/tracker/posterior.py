@@ -1,0 +1,89 @@
+"""What a search minimises: the negative logarithm of likelihood times priors, for the observation in hand."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.observation import Observation
+from abs_service.tracker.curvature import Quadratic, gauss_newton, vertex_jacobian
+from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.objectives.base import Objective
+from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
+from abs_service.tracker.terms.base import Linearization, SensorFit, inlier_share
+
+
+class Posterior:
+    """The cost of Θ (eq. 16, with the priors as further terms); what the optimisers ask of it is `Problem`.
+
+    Attributes:
+        dimension: number of parameters.
+    """
+
+    def __init__(
+        self,
+        model: DeformationModel,
+        objective: Objective,
+        stretch: StretchPrior,
+        shape: ShapePrior,
+        motion: MotionPrior,
+    ):
+        self.dimension = len(model.rest)
+        self._model = model
+        self._objective = objective
+        self._stretch = stretch
+        self._shape = shape
+        self._motion = motion
+        self._linearized: list[tuple[NDArray[np.float64], Quadratic]] = []
+        self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
+
+    def observe(self, observation: Observation) -> NDArray[np.float64]:
+        """Turns to a new observation; the parameters (dim,) that the motion predicts for it."""
+        self._linearized.clear()
+        self._fitted.clear()
+        self._motion.predict(observation.t_host_ns)
+        predicted = self._motion.predicted
+        self._objective.observe(observation, self._model.deform(predicted[None]))
+        return predicted
+
+    def settle(self, theta: NDArray[np.float64]) -> None:
+        """Takes what was found for the observation (dim,), from which the next one's motion is predicted."""
+        self._motion.update(theta)
+
+    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Negative logarithm (population,) of likelihood times priors."""
+        surface = self._model.deform(thetas)
+        priors = self._stretch.cost(surface) + self._shape.cost(thetas) + self._motion.cost(thetas)
+        return self._objective.cost(surface) + priors
+
+    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
+        if self._linearized and np.array_equal(self._linearized[0][0], theta):
+            return self._linearized[0][1]
+        surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
+        parts = [self._objective.linearize(surface, jacobian), *self._priors(surface, jacobian, theta)]
+        quadratic = gauss_newton(parts, self.dimension)
+        self._linearized = [(theta, quadratic)]
+        return quadratic
+
+    def prior(self, theta: NDArray[np.float64]) -> Quadratic:
+        """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""
+        surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
+        return gauss_newton(self._priors(surface, jacobian, theta), self.dimension)
+
+    def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
+        """How every contributing sensor agrees with theta (dim,); the last theta's are remembered."""
+        if not (self._fitted and np.array_equal(self._fitted[0][0], theta)):
+            self._fitted = [(theta, tuple(self._objective.fits(self._model.deform(theta[None]))))]
+        return self._fitted[0][1]
+
+    def unexplained(self, theta: NDArray[np.float64]) -> float:
+        """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""
+        return 1 - inlier_share(self.fits(theta))
+
+    def _priors(
+        self, surface: Surface, jacobian: NDArray[np.float64], theta: NDArray[np.float64]
+    ) -> list[Linearization]:
+        return [
+            self._stretch.linearize(surface, jacobian),
+            self._shape.linearize(theta),
+            self._motion.linearize(theta),
+        ]

@@ -1,0 +1,120 @@
+"""Strategies find minima, the same ones each time, and start every frame with what the last one taught."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.optimizers.cma import Cma
+from abs_service.tracker.optimizers.cma_es import CmaEs
+from abs_service.tracker.optimizers.evolution import Strategy, usual_population
+
+
+@pytest.fixture(params=[Cma, CmaEs], ids=["cma", "cma_es"])
+def make(request):
+    """A strategy from seed, dimension, least step, population and step."""
+
+    def strategy(seed: int = 1, dimension: int = 6, least: float = 0.5, population: int = 0, step: float = 1.0):
+        population = population or usual_population(dimension)
+        return request.param(dimension, np.random.default_rng(seed), least, population, step)
+
+    return strategy
+
+
+def minimize(strategy: Strategy, cost, generations: int) -> list[np.ndarray]:
+    means = []
+    for _ in range(generations):
+        candidates = strategy.ask()
+        strategy.tell(candidates, cost(candidates))
+        means.append(strategy.mean)
+    return means
+
+
+TARGET = np.array([1.0, -0.5, 0.3, 2.0, 0.0, -1.0])
+AXES = 10.0 ** np.linspace(-1, 1, 6)
+
+
+def sphere(x):
+    return np.sum((x - TARGET) ** 2, axis=1)
+
+
+def ellipsoid(x):
+    return np.sum((AXES * (x - TARGET)) ** 2, axis=1)
+
+
+@pytest.mark.parametrize("cost", [sphere, ellipsoid])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_minimum_is_found(make, cost, seed):
+    found = minimize(make(seed), cost, 250)[-1]
+    np.testing.assert_allclose(found, TARGET, atol=1e-4)
+
+
+def test_equal_seeds_search_alike_to_the_last_bit(make):
+    a, b, c = (minimize(make(seed), ellipsoid, 40) for seed in (5, 5, 6))
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+
+
+def shared_state() -> list[int]:
+    state = np.random.get_state(legacy=False)["state"]
+    return [*state["key"].tolist(), state["pos"]]
+
+
+def test_random_numbers_come_from_its_own_generator_only(make):
+    before = shared_state()
+    strategy = make()
+    minimize(strategy, sphere, 10)
+    strategy.restart()
+    minimize(strategy, sphere, 10)
+    assert shared_state() == before
+
+
+def test_the_first_candidates_deviate_by_the_step(make):
+    candidates = make(step=0.4, population=2000).ask()
+    assert candidates.std() == pytest.approx(0.4, rel=0.03)
+    assert abs(candidates.mean()) < 0.02
+
+
+def spread(strategy: Strategy) -> np.ndarray:
+    """Deviations of the candidates along the axes, in units of the step."""
+    return np.std([row for _ in range(400) for row in strategy.ask()], axis=0) / strategy.deviation
+
+
+def test_a_new_frame_begins_at_the_prediction_with_the_old_covariance(make):
+    strategy = make()
+    minimize(strategy, ellipsoid, 120)
+    learnt = spread(strategy)
+    assert learnt[0] / learnt[-1] > 10  # the ellipsoid's axes differ by a factor of 100
+    strategy.restart()
+    np.testing.assert_array_equal(strategy.mean, np.zeros(6))
+    np.testing.assert_allclose(spread(strategy), learnt, rtol=0.15)
+
+
+def test_the_step_of_a_new_frame_is_bounded(make):
+    strategy = make(step=1.0, least=0.5)
+    minimize(strategy, sphere, 60)
+    assert strategy.deviation < 0.1
+    strategy.restart()
+    assert strategy.deviation == 0.5
+    minimize(strategy, lambda x: -np.sum(x, axis=1), 30)  # a slope without an end makes it grow
+    assert strategy.deviation > 1
+    strategy.restart()
+    assert strategy.deviation == 1.0
+
+
+def test_many_frames_do_not_wear_it_out(make):
+    """300 frames of 5 generations; pycma's own conditions to stop must not matter."""
+    strategy = make(2, 12)
+    generator = np.random.default_rng(0)
+    for _ in range(300):
+        strategy.restart()
+        target = generator.normal(0, 0.3, 12)
+        minimize(strategy, lambda x, target=target: np.sum((x - target) ** 2, axis=1), 5)
+    assert np.isfinite(strategy.mean).all()
+    deviations = spread(strategy)
+    assert deviations.min() > 0.01
+    assert deviations.max() < 100
+
+
+def test_equal_costs_are_survived(make):
+    strategy = make()
+    minimize(strategy, lambda x: np.zeros(len(x)), 20)
+    assert np.isfinite(strategy.mean).all()
