@@ -70,6 +70,28 @@ def deform(u: float, w: float, offset: float, control: np.ndarray, weights: np.n
     return surface(u, w, control, weights, degree) + surface_normal(u, w, control, weights, degree) * offset
 
 
+def gravity_segment(points: np.ndarray, s: np.ndarray, beta: float, length: float) -> np.ndarray:
+    """Eq. 9 for one segment that begins at x = 0; points (n, 3) whose place on the flat strip is s (n,)."""
+    if beta == 0:
+        return points
+    x, y, z = points.T
+    r, x_c = length / beta, np.clip(s, 0, length)
+    a = x_c / r
+    return np.column_stack(
+        [(x - x_c) * np.cos(a) - (z - r) * np.sin(a), y, (z - r) * np.cos(a) + (x - x_c) * np.sin(a) + r]
+    )
+
+
+def gravity(flat: np.ndarray, angles: np.ndarray, total: float) -> np.ndarray:
+    """Segments of a strip of the length `total`, from the far one back to the clamp, each carrying its tail along."""
+    step, points = total / len(angles), flat
+    for i in reversed(range(len(angles))):
+        shift = np.array([i * step, 0, 0])
+        moved = gravity_segment(points - shift, flat[:, 0] - shift[0], angles[i], step) + shift
+        points = np.where(flat[:, :1] < shift[0], points, moved)
+    return points
+
+
 def flexpad(theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, least_radius: float) -> np.ndarray:
     """A sheet's point at `place` = (x, y): bends of eight sides add up, height map z + g z²/half, then the pose."""
     flat, height = np.array(place, float), 0.0

@@ -22,4 +22,4 @@ def sight(observation: Observation, rig: Rig, reference: str, region: Region, ve
     camera = rig.sensors[reference].camera
     distance = without_offset(noise, image.distance, image.amplitude)
     inside = region.select(camera.unproject(distance), distance)
-    return Sighting(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices)
+    return Sighting(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices, distance)

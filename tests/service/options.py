@@ -113,6 +113,7 @@ OPTIONS = {
         _option("model.nurbs", "control_points = [5, 4], degree = 3"),
         _option("model.rigid", scene="board"),
         _option("model.flexpad", "width_m = 0.3, height_m = 0.2"),
+        _option("model.gravity", "segments = 3, length_m = 0.3", scene="strip", size="tof=176x144&color=160x120"),
         _option("model.posed", 'shape = { type = "nurbs", control_points = [3, 3] }'),
         _option("synthesis.sparse"),
         _option("synthesis.undistorted", **LENS),

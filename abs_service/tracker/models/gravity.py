@@ -1,0 +1,157 @@
+"""A strip that a gripper holds and that bends under gravity: segments of constant curvature (eq. 9; Fugl et al.)."""
+
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal
+
+import numpy as np
+import scipy  # its parts are imported when they are first used
+from annotated_types import Interval
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.strip import Strip, find_strip
+from calib.jit import kernel
+
+#: Columns of vertices that every segment has at least; with fewer its curvature could not be told from its direction.
+COLUMNS_PER_SEGMENT = 3
+
+#: A board as narrow as a strip is typically.
+BOARD = (0.3, 0.06)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the model.
+
+    Attributes:
+        segments: parts of equal length, each of constant curvature.
+        gripper: `free` if the held end moves, so that its pose is in Θ; `fixed` if it stays where it was found.
+        gravity: direction of gravity in the rig; the default fits a level reference camera.
+        towards_gripper: direction in the rig from the free end to the held one; zeros: against gravity.
+        length_m: free length of the strip [m]; 0 takes what is detected.
+    """
+
+    segments: Annotated[int, Interval(ge=1, le=16)] = 4
+    gripper: Literal["free", "fixed"] = "free"
+    gravity: tuple[float, float, float] = (0.0, 1.0, 0.0)
+    towards_gripper: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    length_m: Annotated[float, Interval(ge=0, le=10)] = 0.0
+
+    def __post_init__(self) -> None:
+        if not any(self.gravity):
+            raise ValueError("gravity must be a direction, not [0, 0, 0]")
+
+    @property
+    def board(self) -> tuple[float, float]:
+        """Length and width [m] of a flat board that the model can be built from."""
+        return (self.length_m, self.length_m / 5) if self.length_m else BOARD
+
+    @property
+    def down(self) -> NDArray[np.float64]:
+        """Unit vector (3,) of gravity in the rig."""
+        return np.array(self.gravity) / np.linalg.norm(self.gravity)
+
+    def build(self, sighting: Sighting) -> "Gravity":
+        """The model of a strip that hangs as it is seen.
+
+        Raises:
+            SightingError: too little is seen, or no strip.
+        """
+        held = np.array(self.towards_gripper) if any(self.towards_gripper) else -self.down
+        strip = find_strip(sighting, self.down, held, self.length_m)
+        return Gravity(strip, self.segments, self.gripper == "free", sighting.vertices)
+
+
+class Gravity:
+    """Θ = angles by which the segments bend, from the gripper on [rad]; if the gripper is free, then its motion.
+
+    Positive angles bend towards the side that faced the sensor. The motion is a rotation vector [rad] about the middle
+    of the gripper line and a translation [m], both since the strip was found. The strip keeps its length and width.
+
+    Attributes:
+        mesh: a grid on the strip as it hung when it was found, rows along it.
+        rest: the angles of that moment, no motion.
+        scales: (dim,).
+        prior: nothing is known (0, dim).
+    """
+
+    def __init__(self, strip: Strip, segments: int, is_free: bool, vertices: int):
+        least = int(np.ceil((COLUMNS_PER_SEGMENT * segments) ** 2 * strip.width / strip.length))
+        flat = strip.flat_mesh(max(vertices, least))
+        columns = int(flat.chart[:, 0].max()) + 1
+        self._T_rg, self._segments, self._step = strip.T_rg, segments, strip.length / segments
+        self._along = np.asarray((np.arange(columns) + 0.5) * (strip.length / columns), np.float64)
+        self._across = ((flat.vertices[::columns] - strip.T_rg[:3, 3]) @ strip.T_rg[:3, 1]).astype(np.float32)
+        arms = strip.length - self._step * (np.arange(segments) + 0.5)
+        pose_scales = [np.full(3, 1 / strip.length), np.ones(3)] if is_free else []
+        self.rest = np.concatenate([strip.bends(segments), np.zeros(6 if is_free else 0)])
+        self.scales = np.concatenate([1 / arms, *pose_scales])
+        self.prior = np.zeros((0, len(self.rest)))
+        self.mesh = replace(flat, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
+
+    def deform(self, thetas: NDArray[np.float64]) -> Surface:
+        """Deforms the mesh with every row of `thetas` (population, dim)."""
+        bends = np.ascontiguousarray(thetas[:, : self._segments])
+        vertices = np.empty((len(thetas), 3, len(self._along) * len(self._across)), np.float32)
+        normals = np.empty_like(vertices)
+        _deform(bends, self._step, self._gripper(thetas), self._along, self._across, vertices, normals)
+        return Surface(vertices, normals)
+
+    def _gripper(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rotation and position (population, 3, 4) of the gripper line in the rig."""
+        motion = thetas[:, self._segments :]
+        if not motion.shape[1]:
+            return np.tile(self._T_rg[:3], (len(thetas), 1, 1))
+        turns = scipy.spatial.transform.Rotation.from_rotvec(motion[:, :3]).as_matrix() @ self._T_rg[:3, :3]
+        return np.concatenate([turns, (self._T_rg[:3, 3] + motion[:, 3:])[:, :, None]], axis=2)
+
+
+@kernel
+def _deform(
+    bends: NDArray[np.float64],
+    step: float,
+    gripper: NDArray[np.float64],
+    along: NDArray[np.float64],
+    across: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+) -> None:
+    """Eq. 9 for a population: arcs that go on from each other, then extended sideways.
+
+    The chord of an arc of length s that bends by a is s · sin(a/2)/(a/2) long and turned by a/2: eq. 9 without its
+    radius, which would be infinite for a straight segment.
+
+    Args:
+        bends: of the segments (population, k) [rad].
+        step: length of a segment [m].
+        gripper: rotation and position of the gripper line in the rig (population, 3, 4).
+        along: arc length of the mesh's columns (columns,) [m], ascending.
+        across: place of its rows on the gripper line (rows,) [m].
+        vertices, normals: results (population, 3, rows · columns).
+    """
+    columns, last = along.size, bends.shape[1] - 1
+    line = np.empty((6, columns), np.float32)
+    for k in range(bends.shape[0]):
+        x, z, phi, segment = 0.0, 0.0, 0.0, 0  # where the segment begins
+        for c in range(columns):
+            while segment < last and along[c] > (segment + 1) * step:
+                half = 0.5 * bends[k, segment]
+                chord = step * (np.sin(half) / half if abs(half) > 1e-4 else 1 - half * half / 6)
+                x, z = x + chord * np.cos(phi + half), z + chord * np.sin(phi + half)
+                phi += bends[k, segment]
+                segment += 1
+            s = along[c] - segment * step
+            half = 0.5 * bends[k, segment] * s / step
+            chord = s * (np.sin(half) / half if abs(half) > 1e-4 else 1 - half * half / 6)
+            p, q = x + chord * np.cos(phi + half), z + chord * np.sin(phi + half)
+            u, w = -np.sin(phi + 2 * half), np.cos(phi + 2 * half)
+            for i in range(3):
+                line[i, c] = gripper[k, i, 0] * p + gripper[k, i, 2] * q + gripper[k, i, 3]
+                line[3 + i, c] = gripper[k, i, 0] * u + gripper[k, i, 2] * w
+        for i in range(3):
+            for r in range(across.size):
+                shift = np.float32(gripper[k, i, 1] * across[r])
+                for c in range(columns):
+                    vertices[k, i, r * columns + c] = line[i, c] + shift
+                    normals[k, i, r * columns + c] = line[3 + i, c]
