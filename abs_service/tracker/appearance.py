@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import LUMA, ChannelImage, ColorImage, Image
+from abs_service.tracker.demosaicing import demosaiced
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.raster import field_radius
@@ -103,38 +104,31 @@ def _seen(image: Image, camera: Camera, mesh: Mesh) -> Values:
     """What a picture shows of the vertices (n, channels), read between the pixels; NaN where it shows nothing."""
     match image:
         case ColorImage():
-            return _between(image.rgb, np.ones(image.rgb.shape, np.bool_), 1, camera, mesh.vertices)
+            return _between(image.rgb, camera, mesh.vertices)
+        case ChannelImage() if image.channels.size > 1:
+            return _between(demosaiced(image.values, image.channel), camera, mesh.vertices)
         case ChannelImage():
-            period = len(image.channels)
-            known = image.channel[..., None] == np.arange(image.channels.max() + 1)
-            values = np.repeat(image.values[..., None], known.shape[2], axis=2)
-            return _between(values, known & np.isfinite(values), period, camera, mesh.vertices)
+            return _between(image.values[..., None], camera, mesh.vertices)
     return np.full((len(mesh.vertices), 1), np.nan)
 
 
-def _between(
-    values: NDArray[np.generic], known: NDArray[np.bool_], period: int, camera: Camera, points: Values
-) -> Values:
-    """Linear interpolation (n, c) among the known pixels of each channel (height, width, c).
-
-    For a picture without gaps (period 1) it is the bilinear one; in a mosaic of period 2 each channel is interpolated
-    on its own lattice.
-    """
+def _between(values: NDArray[np.generic], camera: Camera, points: Values) -> Values:
+    """Bilinear interpolation (n, c) among those of the four pixels (height, width, c) around a point that are known."""
     height, width, channels = values.shape
     place = _place(camera, points)
     inside = np.isfinite(place).all(axis=1)
     result = np.full((len(points), channels), np.nan)
-    corner = np.floor(place[inside]).astype(int) + 1 - period
-    steps = np.arange(2 * period)
+    corner = np.floor(place[inside]).astype(int)
+    steps = np.arange(2)
     column, row = corner[:, :1] + steps, corner[:, 1:] + steps
-    across, down = (
-        np.maximum(1 - np.abs(part - place[inside, i, None]) / period, 0) for i, part in enumerate((column, row))
-    )
+    across, down = (np.maximum(1 - np.abs(part - place[inside, i, None]), 0) for i, part in enumerate((column, row)))
     valid = ((row >= 0) & (row < height))[:, :, None] & ((column >= 0) & (column < width))[:, None, :]
     row, column = np.clip(row, 0, height - 1)[:, :, None], np.clip(column, 0, width - 1)[:, None, :]
-    weights = (down[:, :, None] * across[:, None, :] * valid)[..., None] * known[row, column]
+    corners = values[row, column].astype(np.float64)
+    known = np.isfinite(corners)
+    weights = (down[:, :, None] * across[:, None, :] * valid)[..., None] * known
     total = weights.sum(axis=(1, 2))
-    filled = np.where(known[row, column], values[row, column], 0)
+    filled = np.where(known, corners, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         result[inside] = np.where(total > 0, (weights * filled).sum(axis=(1, 2)) / total, np.nan)
     return result

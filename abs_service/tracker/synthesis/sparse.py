@@ -10,6 +10,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.raster import Raster, field_radius
+from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.rig import Rig
@@ -31,19 +32,29 @@ class Sparse:
     """Projects the vertices into the sensors' own images, which stay as they are.
 
     Attributes:
-        canvas: the mesh.
+        canvas: the vertices and their surroundings.
     """
 
     def __init__(self, rig: Rig, mesh: Mesh):
-        self.canvas = mesh
+        self._step_m = half_pixel(rig, mesh)
+        self.canvas = surroundings(mesh, self._step_m)
         self._rig = rig
+        self._mesh = mesh
 
     def observe(self, observation: Observation) -> None:
         """Nothing depends on the images."""
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The vertices with attributes (n, channels) through one sensor's camera."""
-        return SparseView(self._rig.sensors[sensor].camera, self.canvas.faces, attributes)
+        """The vertices with attributes of the canvas through one sensor's camera.
+
+        Attributes of the vertices alone (n, channels) are taken for the same all around.
+        """
+        camera, n = self._rig.sensors[sensor].camera, len(self._mesh.vertices)
+        if len(attributes) != len(self.canvas.vertices):
+            return SparseView(camera, self._mesh.faces, attributes)
+        return SparseView(
+            camera, self._mesh.faces, attributes[:n], Relief(camera, self._mesh, attributes[n:], self._step_m)
+        )
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texture itself."""
@@ -61,10 +72,17 @@ class SparseView:
         camera: the camera.
     """
 
-    def __init__(self, camera: Camera, faces: NDArray[np.int32], attributes: NDArray[np.float32]):
+    def __init__(
+        self,
+        camera: Camera,
+        faces: NDArray[np.int32],
+        attributes: NDArray[np.float32],
+        slopes: Slopes = LEVEL,
+    ):
         self.camera = camera
         self._raster = Raster(camera, faces)
-        self._attributes = np.ascontiguousarray(attributes, np.float32)[None]
+        self._attributes = np.ascontiguousarray(attributes, np.float32)
+        self._slopes = slopes
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
@@ -76,6 +94,7 @@ class SparseView:
     def look(self, predicted: Surface) -> None:
         """Hides the vertices that face away, or are behind the mesh's own surface, in the predicted mesh."""
         self._hidden = np.zeros(predicted.vertices.shape[2], np.bool_)
+        self._slopes.look(predicted)
         seen = self.synthesize(predicted)
         stride = self.camera.width + 2
         row, column = np.divmod(seen.pixel[0], stride)
@@ -100,7 +119,7 @@ class SparseView:
             pixel,
             distance,
         )
-        return Synthesis(pixel, distance, self._attributes)
+        return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
