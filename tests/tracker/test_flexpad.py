@@ -12,6 +12,7 @@ from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import bends
 from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad, Settings
 from abs_service.tracker.objectives import euclidean
+from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracking import Tracking
 from calib import pose
@@ -277,7 +278,7 @@ def test_a_sheet_that_is_bent_at_first_is_waited_for():
 
 def error_over_300_exposures(uri: str, **changes: object) -> float:
     simulation = simulate(uri)
-    steps = list(drive(tracking(simulation, **changes), simulation, range(300)))
+    steps = list(drive(tracking(simulation, optimizer=cma_es.Settings(), **changes), simulation, range(300)))
     vertex_mm, surface_mm = mean_errors(steps)
     objective = "euclidean" if changes else "likelihood"
     print(f"{uri} flexpad {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")

@@ -20,6 +20,7 @@ from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
+from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.priors import MotionPrior, StretchPrior
 from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.sheet import Sheet
@@ -203,7 +204,7 @@ def test_mistakes_of_the_shape_are_told_with_their_full_key(model, mistake):
 
 def error_over_150_exposures(uri: str, **changes: object) -> float:
     simulation = simulate(uri)
-    plan = default_plan(model=posed.Settings(nurbs.Settings()), **changes)
+    plan = default_plan(model=posed.Settings(nurbs.Settings()), optimizer=cma_es.Settings(), **changes)
     steps = list(drive(Tracking(rig_of(simulation), plan), simulation, range(20, 170)))
     vertex_mm, surface_mm = mean_errors(steps)
     objective = "euclidean" if changes else "likelihood"
