@@ -13,7 +13,7 @@ import numpy as np
 
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models import flexpad, nurbs, posed, rigid
+from abs_service.tracker.models import flexpad, gravity, nurbs, posed, rigid
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking import ModelSettings, Tracking
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
@@ -33,6 +33,7 @@ CASES = (
     Case("`posed`, `nurbs` 4 × 4", "sheet", posed.Settings(nurbs.Settings())),
     Case("`flexpad`, size given", "sheet", flexpad.Settings(0.3, 0.2)),
     Case("`flexpad`, size detected", "sheet", flexpad.Settings()),
+    Case("`gravity`, 4 segments, length given", "strip", gravity.Settings(length_m=0.3)),
     Case("`rigid`", "board", rigid.Settings()),
     Case("`nurbs`, 4 × 4", "board", nurbs.Settings()),
 )
