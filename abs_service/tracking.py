@@ -120,6 +120,11 @@ class Tracking:
         self._told = False
         self._unseen: frozenset[str] = frozenset()
 
+    @property
+    def model(self) -> DeformationModel | None:
+        """What deforms the mesh; None until the object was found."""
+        return None if self._tracker is None else self._tracker.model
+
     def track(self, frames: FrameSet, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for a frame set; the search goes on while `in_time` allows.
 

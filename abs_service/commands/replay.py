@@ -29,6 +29,7 @@ from abs_service.replay import OfflineTracker, free_path, replay
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
 from abs_service.tracking import Tracking, streams
+from calib.rig import Rig
 from drivers.mcap_file import McapFile
 from drivers.replay import Recording
 
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     recording = Recording(arguments.recording)
     for note in notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)
-    settings = _settings(recording, arguments.config)
+    settings = configuration(recording, arguments.config)
     if arguments.speed is not None:
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
@@ -84,7 +85,7 @@ def notes(recording: Recording) -> list[str]:
     return found
 
 
-def _settings(recording: Recording, path: Path | None) -> config.ServiceConfig:
+def configuration(recording: Recording, path: Path | None) -> config.ServiceConfig:
     """The configuration to replay with.
 
     Raises:
@@ -100,7 +101,12 @@ def _settings(recording: Recording, path: Path | None) -> config.ServiceConfig:
     return settings
 
 
-def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
+def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording) -> tuple[Rig, Synchroniser]:
+    """The rig of one tracker with the cameras of the recording, and what makes frame sets for it.
+
+    Raises:
+        ReplayOptionError: the recording lacks images that the tracker needs.
+    """
     cameras = {
         sensor: settings.sensors[sensor].camera.applied_to(camera)
         for sensor, camera in recording.cameras.items()
@@ -112,11 +118,16 @@ def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, fi
     if missing:
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
     tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
+    return rig, Synchroniser(settings.reference(name), members, tolerance_ns)
+
+
+def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
+    rig, synchroniser = recorded_rig(settings, name, recording)
     clock = WallClock(monotonic=lambda: 0, wall=lambda: recording.wall_offset_ns)
     return OfflineTracker(
         name,
         Tracking(rig, plans.plan(settings, name)),
-        Synchroniser(settings.reference(name), members, tolerance_ns),
+        synchroniser,
         plans.model_name(settings, name),
         rig.calib_id,
         Speaker(settings.name, clock, boot_id="replay"),

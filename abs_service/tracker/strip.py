@@ -45,17 +45,27 @@ class Strip:
         length, width: free length from the gripper line to the other end, and width [m].
         turn: nodes (STEPS + 1,) from the gripper to the free end: angle by which the tangent has turned since the
             gripper, positive towards z [rad].
+        pixel: length along the strip that one of the sensor's pixels shows [m].
     """
 
     T_rg: Pose
     length: float
     width: float
     turn: NDArray[np.float64]
+    pixel: float
 
     def bends(self, segments: int) -> NDArray[np.float64]:
         """Angles (segments,) by which equal parts of the strip bend, the first at the gripper [rad]."""
         nodes = np.linspace(0, 1, len(self.turn))
         return np.diff(np.interp(np.linspace(0, 1, segments + 1), nodes, self.turn))
+
+    @property
+    def length_deviation(self) -> float:
+        """Standard deviation of the length and of the gripper's place along the strip [m]: about a pixel.
+
+        So much the ends scatter in simulated images, because the pixels there show what is behind the strip as well.
+        """
+        return self.pixel
 
     def flat_mesh(self, vertices: int) -> Mesh:
         """A regular grid of about so many vertices on the strip if it were flat; rows go along it."""
@@ -82,14 +92,14 @@ def find_strip(sighting: Sighting, gravity: Vector, towards_gripper: Vector, len
     plane = find_plane(seen, gravity)
     hang = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
     points = np.concatenate([seen, sighting.beside(RIM_PX)])
-    fitted = _Fitted(plane, hang, np.arange(len(points)) < len(seen), (0.0, 0.0), False)
+    fitted = _Fitted(plane, hang, np.arange(len(points)) < len(seen), (0.0, 0.0), False, 0.0)
     for _ in range(5):
         fitted = _refine(fitted, points, sighting.camera)
     share = float(np.mean(fitted.belongs[: len(seen)]))
     _check((fitted.hang.length, fitted.sides[1] - fitted.sides[0]), length, share)
     hang = fitted.hang.cut(fitted.hang.length - (length or fitted.hang.length), fitted.hang.length)
     hang = fit(hang, fitted.plane.coordinates(points)[1][fitted.belongs])
-    return _strip(fitted.plane, hang, fitted.sides, fitted.faces)
+    return _strip(fitted, hang)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +112,7 @@ class _Fitted:
         belongs: which points (n,) show the strip.
         sides: first and last place across [m].
         faces: whether the camera is on the side of the plane's normals.
+        pixel: length along the strip that a pixel shows [m].
     """
 
     plane: Plane
@@ -109,6 +120,7 @@ class _Fitted:
     belongs: NDArray[np.bool_]
     sides: tuple[float, float]
     faces: bool
+    pixel: float
 
 
 def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fitted:
@@ -126,7 +138,8 @@ def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fi
     left, right = _extent(across, wide, high)
     tilt = _tilt(across - (left + right) / 2, along - (first + last) / 2, gap, phi)
     faces = bool(np.mean(np.sum(normals * sight, axis=1)[belongs] < 0) > 0.5)
-    return _Fitted(plane.tilted(tilt), hang.cut(first, last), belongs, (left, right), faces)
+    pixel = float(np.median(high))
+    return _Fitted(plane.tilted(tilt), hang.cut(first, last), belongs, (left, right), faces, pixel)
 
 
 def _check(size: tuple[float, float], length: float, share: float) -> None:
@@ -190,13 +203,14 @@ def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np
     return np.linalg.lstsq(rows, np.append(gap - gap.mean(), weight * turn), rcond=None)[0]
 
 
-def _strip(frame: Plane, hang: Hang, sides: tuple[float, float], facing: bool) -> Strip:
-    """The strip in the rig; `facing` tells whether the camera is on the side of the frame's normals."""
+def _strip(fitted: _Fitted, hang: Hang) -> Strip:
+    """The strip in the rig, whose z axis is on the camera's side."""
+    plane, sides = fitted.plane, fitted.sides
     start = hang.inclination[:1]
-    sign = 1.0 if facing else -1.0
-    z = sign * frame.normals(start)[0]
-    x = np.cos(start) * frame.ahead + np.sin(start) * frame.down
+    sign = 1.0 if fitted.faces else -1.0
+    z = sign * plane.normals(start)[0]
+    x = np.cos(start) * plane.ahead + np.sin(start) * plane.down
     T_rg = np.eye(4)
     T_rg[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    T_rg[:3, 3] = hang.nodes[0] @ np.array([frame.ahead, frame.down]) + np.mean(sides) * frame.across
-    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start))
+    T_rg[:3, 3] = hang.nodes[0] @ np.array([plane.ahead, plane.down]) + np.mean(sides) * plane.across
+    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start), fitted.pixel)

@@ -26,6 +26,7 @@ from tests.tracker.driving import default_plan, drive, frame_set, mean_errors, r
 LENGTH, WIDTH = 0.3, 0.05
 HELD = pose.from_rotation_vector((0.3, -0.2, 0.1), (0.05, -0.1, 1.0))
 FLAT = np.zeros(65)
+DOWN = np.array([0.0, 1.0, 0.0])
 
 #: Rounded, because eq. 9 as printed loses all digits where an angle is tiny; small ones have a test of their own.
 bends = st.lists(st.integers(-1500, 1500), min_size=1, max_size=8).map(lambda milli: np.array(milli) / 1000)
@@ -35,7 +36,7 @@ poses = st.lists(st.floats(-0.5, 0.5), min_size=6, max_size=6).map(np.array)
 def model(
     segments: int, T_rg: np.ndarray = HELD, turn: np.ndarray = FLAT, gripper: Literal["free", "fixed"] = "free"
 ) -> Gravity:
-    return Gravity(Strip(T_rg, LENGTH, WIDTH, turn), segments, gripper == "free", 300)
+    return Gravity(Strip(T_rg, LENGTH, WIDTH, turn, 0.004), segments, gripper == "free", 300, DOWN)
 
 
 def flat_points(shape: Gravity) -> np.ndarray:
@@ -136,7 +137,7 @@ def test_scales_move_the_flat_strip_by_about_a_metre_per_unit(segments):
 
 
 def test_many_segments_get_enough_columns():
-    shape = Gravity(Strip(HELD, LENGTH, WIDTH, FLAT), 16, True, 100)
+    shape = Gravity(Strip(HELD, LENGTH, WIDTH, FLAT, 0.004), 16, True, 100, DOWN)
     assert int(shape.mesh.chart[:, 0].max()) + 1 >= 48
 
 

@@ -12,6 +12,7 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.sighting import Sighting
 from abs_service.tracker.strip import Strip, find_strip
 from calib.jit import kernel
+from calib.pose import Pose
 
 #: Columns of vertices that every segment has at least; with fewer its curvature could not be told from its direction.
 COLUMNS_PER_SEGMENT = 3
@@ -60,7 +61,7 @@ class Settings:
         """
         held = np.array(self.towards_gripper) if any(self.towards_gripper) else -self.down
         strip = find_strip(sighting, self.down, held, self.length_m)
-        return Gravity(strip, self.segments, self.gripper == "free", sighting.vertices)
+        return Gravity(strip, self.segments, self.gripper == "free", sighting.vertices, self.down)
 
 
 class Gravity:
@@ -74,13 +75,16 @@ class Gravity:
         rest: the angles of that moment, no motion.
         scales: (dim,).
         prior: nothing is known (0, dim).
+        strip: what was found.
+        segments: number of segments.
     """
 
-    def __init__(self, strip: Strip, segments: int, is_free: bool, vertices: int):
+    def __init__(self, strip: Strip, segments: int, is_free: bool, vertices: int, down: NDArray[np.float64]):
         least = int(np.ceil((COLUMNS_PER_SEGMENT * segments) ** 2 * strip.width / strip.length))
         flat = strip.flat_mesh(max(vertices, least))
         columns = int(flat.chart[:, 0].max()) + 1
-        self._T_rg, self._segments, self._step = strip.T_rg, segments, strip.length / segments
+        self.strip, self.segments, self._down = strip, segments, down
+        self._T_rg, self._step = strip.T_rg, strip.length / segments
         self._along = np.asarray((np.arange(columns) + 0.5) * (strip.length / columns), np.float64)
         self._across = ((flat.vertices[::columns] - strip.T_rg[:3, 3]) @ strip.T_rg[:3, 1]).astype(np.float32)
         arms = strip.length - self._step * (np.arange(segments) + 0.5)
@@ -92,15 +96,35 @@ class Gravity:
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, dim)."""
-        bends = np.ascontiguousarray(thetas[:, : self._segments])
+        bends = np.ascontiguousarray(thetas[:, : self.segments])
         vertices = np.empty((len(thetas), 3, len(self._along) * len(self._across)), np.float32)
         normals = np.empty_like(vertices)
         _deform(bends, self._step, self._gripper(thetas), self._along, self._across, vertices, normals)
         return Surface(vertices, normals)
 
+    def inclination(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Angle between the strip and the horizontal, downwards, (segments + 1,) [rad] at the ends of the segments.
+
+        It is that in the plane of bending, whatever else the gripper does.
+        """
+        down = self.T_rg(theta)[:3, :3].T @ self._down
+        start = np.arctan2(down[0], abs(down[2]))
+        return start + np.copysign(1.0, down[2]) * np.concatenate([[0.0], np.cumsum(theta[: self.segments])])
+
+    def side_view(self, theta: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Rig points (n, 3) as horizontal distance from the gripper and drop below it (n, 2) [m]."""
+        T_rg = self.T_rg(theta)
+        ahead = T_rg[:3, 0] - (T_rg[:3, 0] @ self._down) * self._down
+        axes = np.stack([ahead / max(np.linalg.norm(ahead), 1e-9), self._down], axis=1)
+        return (points - T_rg[:3, 3]) @ axes
+
+    def T_rg(self, theta: NDArray[np.float64]) -> Pose:
+        """Pose of the gripper line: x along the strip as it leaves it, y along the line."""
+        return np.vstack([self._gripper(theta[None])[0], [0.0, 0.0, 0.0, 1.0]])
+
     def _gripper(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rotation and position (population, 3, 4) of the gripper line in the rig."""
-        motion = thetas[:, self._segments :]
+        motion = thetas[:, self.segments :]
         if not motion.shape[1]:
             return np.tile(self._T_rg[:3], (len(thetas), 1, 1))
         turns = scipy.spatial.transform.Rotation.from_rotvec(motion[:, :3]).as_matrix() @ self._T_rg[:3, :3]

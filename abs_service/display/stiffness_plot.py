@@ -1,0 +1,36 @@
+"""A strip from its side: what was measured, what was tracked, and what the beam model predicts."""
+
+from pathlib import Path
+
+import numpy as np
+
+from abs_service.hanging_strip import Profiles
+
+
+def draw(profiles: Profiles, title: str, path: Path) -> None:
+    """Draws the side view, and the inclination along the strip; the file's suffix says the format.
+
+    Raises:
+        ValueError: no such format.
+        OSError: the file cannot be written.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that no other command needs
+
+    figure = Figure(figsize=(11, 4.6), layout="constrained")
+    figure.suptitle(title)
+    side, angle = figure.subplots(1, 2)
+    side.plot(*(profiles.measured.T * 1e3), ".", color="0.7", markersize=3, label="depth pixels")
+    side.plot(*(profiles.tracked.T * 1e3), ".", color="tab:blue", markersize=4, label="tracked vertices")
+    side.plot(*(profiles.predicted.T * 1e3), color="tab:orange", label="heavy elastica")
+    side.plot(0, 0, "ks", markersize=7, label="gripper")
+    side.set(xlabel="horizontal distance from the gripper [mm]", ylabel="drop [mm]", aspect="equal")
+    side.invert_yaxis()
+    side.legend()
+    degrees = np.rad2deg(profiles.inclination)
+    angle.errorbar(
+        profiles.along * 1e3, degrees, 2 * np.rad2deg(profiles.deviation), fmt="o", capsize=3, label="tracked ± 2σ"
+    )
+    angle.plot(profiles.predicted_along * 1e3, np.rad2deg(profiles.predicted_inclination), label="heavy elastica")
+    angle.set(xlabel="along the strip [mm]", ylabel="inclination below the horizontal [°]")
+    angle.legend()
+    figure.savefig(path, dpi=120)
