@@ -31,7 +31,7 @@ parts = {key: plugins.load(f"abs_service.tracker.{package}", table[key], Path())
 plan = dataclasses.replace(plans.plan(settings, "sheet"), **parts)
 warm_up(plans.noises(settings, "sheet"), plan)
 
-simulation = address.parse(settings.devices["sim"].uri + table.get("keys", "")).build()
+simulation = address.parse(table.get("uri", settings.devices["sim"].uri) + table.get("keys", "")).build()
 exposures = [simulation.expose(k)[0] for k in range(3)]
 
 def forms():
@@ -57,6 +57,7 @@ print(json.dumps([before, forms(), estimate.status]))
         {"model": {"type": "nurbs", "control_points": [4, 4]}},
         {"model": {"type": "flexpad", "width_m": 0.3, "height_m": 0.2}},
         {"model": {"type": "posed", "shape": {"type": "flexpad"}}},
+        {"model": {"type": "gravity"}, "uri": "simulated://strip?seed=1"},
         {"synthesis": {"type": "sparse"}, "keys": "&lens=0.25"},
         {"synthesis": {"type": "undistorted"}, "keys": "&lens=0.25"},
         {"synthesis": {"type": "warped"}, "keys": "&lens=0.25"},

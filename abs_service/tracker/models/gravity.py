@@ -17,8 +17,8 @@ from calib.pose import Pose
 #: Columns of vertices that every segment has at least; with fewer its curvature could not be told from its direction.
 COLUMNS_PER_SEGMENT = 3
 
-#: A board as narrow as a strip is typically.
-BOARD = (0.3, 0.06)
+#: Width and height of a board that hangs down, as narrow as a strip is typically.
+BOARD = (0.06, 0.3)
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Length and width [m] of a flat board that the model can be built from."""
-        return (self.length_m, self.length_m / 5) if self.length_m else BOARD
+        """Width and height [m] of a flat board that the model can be built from: one that hangs down."""
+        return (self.length_m / 5, self.length_m) if self.length_m else BOARD
 
     @property
     def down(self) -> NDArray[np.float64]:
