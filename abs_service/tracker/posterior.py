@@ -64,6 +64,20 @@ class Posterior:
         self._linearized = [(theta, quadratic)]
         return quadratic
 
+    def sensed(
+        self, theta: NDArray[np.float64], offsets: NDArray[np.float64]
+    ) -> tuple[Linearization, NDArray[np.float64]]:
+        """What the sensors alone say near theta (dim,), and the derivatives (m, k) of the same residuals by offsets.
+
+        Args:
+            theta: parameters (dim,).
+            offsets: by which the vertices are moved (n, 3, k) [m].
+        """
+        both = np.concatenate([vertex_jacobian(self._model, theta), offsets], axis=2)
+        found = self._objective.linearize(self._model.deform(theta[None]), both)
+        by_theta, by_offsets = np.split(found.jacobian, [self.dimension], axis=1)
+        return Linearization(found.residual, by_theta), by_offsets
+
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""
         surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)

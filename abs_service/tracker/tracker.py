@@ -3,12 +3,13 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker import status, uncertainty
-from abs_service.tracker.curvature import posterior_covariance
+from abs_service.tracker.curvature import posterior_covariance, vertex_jacobian
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome
 from abs_service.tracker.posterior import Posterior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
@@ -49,9 +50,22 @@ class Tracker:
         self._posterior.settle(found.theta)
         return self._estimate(observation, found, budget)
 
+    def _covariances(
+        self, theta: NDArray[np.float64], surface: Surface
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
+        offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
+        sensed, by_offsets = self._posterior.sensed(theta, offsets)
+        inverse = posterior_covariance(self._posterior.linearize(theta))
+        covariance = uncertainty.sandwich(inverse, sensed)
+        jacobian = vertex_jacobian(self.model, theta)
+        response = -inverse @ (sensed.jacobian.T @ by_offsets)
+        own = uncertainty.remaining(offsets, jacobian, response)
+        return covariance, uncertainty.propagated(jacobian, covariance) + own
+
     def _estimate(self, observation: Observation, found: Outcome, budget: Budget) -> Estimate:
         surface = self.model.deform(found.theta[None])
-        covariance = posterior_covariance(self._posterior.linearize(found.theta))
+        covariance, vertex_covariance = self._covariances(found.theta, surface)
         fits = self._posterior.fits(found.theta)
         share = inlier_share(fits)
         verdict, reasons = status.judge(share, _hidden_share(fits), observation.missing, self._verdict)
@@ -63,7 +77,7 @@ class Tracker:
             theta=found.theta,
             covariance=covariance,
             vertices=np.ascontiguousarray(surface.vertices[0].T),
-            vertex_covariance=uncertainty.of_vertices(self.model, found.theta, surface, covariance),
+            vertex_covariance=vertex_covariance,
             cost=found.cost,
             deviation=found.deviation,
             searcher=found.searcher,

@@ -1,44 +1,77 @@
-"""How well every vertex is known, given how well Θ is."""
+"""How well Θ is known, and every vertex.
+
+**Θ.** At the Θ that was found, JᵀJ + P is the curvature of the cost, of the sensors' normalised residuals r with
+derivatives J and of the priors P, and Σ = (JᵀJ + P)⁻¹ is the covariance if every residual scatters as its noise model
+says. It does not: a colour is read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform quantisation)
+to its variance where the print is sharp, and on smooth print a cautious model says too much. What the residuals did is
+known, so the sandwich Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ takes their squares instead (White, Econometrica 50, 1982).
+The leverage h = diag(J Σ Jᵀ) is how much of its own noise each residual has lost to the fit (HC2 of MacKinnon and
+White, J. Econometrics 29, 1985): if the models are right, r² / (1 − h) is 1 on average and the sandwich Σ.
+
+**Vertices.** Every vertex is bound to the surface where the first frame's noise put it, off by σε along its normal n
+with ε standard normal, and keeps that offset in all frames. The sensors see the surface, not the vertex; so a search
+moves Θ until the mesh lies on the surface as well as Θ can make it, and only the rest of the offsets remains. With the
+derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
+so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
+D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains.
+"""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.curvature import vertex_jacobian
-from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.base import Linearization
+
+#: Least share of its noise that a residual keeps: below, rounding decides.
+LEAST_KEPT = 1e-6
 
 
-def of_vertices(
-    model: DeformationModel, theta: NDArray[np.float64], surface: Surface, covariance: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Covariance (n, 3, 3) [m²] of the vertices around their material points.
+def sandwich(inverse: NDArray[np.float64], sensed: Linearization) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of Θ: Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ, where P = Σ⁻¹ − JᵀJ.
 
     Args:
-        model: the deformation model.
-        theta: parameters (dim,).
-        surface: the mesh at theta, a population of one.
-        covariance: of theta (dim, dim).
+        inverse: Σ (dim, dim), of the curvature of likelihood and priors.
+        sensed: r and J of the sensors.
     """
-    moved = propagated(vertex_jacobian(model, theta), covariance)
-    return moved + along(surface.normals[0].T.astype(np.float64), model.mesh.deviation)
+    answer = sensed.jacobian @ inverse
+    kept = np.maximum(1 - np.einsum("md,md->m", answer, sensed.jacobian), LEAST_KEPT)
+    excess = sensed.residual**2 / kept - 1
+    return inverse + (answer.T * excess) @ answer
 
 
 def propagated(jacobian: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """J Σ Jᵀ (n, 3, 3) of every vertex, for derivatives (n, 3, dim) and the covariance Σ (dim, dim) of Θ."""
+    """D Σ Dᵀ (n, 3, 3) of every vertex, for derivatives (n, 3, dim) and the covariance Σ (dim, dim) of Θ."""
     n, axes, dimension = jacobian.shape
     # One product of matrices for all vertices: n small ones take several times as long.
     weighted = (jacobian.reshape(-1, dimension) @ covariance).reshape(n, axes, dimension)
     return weighted @ jacobian.transpose(0, 2, 1)
 
 
-def along(normals: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance (n, 3, 3) of what was wrong with the mesh before it was deformed: σ² n nᵀ.
-
-    Every vertex is bound to the surface where the first frame's noise put it, and keeps that offset along the normal in
-    all frames. No parameter moves a vertex alone, so no later measurement tells Θ about it.
+def own_offsets(surface: Surface, deviation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """E (n, 3, k) [m]: how each of k independent standard normal errors of the mesh's making moves the vertices.
 
     Args:
-        normals: unit normals (n, 3) of the deformed mesh.
-        deviation: σ of the vertices (n,) or of all alike () [m].
+        surface: the deformed mesh, a population of one.
+        deviation: σ of the vertices (n,) or of all alike () [m]; where all are exact, k is 0.
     """
-    offset = normals * np.reshape(deviation, (-1, 1))
-    return offset[:, :, None] * offset[:, None, :]
+    normals = surface.normals[0].T.astype(np.float64)
+    deviations = np.broadcast_to(deviation, len(normals))
+    offsets = np.zeros((len(normals), 3, len(normals)))
+    own = np.arange(len(normals))
+    offsets[own, :, own] = normals * deviations[:, None]
+    return offsets[:, :, deviations > 0]
+
+
+def remaining(
+    offsets: NDArray[np.float64], jacobian: NDArray[np.float64], response: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of the part of the mesh's own errors that Θ does not correct.
+
+    Args:
+        offsets: E (n, 3, k) [m].
+        jacobian: D, derivatives (n, 3, dim) of the vertices.
+        response: −Σ JᵀJE, the change (dim, k) of Θ with which the search answers each error.
+    """
+    n, axes, dimension = jacobian.shape
+    left = offsets + (jacobian.reshape(-1, dimension) @ response).reshape(n, axes, -1)
+    return left @ left.transpose(0, 2, 1)
