@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.images import ChannelImage, ColorImage
+from abs_service.readers import BAYER_ORDERS
 from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
@@ -16,11 +17,12 @@ from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.channel import ChannelTerm
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.illumination import Active
+from abs_service.tracker.terms.illumination import Active, Passive
 from abs_service.tracking import Tracking
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
+from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.intensity import GaussianIntensity
@@ -90,6 +92,29 @@ def test_the_colour_gradient_is_that_of_the_cost(kind):
         assert abs(linear) > 1000
     fit = term.fit(Rigid(mesh).deform(np.zeros((1, 6))))
     assert fit.inliers == fit.samples > 0.8 * fit.visible
+
+
+@ALL
+@pytest.mark.parametrize("order", ["rggb", "bggr", "grbg", "gbrg"])
+def test_a_mosaic_is_compared_channel_by_channel(kind, order):
+    """Of every pixel the channel that it has, whatever the order; in another order the colours do not fit."""
+    mesh = sheet(21, 31, flat, size=(0.2, 0.14))
+    synthesizer = built(kind, mesh)
+    looks = gradient_colors(synthesizer.canvas.vertices) * np.array([1.0, 0.6, 0.3], np.float32)
+    wall = gradient_colors(COLOR.unproject(plane_distance(COLOR, WALL, 1.0))) * np.array([1.0, 0.6, 0.3])
+    rows, columns = np.indices((COLOR.height, COLOR.width))
+    channel = BAYER_ORDERS[order][rows % 2, columns % 2]
+    values = np.take_along_axis(wall, channel[..., None].astype(int), axis=2)[..., 0].astype(np.float32)
+    surface = as_surface((mesh.vertices, mesh.normals))
+    term = ChannelTerm("color", synthesizer, looks, GaussianBayer(LEVELS), Passive(), BOUNDS)
+    term.observe(ChannelImage(values, channel), surface)
+    fit = term.fit(surface)
+    assert fit.inliers == fit.samples > 0.8 * fit.visible
+    assert fit.normalized_residual < 0.3
+    term.observe(
+        ChannelImage(values, BAYER_ORDERS["gbrg" if order == "rggb" else "rggb"][rows % 2, columns % 2]), surface
+    )
+    assert term.fit(surface).inliers < 0.8 * fit.inliers
 
 
 @ALL
