@@ -32,7 +32,7 @@ class Posterior:
         self._stretch = stretch
         self._shape = shape
         self._motion = motion
-        self._linearized: list[tuple[NDArray[np.float64], Quadratic]] = []
+        self._linearized: list[tuple[NDArray[np.float64], Quadratic, Linearization, NDArray[np.float64]]] = []
         self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
 
     def observe(self, observation: Observation) -> NDArray[np.float64]:
@@ -56,27 +56,21 @@ class Posterior:
 
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
-        if self._linearized and np.array_equal(self._linearized[0][0], theta):
-            return self._linearized[0][1]
-        surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
-        parts = [self._objective.linearize(surface, jacobian), *self._priors(surface, jacobian, theta)]
-        quadratic = gauss_newton(parts, self.dimension)
-        self._linearized = [(theta, quadratic)]
-        return quadratic
+        if not (self._linearized and np.array_equal(self._linearized[0][0], theta)):
+            surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
+            sensed = self._objective.linearize(surface, jacobian)
+            quadratic = gauss_newton([sensed, *self._priors(surface, jacobian, theta)], self.dimension)
+            self._linearized = [(theta, quadratic, sensed, jacobian)]
+        return self._linearized[0][1]
 
-    def sensed(
-        self, theta: NDArray[np.float64], offsets: NDArray[np.float64]
-    ) -> tuple[Linearization, NDArray[np.float64]]:
-        """What the sensors alone say near theta (dim,), and the derivatives (m, k) of the same residuals by offsets.
+    def sensed(self, theta: NDArray[np.float64]) -> tuple[Linearization, NDArray[np.float64]]:
+        """What the sensors alone say near theta (dim,), and the derivatives (n, 3, dim) of the vertices there."""
+        self.linearize(theta)
+        return self._linearized[0][2:]
 
-        Args:
-            theta: parameters (dim,).
-            offsets: by which the vertices are moved (n, 3, k) [m].
-        """
-        both = np.concatenate([vertex_jacobian(self._model, theta), offsets], axis=2)
-        found = self._objective.linearize(self._model.deform(theta[None]), both)
-        by_theta, by_offsets = np.split(found.jacobian, [self.dimension], axis=1)
-        return Linearization(found.residual, by_theta), by_offsets
+    def by_offsets(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (m, k) of the sensors' residuals at theta (dim,) by offsets of the vertices (n, 3, k) [m]."""
+        return self._objective.linearize(self._model.deform(theta[None]), offsets).jacobian
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker import status, uncertainty
-from abs_service.tracker.curvature import posterior_covariance, vertex_jacobian
+from abs_service.tracker.curvature import posterior_covariance
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome
@@ -36,6 +36,7 @@ class Tracker:
         self._evaluations = evaluations
         self._verdict = verdict
         self._started = False
+        self._own = np.zeros(0)  # variance of the vertices' own offsets, as far as Θ does not correct them
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """Searches while evaluations are left and `in_time` allows; widely, and as long as it takes, the first time."""
@@ -46,6 +47,7 @@ class Tracker:
         else:
             budget = Budget(self._evaluations, lambda: True)
             found = self._optimizer.explore(self._posterior, predicted, budget)
+            self._own = self._uncorrected(found.theta)
         self._started = True
         self._posterior.settle(found.theta)
         return self._estimate(observation, found, budget)
@@ -54,14 +56,20 @@ class Tracker:
         self, theta: NDArray[np.float64], surface: Surface
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
-        offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
-        sensed, by_offsets = self._posterior.sensed(theta, offsets)
-        inverse = posterior_covariance(self._posterior.linearize(theta))
-        covariance = uncertainty.sandwich(inverse, sensed)
-        jacobian = vertex_jacobian(self.model, theta)
-        response = -inverse @ (sensed.jacobian.T @ by_offsets)
-        own = uncertainty.remaining(offsets, jacobian, response)
+        sensed, jacobian = self._posterior.sensed(theta)
+        covariance = uncertainty.sandwich(posterior_covariance(self._posterior.linearize(theta)), sensed)
+        own = uncertainty.along_normals(surface, self._own)
         return covariance, uncertainty.propagated(jacobian, covariance) + own
+
+    def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance (n,) [m²] along the normals, told once for a mesh: it hardly changes with the deformation."""
+        surface = self.model.deform(theta[None])
+        offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
+        sensed, jacobian = self._posterior.sensed(theta)
+        inverse = posterior_covariance(self._posterior.linearize(theta))
+        response = -inverse @ (sensed.jacobian.T @ self._posterior.by_offsets(theta, offsets))
+        normals = surface.normals[0].T.astype(np.float64)
+        return np.einsum("ni,nij,nj->n", normals, uncertainty.remaining(offsets, jacobian, response), normals)
 
     def _estimate(self, observation: Observation, found: Outcome, budget: Budget) -> Estimate:
         surface = self.model.deform(found.theta[None])

@@ -13,7 +13,8 @@ with ε standard normal, and keeps that offset in all frames. The sensors see th
 moves Θ until the mesh lies on the surface as well as Θ can make it, and only the rest of the offsets remains. With the
 derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
 so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
-D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains.
+D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That takes a frame's time to tell, and is told
+once for a mesh, in the frame that it was made from; its part along the normal goes with the vertices from then on.
 """
 
 import numpy as np
@@ -60,6 +61,12 @@ def own_offsets(surface: Surface, deviation: NDArray[np.float64]) -> NDArray[np.
     own = np.arange(len(normals))
     offsets[own, :, own] = normals * deviations[:, None]
     return offsets[:, :, deviations > 0]
+
+
+def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
+    normals = surface.normals[0].T.astype(np.float64)
+    return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
 
 
 def remaining(
