@@ -36,7 +36,8 @@ class Tracker:
         self._evaluations = evaluations
         self._verdict = verdict
         self._started = False
-        self._own = np.zeros(0)  # variance of the vertices' own offsets, as far as Θ does not correct them
+        self._own = np.broadcast_to(model.mesh.deviation**2, len(model.mesh.vertices))
+        self._knows_own = False
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """Searches while evaluations are left and `in_time` allows; widely, and as long as it takes, the first time."""
@@ -44,10 +45,11 @@ class Tracker:
         if self._started:
             budget = Budget(self._evaluations, in_time)
             found = self._optimizer.follow(self._posterior, predicted, budget)
+            if not self._knows_own:
+                self._own, self._knows_own = self._uncorrected(found.theta), True
         else:
             budget = Budget(self._evaluations, lambda: True)
             found = self._optimizer.explore(self._posterior, predicted, budget)
-            self._own = self._uncorrected(found.theta)
         self._started = True
         self._posterior.settle(found.theta)
         return self._estimate(observation, found, budget)
@@ -62,7 +64,11 @@ class Tracker:
         return covariance, uncertainty.propagated(jacobian, covariance) + own
 
     def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance (n,) [m²] along the normals, told once for a mesh: it hardly changes with the deformation."""
+        """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.
+
+        Told once for a mesh, because it hardly changes with the deformation; not in the first frame, where nothing may
+        have moved and the priors let Θ correct nothing.
+        """
         surface = self.model.deform(theta[None])
         offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
         sensed, jacobian = self._posterior.sensed(theta)

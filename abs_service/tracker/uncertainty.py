@@ -14,7 +14,7 @@ moves Θ until the mesh lies on the surface as well as Θ can make it, and only 
 derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
 so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
 D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That takes a frame's time to tell, and is told
-once for a mesh, in the frame that it was made from; its part along the normal goes with the vertices from then on.
+once for a mesh, in the frame after the one that it was made from; its part along the normal goes with the vertices.
 """
 
 import numpy as np
