@@ -69,6 +69,8 @@ class Tracker:
         Told once for a mesh, because it hardly changes with the deformation; not in the first frame, where nothing may
         have moved and the priors let Θ correct nothing.
         """
+        if not np.any(self.model.mesh.deviation):
+            return self._own
         surface = self.model.deform(theta[None])
         offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
         sensed, jacobian = self._posterior.sensed(theta)

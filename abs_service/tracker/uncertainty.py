@@ -80,5 +80,5 @@ def remaining(
         response: −Σ JᵀJE, the change (dim, k) of Θ with which the search answers each error.
     """
     n, axes, dimension = jacobian.shape
-    left = offsets + (jacobian.reshape(-1, dimension) @ response).reshape(n, axes, -1)
+    left = offsets + (jacobian.reshape(-1, dimension) @ response).reshape(n, axes, response.shape[1])
     return left @ left.transpose(0, 2, 1)

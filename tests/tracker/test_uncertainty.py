@@ -89,6 +89,8 @@ def test_the_sandwich_learns_the_noise_that_the_residuals_show(factor):
 def test_a_mesh_that_is_exact_adds_nothing():
     exact = Surface(np.zeros((1, 3, 5), np.float32), np.ones((1, 3, 5), np.float32))
     assert uncertainty.own_offsets(exact, np.zeros(())).shape == (5, 3, 0)
+    nothing = uncertainty.remaining(np.zeros((5, 3, 0)), np.ones((5, 3, 2)), np.zeros((2, 0)))
+    np.testing.assert_array_equal(nothing, np.zeros((5, 3, 3)))
 
 
 def test_what_the_mesh_did_not_know_stays_with_its_vertices_when_they_are_sorted():
