@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import packages_distributions
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
 from pathlib import Path
 
 import pytest
@@ -57,6 +57,13 @@ def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> N
     assert [line for line in map(Requirement, wanted) if pins[line.name] not in line.specifier] == [], (
         "make constraints"
     )
+
+
+@pytest.mark.parametrize("name", ["constraints.txt", "constraints-dev.txt"])
+def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
+    """An installer that insists on hashes accepts nothing less; a list compiled from old metadata may fall short."""
+    pins = _pins(name)
+    assert {f"{pin} wants {wanted}" for pin in pins for wanted in _requirements(pin) if wanted not in pins} == set()
 
 
 def test_running_and_testing_use_the_same_versions() -> None:
@@ -120,6 +127,15 @@ def _not_portable(line: str) -> list[str]:
 def _pins(name: str) -> dict[str, Version]:
     text = (ROOT / name).read_text(encoding="utf-8")
     return {pin: Version(version) for pin, version in re.findall(r"^([\w-]+)==([^\s;]+)", text, re.M)}
+
+
+def _requirements(package: str) -> set[str]:
+    """What the installed `package` requires here; empty for one that this machine does without."""
+    try:
+        wanted = map(Requirement, requires(package) or [])
+    except PackageNotFoundError:
+        return set()
+    return {_normal(line.name) for line in wanted if line.marker is None or line.marker.evaluate({"extra": ""})}
 
 
 def _normal(name: str) -> str:
