@@ -8,6 +8,8 @@ import numpy as np
 from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
+from calib.noise.intensity import GaussianIntensity
+from calib.rig import PictureNoise
 
 
 def knots(control_points: int, degree: int) -> np.ndarray:
@@ -197,6 +199,12 @@ def color_cost(
             density = np.exp(-0.5 * e @ e) / (np.sqrt(2 * np.pi) * sigma) ** 3
         total -= np.log(max((1 - outlier_share) * density, outlier_share * uniform))
     return float(total)
+
+
+def picture_deviation(noise: PictureNoise, values: np.ndarray | float) -> np.ndarray:
+    """σ of numbers of a picture that have these values."""
+    relative = noise.relative if isinstance(noise, GaussianIntensity) else 0.0
+    return np.sqrt(noise.sigma**2 + (relative * np.asarray(values)) ** 2)
 
 
 def stretch_cost(rest: np.ndarray, vertices: np.ndarray, edges: np.ndarray, deviation: float) -> float:

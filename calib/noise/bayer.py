@@ -5,8 +5,9 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from calib.noise import fitting, pictures
 from calib.noise.base import LEVELS, NoiseError
 
 #: Every filter lets its own colour through and nothing else.
@@ -63,3 +64,40 @@ class GaussianBayer:
 
 
 Settings = GaussianBayer
+
+
+def fit(measured: ArrayLike, real: ArrayLike) -> GaussianBayer:
+    """The deviation of greatest likelihood; see `fit_crosstalk` for the filters.
+
+    Args:
+        measured: pixels of mosaics, in levels of 256; NaN where they do not count.
+        real: what they would have measured without noise, in the same shape.
+
+    Raises:
+        NoiseError: no measured number comes with a real one.
+    """
+    return GaussianBayer(pictures.fit_deviation(measured, real))
+
+
+def fit_crosstalk(measured: ArrayLike, colors: ArrayLike, channel: ArrayLike) -> tuple[tuple[float, float, float], ...]:
+    """Shares of red, green and blue light behind every filter, from pixels that saw known colours (a colour chart).
+
+    Args:
+        measured: pixels (n,) of a mosaic, in levels of 256.
+        colors: red, green and blue (n, 3) that each of them looked at, alike in the pixels around it.
+        channel: filter (n,) before each pixel: 0 red, 1 green, 2 blue.
+
+    Raises:
+        NoiseError: behind a filter there is no pixel, or the colours that it saw do not tell the three shares apart.
+    """
+    pixels, known, filters = np.asarray(measured, np.float64), np.asarray(colors, np.float64), np.asarray(channel)
+    for index, name in enumerate(("red", "green", "blue")):
+        if not np.any(filters == index):
+            raise NoiseError(f"no pixel lies behind a {name} filter")
+    rows = []
+    for index in range(3):
+        behind = filters == index
+        columns = fitting.Columns(known[behind], np.ones((np.count_nonzero(behind), 1)))
+        red, green, blue = fitting.maximize(pixels[behind], columns, span=LEVELS).mean.tolist()
+        rows.append((red, green, blue))
+    return tuple(rows)

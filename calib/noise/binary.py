@@ -5,6 +5,9 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt, Interval
+from numpy.typing import ArrayLike, NDArray
+
+from calib.noise.base import NoiseError
 
 Rate = Annotated[float, Interval(gt=0, lt=0.5)]
 
@@ -40,3 +43,42 @@ class LightBarrier:
 
 
 Settings = LightBarrier
+
+
+def log_probability(model: LightBarrier, interrupted: ArrayLike, crossing: ArrayLike) -> NDArray[np.float64]:
+    """Logarithm of the probability of readings, of beams that the object crosses or leaves free; both boolean."""
+    costs = np.array([model.cost(False), model.cost(True)])
+    return -costs[np.asarray(interrupted, int), np.asarray(crossing, int)]
+
+
+def sample(model: LightBarrier, generator: np.random.Generator, crossing: ArrayLike) -> NDArray[np.bool_]:
+    """Draws one reading for every beam that the object crosses or leaves free; True where it is interrupted."""
+    crosses = np.asarray(crossing, np.bool_)
+    return crosses ^ (generator.random(crosses.shape) < np.where(crosses, model.miss, model.false_alarm))
+
+
+def fit(interrupted: ArrayLike, crossing: ArrayLike, length_m: float) -> LightBarrier:
+    """Error rates from readings of which the truth is known: the means of their posterior (Jeffreys' prior).
+
+    Errors that never happened in n readings are taken to happen once in 2 (n + 1), so that no reading is impossible.
+
+    Args:
+        interrupted: readings (n,), boolean.
+        crossing: whether the object crossed the beam (n,), boolean.
+        length_m: from the lamp to the receiver [m].
+
+    Raises:
+        NoiseError: the beam was always free, or never; or the receiver errs at least as often as not.
+    """
+    readings, crosses = np.asarray(interrupted, np.bool_), np.asarray(crossing, np.bool_)
+    miss = _rate("miss", ~readings[crosses], "crossed by the object")
+    return LightBarrier(length_m, miss, _rate("false_alarm", readings[~crosses], "free"))
+
+
+def _rate(name: str, errors: NDArray[np.bool_], state: str) -> float:
+    if not errors.size:
+        raise NoiseError(f"{name} is unknown: the beam was never {state}")
+    rate = (np.count_nonzero(errors) + 0.5) / (errors.size + 1)
+    if rate >= 0.5:
+        raise NoiseError(f"{name} is {rate:.2f}, but must be less than 0.5: the readings say the opposite, or nothing")
+    return rate

@@ -63,15 +63,22 @@ class Law:
 NO_CORNERS = Columns(np.zeros((0, 0)), np.zeros((0, 0)))
 
 
-def maximize(residual: NDArray[np.floating], columns: Columns, power: int = 1, corners: Columns = NO_CORNERS) -> Law:
+def maximize(
+    residual: NDArray[np.floating],
+    columns: Columns,
+    power: int = 1,
+    corners: Columns = NO_CORNERS,
+    span: float = RANGE_M,
+) -> Law:
     """Fits (1 − ε) N(μ, σ²) + ε uniform to residuals, with μ = columns.mean @ m and σᵖᵒʷᵉʳ = columns.spread @ s.
 
     Args:
-        residual: measured minus real distance (n,) [m].
+        residual: measured minus real distance (n,) [m], or another number.
         columns: of every sample.
         power: 1 if the deviation is linear in its parameters, 2 if the variance is.
         corners: of conditions under which there may be no sample. Each counts like one sample of the usual mean and
             spread: nothing beside thousands of real ones, and enough that nothing wild is said where there are none.
+        span: range over which an outlier is uniform, in the unit of the residuals.
 
     Raises:
         NoiseError: the samples do not vary enough to tell the coefficients of all columns.
@@ -82,7 +89,7 @@ def maximize(residual: NDArray[np.floating], columns: Columns, power: int = 1, c
     q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns, however different the powers of x and a are
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
-    samples = _Samples(residual / unit, Columns(q_mean, q_spread), power, unit / RANGE_M)
+    samples = _Samples(residual / unit, Columns(q_mean, q_spread), power, unit / span)
     turned = Columns(_solved(corners.mean, r_mean), _solved(corners.spread, r_spread))
     imagined = _Imagined(usual / unit, turned, power)
 
@@ -199,7 +206,7 @@ def _check_variety(columns: NDArray[np.floating]) -> None:
     scaled = columns / np.linalg.norm(columns, axis=0)
     if columns.shape[1] and np.linalg.svd(scaled, compute_uv=False)[-1] < _LEAST_VARIETY:
         raise NoiseError(
-            f"the samples' distances and amplitudes vary too little to tell {columns.shape[1]} coefficients apart; "
+            f"the samples vary too little to tell {columns.shape[1]} coefficients apart; "
             "measure at more distances and on more materials, or ask for lower powers"
         )
 

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import numpy as np
 from annotated_types import Gt
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from calib.noise import pictures
 from calib.noise.base import LEVELS
 
 
@@ -37,3 +38,16 @@ class GaussianGrey:
 
 
 Settings = GaussianGrey
+
+
+def fit(measured: ArrayLike, real: ArrayLike) -> GaussianGrey:
+    """The model of greatest likelihood.
+
+    Args:
+        measured: grey of pixels, in levels of 256; NaN where it does not count.
+        real: what they would have measured without noise, in the same shape.
+
+    Raises:
+        NoiseError: no measured number comes with a real one.
+    """
+    return GaussianGrey(pictures.fit_deviation(measured, real))
