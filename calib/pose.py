@@ -6,6 +6,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Pose = NDArray[np.float64]
 
+#: Matrices (3, 3, 3): the k-th times a vector is the cross product of the k-th axis with it.
+_CROSS = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(0, 2, 1)
+
 
 def identity() -> Pose:
     """The pose that maps every point to itself."""
@@ -23,6 +26,25 @@ def from_rotation_vector(rotation_vector: ArrayLike, translation: ArrayLike) -> 
 def to_rotation_vector(T_ab: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The rotation vector [rad] and translation [m] of a pose; inverse of `from_rotation_vector`."""
     return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_rotvec(), T_ab[:3, 3].copy()
+
+
+def turning(rotation_vector: ArrayLike, turned: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Derivatives (n, 3, 3) of turned points R p by the rotation vector (3,) that R is of: −[R p]× J.
+
+    J = I + (1 − cos θ)/θ² [r]× + (θ − sin θ)/θ³ [r]×² is the left Jacobian of the rotations (T. D. Barfoot, State
+    Estimation for Robotics, eq. 7.77).
+
+    Args:
+        rotation_vector: r with the angle θ = ‖r‖ [rad].
+        turned: R p (n, 3).
+    """
+    r = np.asarray(rotation_vector, np.float64)
+    angle = float(np.linalg.norm(r))
+    cross = np.tensordot(r, _CROSS, 1)
+    first = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    second = (angle - np.sin(angle)) / angle**3 if angle > 1e-2 else 1 / 6 - angle**2 / 120
+    left = np.eye(3) + first * cross + second * cross @ cross
+    return -(turned @ (_CROSS @ left).reshape(3, 9)).reshape(-1, 3, 3)
 
 
 def to_quaternion(T_ab: Pose) -> NDArray[np.float64]:

@@ -6,11 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.terms.base import Linearization
-
-#: Surface motion [m] of the central differences that give the vertices' derivatives.
-STEP_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,15 +20,6 @@ class Quadratic:
 
     gradient: NDArray[np.float64]
     curvature: NDArray[np.float64]
-
-
-def vertex_jacobian(model: DeformationModel, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives (n, 3, dim) of the vertices by the parameters, by central differences."""
-    steps = STEP_M * model.scales
-    offsets = np.diag(steps)
-    vertices = model.deform(np.concatenate([theta + offsets, theta - offsets])).vertices.astype(np.float64)
-    plus, minus = vertices[: len(steps)], vertices[len(steps) :]
-    return np.asarray((plus - minus) / (2 * steps)[:, None, None], np.float64).transpose(2, 1, 0)
 
 
 def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:

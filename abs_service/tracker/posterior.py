@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
-from abs_service.tracker.curvature import Quadratic, gauss_newton, vertex_jacobian
+from abs_service.tracker.curvature import Quadratic, gauss_newton
 from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
@@ -57,7 +57,7 @@ class Posterior:
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
         if not (self._linearized and np.array_equal(self._linearized[0][0], theta)):
-            surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
+            surface, jacobian = self._model.deform(theta[None]), self._model.jacobian(theta)
             sensed = self._objective.linearize(surface, jacobian)
             quadratic = gauss_newton([sensed, *self._priors(surface, jacobian, theta)], self.dimension)
             self._linearized = [(theta, quadratic, sensed, jacobian)]
@@ -74,7 +74,7 @@ class Posterior:
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""
-        surface, jacobian = self._model.deform(theta[None]), vertex_jacobian(self._model, theta)
+        surface, jacobian = self._model.deform(theta[None]), self._model.jacobian(theta)
         return gauss_newton(self._priors(surface, jacobian, theta), self.dimension)
 
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from abs_service.observation import Observation, Observer
-from abs_service.tracker.curvature import gauss_newton, search_metric, vertex_jacobian
+from abs_service.tracker.curvature import gauss_newton, search_metric
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.nurbs import Settings
+from abs_service.tracker.models.nurbs import Nurbs, Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
 from abs_service.tracker.priors import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
@@ -23,6 +23,7 @@ from abs_service.tracker.terms.base import Linearization
 from abs_service.tracking import Tracking
 from calib.noise.base import render_texture
 from calib.rig import Rig
+from tests.tracker.differences import central_differences
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 from tests.tracker.scenes import sheet
 
@@ -119,13 +120,15 @@ def test_per_frame_linearize(benchmark, observation):
     model, thetas = model_and_thetas((4, 4), sheet(17, 18))
     objective = Likelihood().build(RIG, model.mesh, Sparse(RIG, model.mesh))
     objective.observe(observation, model.deform(model.rest[None]))
-    surface, jacobian = model.deform(thetas[:1]), vertex_jacobian(model, thetas[0])
+    surface, jacobian = model.deform(thetas[:1]), model.jacobian(thetas[0])
     assert benchmark(objective.linearize, surface, jacobian).jacobian.shape[1] == 48
 
 
-def test_per_frame_vertex_jacobian(benchmark):
-    model, thetas = model_and_thetas((4, 4), sheet(17, 18))
-    assert benchmark(vertex_jacobian, model, thetas[0]).shape == (306, 3, 48)
+@pytest.mark.parametrize("size", [(17, 18), (32, 32)], ids=["306", "1024"])
+@pytest.mark.parametrize("derivatives", [Nurbs.jacobian, central_differences], ids=["closed", "differences"])
+def test_per_frame_jacobian(benchmark, derivatives, size):
+    model, thetas = model_and_thetas((4, 4), sheet(*size))
+    assert benchmark(derivatives, model, thetas[0]).shape == (size[0] * size[1], 3, 48)
 
 
 def test_per_frame_search_metric(benchmark):
@@ -134,9 +137,10 @@ def test_per_frame_search_metric(benchmark):
     assert benchmark(search_metric, quadratic).shape == (48, 48)
 
 
-def test_whole_frame_of_300_vertices(benchmark):
-    """From a frame set to an estimate with the default plan: 4 × 4 control points, 20 generations."""
-    tracking = Tracking(RIG, default_plan())
+@pytest.mark.parametrize("vertices", [300, 1000])
+def test_whole_frame(benchmark, vertices):
+    """From a frame set to an estimate with the default plan: 4 × 4 control points, `hybrid`."""
+    tracking = Tracking(RIG, default_plan(vertices=vertices))
     exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(30, 50)]
     tracking.track(exposures[0], lambda: True)
     following = iter(exposures[1:])

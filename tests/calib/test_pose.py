@@ -71,3 +71,15 @@ BROKEN = np.eye(4)[[1, 0, 2, 3]]  # a mirror
 @pytest.mark.parametrize("matrix", [2 * np.eye(4), BROKEN, np.full((4, 4), np.nan), np.eye(4) + np.eye(4)[::-1]])
 def test_what_is_no_pose_is_recognised(matrix):
     assert not pose.is_pose(matrix)
+
+
+@given(vectors | vectors.map(lambda v: v * 1e-3) | vectors.map(lambda v: v * 1e-8), vectors)
+def test_turned_points_follow_the_rotation_vector_as_their_derivatives_say(rotation_vector, point):
+    steps = 1e-6 * np.eye(3)
+    ahead, behind = (
+        [pose.from_rotation_vector(rotation_vector + sign * step, (0, 0, 0))[:3, :3] @ point for step in steps]
+        for sign in (1, -1)
+    )
+    turned = pose.transform(pose.from_rotation_vector(rotation_vector, (0, 0, 0)), point[None])
+    expected = (np.array(ahead) - behind).T / 2e-6
+    np.testing.assert_allclose(pose.turning(rotation_vector, turned)[0], expected, rtol=0, atol=1e-8)

@@ -21,7 +21,6 @@ from scipy.linalg import eigh
 from scipy.stats import chi2
 
 from abs_service.evaluation import TruthComparison
-from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel
@@ -72,7 +71,7 @@ def coverage(uri: str, frames: int) -> Coverage:
     rows, said, true = [], [], []
     for frame in list(tracked(simulation, frames))[1:]:
         error, known = frame.points - frame.estimate.vertices, frame.estimate.covariance
-        jacobian = vertex_jacobian(frame.model, frame.estimate.theta)
+        jacobian = frame.model.jacobian(frame.estimate.theta)
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
         sensed = _sensed(known, _prior(frame, jacobian, 1 / simulation.rate_hz))
         within = [

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.observation import Observer
-from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.initialization import sight
 from abs_service.tracker.models import gravity, posed
@@ -113,23 +112,10 @@ def test_the_gripper_carries_the_strip(angles, motion):
     np.testing.assert_allclose(moved.normals[0].T, still.normals[0].T @ T_rr[:3, :3].T, atol=1e-6)
 
 
-@given(bends)
-def test_derivatives_are_those_of_the_exact_form(angles):
-    """Central differences of the kernel against those of eq. 9 in double precision."""
-    shape = model(len(angles), gripper="fixed")
-    found = vertex_jacobian(shape, angles)
-    flat = flat_points(shape)
-    for i, step in enumerate(1e-6 * np.eye(len(angles))):
-        change = (
-            reference.gravity(flat, angles + step, LENGTH) - reference.gravity(flat, angles - step, LENGTH)
-        ) / 2e-6
-        np.testing.assert_allclose(found[..., i], change @ HELD[:3, :3].T, rtol=0, atol=2e-3)
-
-
 @pytest.mark.parametrize("segments", [1, 4, 16])
 def test_scales_move_the_flat_strip_by_about_a_metre_per_unit(segments):
     shape = model(segments)
-    motion = vertex_jacobian(shape, np.zeros(segments + 6)) * shape.scales
+    motion = shape.jacobian(np.zeros(segments + 6)) * shape.scales
     farthest = np.linalg.norm(motion, axis=1).max(axis=0)
     assert np.all(
         (farthest[[*range(segments), *range(-3, 0)]] > 0.3) & (farthest[[*range(segments), *range(-3, 0)]] < 1.5)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from abs_service.images import ColorImage
-from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.priors import MotionPrior, StretchPrior
@@ -28,23 +27,6 @@ SIGMA = 5e-3
 BOUNDS = Bounds(0.05, 1.6, 4.6)
 
 
-def test_the_jacobian_of_the_vertices_is_that_of_the_model():
-    model = Settings(control_points=(4, 4)).of_mesh(sheet())
-    jacobian = vertex_jacobian(model, model.rest)
-    generator = np.random.default_rng(1)
-    step = generator.normal(0, 1e-4, len(model.rest))
-    moved = model.deform(np.stack([model.rest + step, model.rest - step])).vertices.astype(float)
-    np.testing.assert_allclose(jacobian @ step, (moved[0] - moved[1]).T / 2, atol=3e-7)
-
-
-def test_the_jacobian_of_a_rigid_motion_is_the_lever_rule():
-    model = Rigid(sheet())
-    jacobian = vertex_jacobian(model, model.rest)
-    arms = model.mesh.vertices - model.mesh.vertices.mean(axis=0)
-    np.testing.assert_allclose(jacobian[:, :, 3:], np.tile(np.eye(3), (len(arms), 1, 1)), atol=2e-4)
-    np.testing.assert_allclose(jacobian[:, :, 2], np.cross([0, 0, 1], arms), atol=2e-4)
-
-
 def depth_term() -> DepthTerm:
     term = DepthTerm("tof", sparse(FINE, MESH), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     term.observe(depth_image(plane_distance(FINE, NORMAL, 1.0)), as_surface((MESH.vertices, MESH.normals)))
@@ -56,7 +38,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
     model, term = Rigid(MESH), depth_term()
     theta = np.array([0, 0, 0, 2e-3, -1e-3, 3e-3])
     there = model.deform(theta[None])
-    linear = term.linearize(there, vertex_jacobian(model, theta))
+    linear = term.linearize(there, model.jacobian(theta))
     assert len(linear.residual) == len(MESH.vertices)
     for step in np.diag([0.02, 0.02, 0.1, 0.02, 0.04, 5e-3]):
         predicted = linear.jacobian @ step
@@ -68,7 +50,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
 def test_depth_residuals_are_normalised_differences():
     model, term = Rigid(MESH), depth_term()
     nearer = np.array([0, 0, 0, 0, 0, -SIGMA])
-    linear = term.linearize(model.deform(nearer[None]), vertex_jacobian(model, nearer))
+    linear = term.linearize(model.deform(nearer[None]), model.jacobian(nearer))
     sight = MESH.vertices / np.linalg.norm(MESH.vertices, axis=1, keepdims=True)
     gap = SIGMA * NORMAL[2] / (sight @ NORMAL)  # along the ray, from a plane moved by σ along z
     np.testing.assert_allclose(linear.residual, gap / SIGMA, atol=0.04)
@@ -95,7 +77,7 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
     colors = np.stack([columns, rows, 255 - rows], axis=-1)
     term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), GaussianColor(10.0), BOUNDS)
     term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
-    linear = term.linearize(model.deform(model.rest[None]), vertex_jacobian(model, model.rest))
+    linear = term.linearize(model.deform(model.rest[None]), model.jacobian(model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=0.06)  # pixels are whole numbers
     for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
         theta = np.zeros(6)
@@ -134,7 +116,7 @@ def test_stretch_rows_are_derivatives_of_the_stretch_cost():
     model = Settings(control_points=(4, 4)).of_mesh(sheet(5, 6))
     prior = StretchPrior(model.mesh, 0.02)
     theta = model.rest + np.random.default_rng(2).normal(0, 3e-3, len(model.rest))
-    linear = prior.linearize(model.deform(theta[None]), vertex_jacobian(model, theta))
+    linear = prior.linearize(model.deform(theta[None]), model.jacobian(theta))
     assert 0.5 * np.sum(linear.residual**2) == pytest.approx(prior.cost(model.deform(theta[None]))[0], rel=1e-3)
     gradient, h = linear.jacobian.T @ linear.residual, 1e-4
     offsets = h * np.eye(len(theta))

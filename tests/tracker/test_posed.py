@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from abs_service import config
 from abs_service.commands import plans
-from abs_service.tracker.curvature import gauss_newton, search_metric, vertex_jacobian
+from abs_service.tracker.curvature import gauss_newton, search_metric
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
@@ -88,6 +88,11 @@ class Waves:
             vertices.astype(np.float32), np.tile(self.mesh.normals.T, (len(thetas), 1, 1)).astype(np.float32)
         )
 
+    def jacobian(self, theta: np.ndarray) -> np.ndarray:
+        result = np.zeros((len(self.mesh.vertices), 3, len(theta)))
+        result[:, 2] = np.sin(np.outer(self.mesh.vertices[:, 0], [40.0, 60.0]))
+        return result
+
 
 @pytest.mark.parametrize(
     ("shape", "known", "rigid"),
@@ -120,7 +125,7 @@ def test_a_rigid_motion_of_the_shape_costs_what_it_moves_the_vertices():
 
 def test_what_only_deforms_the_shape_costs_nothing():
     """A bend whose vertices on the whole neither shift nor turn."""
-    jacobian = vertex_jacobian(SHAPE, SHAPE.rest).reshape(-1, 48)
+    jacobian = SHAPE.jacobian(SHAPE.rest).reshape(-1, 48)
     x = SHAPE.mesh.vertices[:, 0]
     target = np.column_stack([np.zeros_like(x), np.zeros_like(x), x**2 - np.mean(x**2)]).ravel()
     bend = np.concatenate([np.zeros(6), np.linalg.lstsq(jacobian, target, rcond=None)[0]])
@@ -130,7 +135,7 @@ def test_what_only_deforms_the_shape_costs_nothing():
 def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     motion = MotionPrior(MODEL.rest, MODEL.scales, PriorSettings())
     motion.predict(0)
-    jacobian = vertex_jacobian(MODEL, MODEL.rest)
+    jacobian = MODEL.jacobian(MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
     stretch = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), jacobian).jacobian
     rows = np.concatenate([measured, stretch, MODEL.prior, motion.linearize(MODEL.rest).jacobian])

@@ -7,7 +7,6 @@ import pytest
 
 from abs_service.images import ChannelImage, ColorImage
 from abs_service.readers import BAYER_ORDERS
-from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.rigid import Rigid
@@ -57,7 +56,7 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
     """Derivative of the cost by a parameter of the pose, numerically and as the linearisation says."""
     offset = step * np.eye(6)[parameter]
     ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
-    linear = term.linearize(model.deform(theta[None]), vertex_jacobian(model, theta))
+    linear = term.linearize(model.deform(theta[None]), model.jacobian(theta))
     return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from abs_service.images import ColorImage
-from abs_service.tracker.curvature import vertex_jacobian
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.raster import Raster
@@ -196,7 +195,7 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     """The slope of what is linearised is that of the cost; depth itself says nothing about sliding along a plane."""
     term, model = term_before(board(STRAIGHT)), Rigid(MESH)
     theta = np.array([0, 0, 0, x, 0, 0])
-    jacobian = vertex_jacobian(model, theta)
+    jacobian = model.jacobian(theta)
     linear = term.linearize(model.deform(theta[None]), jacobian)
     ahead, behind = (
         np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)

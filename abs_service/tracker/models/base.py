@@ -48,3 +48,7 @@ class DeformationModel(Protocol):
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, dim)."""
         ...
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, dim) of the vertices by the parameters at theta (dim,), contiguous."""
+        ...

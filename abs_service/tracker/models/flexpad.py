@@ -9,6 +9,7 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.models import bends
+from abs_service.tracker.models.arc import arc
 from abs_service.tracker.models.base import BOARD, Surface
 from abs_service.tracker.rectangle import find_sheet
 from abs_service.tracker.sheet import Sheet
@@ -108,6 +109,31 @@ class FlexPad:
         sides = bends.SIDES.astype(np.float32)
         _deform(row, fraction, height.astype(np.float32), motion, self._points, sides, self._tables, vertices, normals)
         return Surface(vertices, normals)
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, 15) of the vertices at theta (15,), by bends and g beyond their range none."""
+        turn = pose.from_rotation_vector(theta[ROTATION], (0, 0, 0))[:3, :3]
+        turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
+        shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
+        on_sheet = turn @ self._rotation @ self._slopes(theta[BENDS], theta[HEIGHT])
+        return np.concatenate([on_sheet, pose.turning(theta[ROTATION], turned), shifts], axis=2)
+
+    def _slopes(self, bend: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+        """Derivatives (n, 3, 9) of places on the sheet, z pointing away, by bends (8,) and height map.
+
+        They are those of the exact bends; the tables' own would jump from row to row.
+        """
+        per_bend = self._kappa[-1] / bends.FULL
+        bounded, g = np.clip(bend, -bends.FULL, bends.FULL), np.clip(height, -FULL_HEIGHT, FULL_HEIGHT)
+        q = np.maximum(bends.SIDES @ self._points, 0.0)
+        end, slope = arc((per_bend * bounded)[:, None] * q)
+        rise = np.sum(q * end.imag, axis=0)
+        by_bends = np.where(bounded == bend, per_bend, 0.0)[:, None] * q**2 * slope
+        result = np.zeros((len(rise), 3, 9))
+        result[:, :2, :8] = by_bends.real.T[:, None] * bends.SIDES.T
+        result[:, 2, :8] = -(by_bends.imag * (1 + 2 * g / self._half * rise)).T
+        result[:, 2, 8] = np.where(g == height, -(rise**2) / self._half, 0.0)
+        return result
 
 
 def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> NDArray[np.float64]:

@@ -8,9 +8,11 @@ import scipy  # its parts are imported when they are first used
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.arc import arc
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.sighting import Sighting
 from abs_service.tracker.strip import Strip, find_strip
+from calib import pose
 from calib.jit import kernel
 from calib.pose import Pose
 
@@ -101,6 +103,29 @@ class Gravity:
         normals = np.empty_like(vertices)
         _deform(bends, self._step, self._gripper(thetas), self._along, self._across, vertices, normals)
         return Surface(vertices, normals)
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
+        gripper = self._gripper(theta[None])[0]
+        slopes = self._slopes(theta[: self.segments])
+        in_plane = np.stack([slopes.real, slopes.imag], axis=-1) @ gripper[:, [0, 2]].T
+        by_bends = np.tile(in_plane.transpose(1, 2, 0), (len(self._across), 1, 1))
+        if len(theta) == self.segments:
+            return by_bends
+        arms = self.deform(theta[None]).vertices[0].T - gripper[:, 3]
+        turning = pose.turning(theta[self.segments : self.segments + 3], arms)
+        return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
+
+    def _slopes(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Derivatives (segments, columns) of the columns' places along (real) and across (imaginary) the gripper's x.
+
+        A bend changes its own segment's arc, and turns what comes after.
+        """
+        shares = np.clip(self._along / self._step - np.arange(self.segments)[:, None], 0, 1)
+        starts = self._step * np.exp(1j * (np.cumsum(bends) - bends))[:, None] * shares
+        end, slope = arc(bends[:, None] * shares)
+        passed = np.cumsum(starts * end, axis=0)
+        return starts * shares * slope + 1j * (passed[-1] - passed)
 
     def inclination(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Angle between the strip and the horizontal, downwards, (segments + 1,) [rad] at the ends of the segments.

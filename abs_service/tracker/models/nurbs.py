@@ -119,6 +119,12 @@ class Nurbs:
         _deform(control, self._span_start, self._span_control, self._basis, self._offset, vertices, normals)
         return Surface(vertices, normals)
 
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
+        result = np.zeros((len(self._offset), 3, len(theta)))
+        _jacobian(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, result)
+        return result
+
 
 @kernel
 def _deform(
@@ -183,3 +189,50 @@ def _deform(
             p0[v] += n0[v] * offset[v]
             p1[v] += n1[v] * offset[v]
             p2[v] += n2[v] * offset[v]
+
+
+@kernel
+def _jacobian(
+    control: NDArray[np.float64],
+    span_start: NDArray[np.int32],
+    span_control: NDArray[np.int32],
+    basis: NDArray[np.float32],
+    offset: NDArray[np.float32],
+    result: NDArray[np.float64],
+) -> None:
+    """Derivatives of eq. 8 by the control points: ∂D(v)/∂p = R_p I − o ∇R_p N̂ᵀ.
+
+    Where a motion along the normal rises, N̂ turns back by as much: its derivative is −∇R_p N̂ᵀ, with the gradient
+    ∇R_p = ∂R_p/∂u a + ∂R_p/∂w b on the surface. Of its tangents U and W with N = U × W, the dual ones are
+    a = W × N̂/‖N‖ and b = N̂ × U/‖N‖.
+
+    Args:
+        control: (control points, 3).
+        span_start, span_control, basis, offset: as in `_deform`.
+        result: zeros (n, 3, 3 · control points) to begin with.
+    """
+    u, w, normal, a, b = np.empty((5, 3))
+    for s in range(span_control.shape[0]):
+        for v in range(span_start[s], span_start[s + 1]):
+            u[:] = 0
+            w[:] = 0
+            for q in range(span_control.shape[1]):
+                for i in range(3):
+                    u[i] += basis[1, q, v] * control[span_control[s, q], i]
+                    w[i] += basis[2, q, v] * control[span_control[s, q], i]
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                normal[i] = u[j] * w[k] - u[k] * w[j]
+            inverse = 1 / np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2 + 1e-20)
+            normal *= inverse
+            for i in range(3):
+                j, k = (i + 1) % 3, (i + 2) % 3
+                a[i] = (w[j] * normal[k] - w[k] * normal[j]) * inverse
+                b[i] = (normal[j] * u[k] - normal[k] * u[j]) * inverse
+            for q in range(span_control.shape[1]):
+                first = 3 * span_control[s, q]
+                for i in range(3):
+                    turn = -offset[v] * (basis[1, q, v] * a[i] + basis[2, q, v] * b[i])
+                    for j in range(3):
+                        result[v, i, first + j] = turn * normal[j]
+                    result[v, i, first + i] += basis[0, q, v]

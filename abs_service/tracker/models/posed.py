@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.sighting import Sighting
+from calib import pose
 from calib.jit import kernel
 
 #: Standard deviation of the rigid motion that is left to the shape [m].
@@ -16,9 +17,6 @@ GAUGE_M = 1e-4
 
 #: A shape can do a rigid motion by itself if the cosine between it and the shape's nearest motion is larger.
 CONTAINED = 0.999
-
-#: Surface motion [m] of the central differences that tell the shape's motions.
-STEP_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -78,14 +76,22 @@ class Posed:
         _move(motion, self._centroid.astype(np.float32), surface.vertices, surface.normals)
         return surface
 
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, dim) of the vertices at theta (dim,): those of the pose, then the shape's, turned."""
+        R = pose.from_rotation_vector(theta[:3], (0, 0, 0))[:3, :3]
+        turned = (self._shape.deform(theta[None, 6:]).vertices[0].T - self._centroid) @ R.T
+        result = np.empty((len(turned), 3, len(theta)))
+        result[:, :, :3] = pose.turning(theta[:3], turned)
+        result[:, :, 3:6] = np.eye(3)
+        np.matmul(R, self._shape.jacobian(theta[6:]), out=result[:, :, 6:])
+        return result
+
 
 def _gauge(shape: DeformationModel) -> NDArray[np.float64]:
     """Rows (k, dim of the shape) of the prior, one for each of k ≤ 6 rigid motions that the shape can do by itself."""
     count = len(shape.mesh.vertices)
-    steps = np.diag(STEP_M * shape.scales)
-    moved = shape.deform(np.concatenate([shape.rest + steps, shape.rest - steps])).vertices.astype(np.float64)
     # Columns: how the vertices move, component by component, when a parameter moves the surface by a metre.
-    motions = ((moved[: len(steps)] - moved[len(steps) :]) / (2 * STEP_M)).reshape(len(steps), -1).T
+    motions = shape.jacobian(shape.rest).transpose(1, 0, 2).reshape(3 * count, -1) * shape.scales
     arms = shape.mesh.vertices - shape.mesh.vertices.mean(axis=0)
     turns = [np.cross(axis, arms).T.ravel() for axis in np.eye(3)]
     rigid = np.linalg.qr(np.column_stack([np.kron(np.eye(3), np.ones((count, 1))), *turns]))[0]

@@ -10,6 +10,7 @@ from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, Surface
 from abs_service.tracker.sighting import Sighting
+from calib import pose
 
 
 @dataclass(frozen=True)
@@ -57,3 +58,9 @@ class Rigid:
         vertices = rotations @ self._arms.T + centers
         normals = rotations @ self._normals.T
         return Surface(np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32))
+
+    def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives (n, 3, 6) of the vertices at theta (6,)."""
+        turned = pose.transform(pose.from_rotation_vector(theta[:3], (0, 0, 0)), self._arms)
+        shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
+        return np.concatenate([pose.turning(theta[:3], turned), shifts], axis=2)
