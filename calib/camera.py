@@ -70,6 +70,15 @@ class Camera:
             ideal = np.where(depth > 0, points_s[..., :2] / depth, np.nan)
         return self.lens.distort(ideal) * (self.fx, self.fy) + (self.cx, self.cy)
 
+    def projection_jacobian(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Derivatives (…, 2, 3) of `project` by rig points (…, 3) before the camera [px/m]."""
+        points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
+        depth = points_s[..., 2, None, None]
+        ideal = points_s[..., :2] / depth[..., 0]
+        by_ideal = self.lens.jacobian(ideal) * np.array([[self.fx], [self.fy]]) / depth
+        by_depth = -np.sum(by_ideal * ideal[..., None, :], axis=-1, keepdims=True)
+        return np.concatenate([by_ideal, by_depth], axis=-1) @ self.T_rs[:3, :3].T
+
     def distance(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
         """Radial distance (…,) [m] from the camera centre, eq. 11."""
         return np.linalg.norm(np.asarray(points_r, np.float64) - self.center, axis=-1)

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
+#: Normalised coordinates that no pixel has; an iteration that goes there finds nothing any more.
+FARTHEST = 1e6
+
 
 class LensError(ValueError):
     """Coefficients that are no lens, or a point for which the distortion has no inverse."""
@@ -53,6 +56,21 @@ class Lens:
             axis=-1,
         )
 
+    def jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Derivatives (…, 2, 2) of `distort` by the ideal normalised coordinates (…, 2)."""
+        k1, k2, p1, p2, k3, k4, k5, k6 = self.coefficients
+        x, y = np.moveaxis(np.asarray(xy, np.float64), -1, 0)
+        r2 = x * x + y * y
+        below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
+        # Twice the derivative of the radial factor by r², since r² changes by 2x and 2y.
+        slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3) - radial * (k4 + r2 * (2 * k5 + r2 * 3 * k6))) / below
+        result = np.empty((*r2.shape, 2, 2))
+        result[..., 0, 0] = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x
+        result[..., 0, 1] = result[..., 1, 0] = x * y * slope + 2 * p1 * x + 2 * p2 * y
+        result[..., 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
+        return result
+
     def undistort(self, xy: NDArray[np.floating], tolerance: float = 1e-10) -> NDArray[np.float64]:
         """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method.
 
@@ -68,10 +86,13 @@ class Lens:
             if np.all(np.abs(residual) < tolerance) and np.all(self._is_before_fold(ideal)):
                 return ideal.reshape(np.shape(xy))
             try:
-                inverse = np.linalg.inv(self._jacobian(ideal))
-            except np.linalg.LinAlgError:  # the iteration has left the range of numbers
+                inverse = np.linalg.inv(self.jacobian(ideal))
+            except np.linalg.LinAlgError:  # exactly on a fold
                 break
-            ideal -= np.einsum("nij,nj->ni", inverse, residual)
+            step = np.einsum("nij,nj->ni", inverse, residual)
+            if not np.all(np.abs(step) < FARTHEST):
+                break
+            ideal -= step
         error = np.where(self._is_before_fold(ideal), np.abs(self.distort(ideal) - target).max(axis=1), np.inf)
         worst = target[error.argmax()]
         raise LensError(f"the distortion {self.coefficients.tolist()} has no inverse at normalised {worst.tolist()}")
@@ -84,13 +105,6 @@ class Lens:
         """
         before = np.ones(len(xy), np.bool_)
         for part in (0.25, 0.5, 0.75, 1.0):
-            jacobian = self._jacobian(part * xy)
+            jacobian = self.jacobian(part * xy)
             before &= (np.linalg.det(jacobian) > 0) & (np.trace(jacobian, axis1=1, axis2=2) > 0)
         return before
-
-    def _jacobian(self, xy: NDArray[np.float64], step: float = 1e-6) -> NDArray[np.float64]:
-        columns = [
-            (self.distort(xy + delta) - self.distort(xy - delta)) / (2 * step)
-            for delta in (np.array([step, 0.0]), np.array([0.0, step]))
-        ]
-        return np.stack(columns, axis=-1)

@@ -50,12 +50,11 @@ class StretchPrior:
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The edges' normalised residuals of a population of one, and their derivatives; jacobian (n, 3, dim)."""
-        first, second = self._edges.T
-        difference = (surface.vertices[0][:, first] - surface.vertices[0][:, second]).T.astype(np.float64)
-        length = np.linalg.norm(difference, axis=1, keepdims=True)
-        scale = self._inverse_lengths[:, None] * self._inverse_deviation
-        rows = np.einsum("ei,eid->ed", difference / length * scale, jacobian[first] - jacobian[second])
-        return Linearization((length * scale)[:, 0] - self._inverse_deviation, rows)
+        residual = np.empty(len(self._edges))
+        rows = np.empty((len(self._edges), jacobian.shape[2]))
+        scales = self._inverse_lengths * self._inverse_deviation
+        _stretch_rows(surface.vertices[0], self._edges, scales, self._inverse_deviation, jacobian, residual, rows)
+        return Linearization(residual, rows)
 
 
 class ShapePrior:
@@ -135,3 +134,29 @@ def _stretch_cost(
             change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[e] - np.float32(1)
             total += change * change
         out[k] = total
+
+
+@kernel
+def _stretch_rows(
+    vertices: NDArray[np.float32],
+    edges: NDArray[np.int32],
+    scales: NDArray[np.float32],
+    rest: float,
+    jacobian: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    rows: NDArray[np.float64],
+) -> None:
+    """Length times scale of every edge, less what it is at rest, and its derivatives (edges, dim)."""
+    for e in range(edges.shape[0]):
+        i, j = edges[e, 0], edges[e, 1]
+        x = np.float64(vertices[0, i]) - vertices[0, j]
+        y = np.float64(vertices[1, i]) - vertices[1, j]
+        z = np.float64(vertices[2, i]) - vertices[2, j]
+        length = np.sqrt(x * x + y * y + z * z)
+        residual[e] = length * scales[e] - rest
+        x, y, z = x * scales[e] / length, y * scales[e] / length, z * scales[e] / length
+        first, second, row = jacobian[i], jacobian[j], rows[e]
+        for d in range(row.size):
+            row[d] = (
+                x * (first[0, d] - second[0, d]) + y * (first[1, d] - second[1, d]) + z * (first[2, d] - second[2, d])
+            )

@@ -33,6 +33,16 @@ def test_projection_is_opencv_s(point):
     np.testing.assert_allclose(CAMERA.project(point), expected[0, 0], atol=1e-9)
 
 
+@given(rig_points)
+def test_derivatives_of_the_projection_are_its_differences(point):
+    step = 1e-6
+    columns = [
+        (CAMERA.project(point + offset) - CAMERA.project(point - offset)) / (2 * step) for offset in step * np.eye(3)
+    ]
+    np.testing.assert_allclose(CAMERA.projection_jacobian(point), np.stack(columns, axis=-1), rtol=0, atol=1e-6)
+    np.testing.assert_array_equal(CAMERA.projection_jacobian(point[None])[0], CAMERA.projection_jacobian(point))
+
+
 def test_unprojection_is_the_inverse():
     distance = np.random.default_rng(1).uniform(0.5, 3, (24, 32))
     points = CAMERA.unproject(distance)

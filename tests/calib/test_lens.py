@@ -35,6 +35,13 @@ def test_distortion_is_opencv_s(number):
     np.testing.assert_allclose(lens.distort(GRID).reshape(-1, 2), expected[:, 0], atol=1e-12)
 
 
+@given(points, coefficients)
+def test_derivatives_of_the_distortion_are_its_differences(xy, k):
+    lens, step = Lens(np.array(k)), 1e-6
+    columns = [(lens.distort(xy + offset) - lens.distort(xy - offset)) / (2 * step) for offset in step * np.eye(2)]
+    np.testing.assert_allclose(lens.jacobian(xy), np.stack(columns, axis=-1), rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("number", LENSES)
 def test_undistortion_is_the_inverse_and_opencv_s(number):
     lens = Lens(np.array(LENSES[number]))

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.tracker.priors import (
     FIRST_INTERVAL_S,
@@ -55,6 +57,21 @@ def test_motion_fades_with_the_age_of_the_last_estimate():
         travelled.append(motion.predicted[0] - 0.05)
     expected = [gap * np.exp(-gap / 0.1) for gap in (0.01, 0.1, 0.4, LONGEST_INTERVAL_S)]
     np.testing.assert_allclose(travelled, expected, atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_stretch_rows_are_the_derivatives_of_the_edges_lengths(seed):
+    generator = np.random.default_rng(seed)
+    mesh, jacobian = sheet(4, 5), generator.standard_normal((20, 3, 7))
+    moved = mesh.vertices + generator.normal(0, 5e-3, mesh.vertices.shape)
+    surface = as_surface((moved, mesh.normals))
+    linear = StretchPrior(mesh, 0.02).linearize(surface, jacobian)
+    (i, j), now = mesh.edges.T, surface.vertices[0].T.astype(float)
+    rest = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
+    length = np.linalg.norm(now[i] - now[j], axis=1)
+    slopes = np.einsum("ei,eid->ed", (now[i] - now[j]) / length[:, None], jacobian[i] - jacobian[j])
+    np.testing.assert_allclose(linear.residual, (length / rest - 1) / 0.02, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(linear.jacobian, slopes / rest[:, None] / 0.02, rtol=1e-5, atol=1e-2)
 
 
 def test_the_cost_is_that_of_a_speed():

@@ -94,11 +94,7 @@ def _slope(
 def _projected(camera: Camera, vertices: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Pixels (n, 2) of vertices (n, 3), and derivatives (n, 2, 3) of their projection [px/m]."""
     points = np.asarray(vertices, np.float64)
-    step = 1e-4
-    offsets = np.concatenate([np.eye(3), -np.eye(3)]) * step
-    moved = camera.project(points[:, None] + offsets)
-    projection = (moved[:, :3] - moved[:, 3:]).transpose(0, 2, 1) / (2 * step)
-    return np.floor(camera.project(points) + 0.5).astype(int), projection
+    return np.floor(camera.project(points) + 0.5).astype(int), camera.projection_jacobian(points)
 
 
 def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
