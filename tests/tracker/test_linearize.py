@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from abs_service.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings
@@ -11,7 +13,7 @@ from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.terms.base import Bounds, Linearization, stack
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.gradients import depth_rows
+from abs_service.tracker.terms.gradients import chained, depth_rows
 from calib.camera import Camera
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
@@ -55,6 +57,15 @@ def test_depth_residuals_are_normalised_differences():
     gap = SIGMA * NORMAL[2] / (sight @ NORMAL)  # along the ray, from a plane moved by σ along z
     np.testing.assert_allclose(linear.residual, gap / SIGMA, atol=0.04)
     np.testing.assert_allclose(linear.jacobian[:, 5], -gap / SIGMA**2, rtol=0.02)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(1, 3))
+def test_the_chain_rule_is_a_product_of_matrices(seed, channels):
+    generator = np.random.default_rng(seed)
+    chosen, moves = generator.random(9) < 0.6, generator.standard_normal((5, 3, 9)).transpose(2, 1, 0)
+    rows = generator.standard_normal((np.count_nonzero(chosen), channels, 3))
+    found = chained(rows, chosen, moves)
+    np.testing.assert_allclose(found, (rows @ moves[chosen]).reshape(-1, 5), rtol=0, atol=1e-12)
 
 
 def test_grazing_views_do_not_explode():

@@ -9,7 +9,7 @@ from abs_service.images import ChannelImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import channel_rows
+from abs_service.tracker.terms.gradients import chained, channel_rows
 from abs_service.tracker.terms.illumination import Illumination
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
@@ -98,9 +98,10 @@ class ChannelTerm:
         """
         residual, inverse, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
-        vertices, moves = (self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, jacobian))
+        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         rows = channel_rows(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, vertices)
-        return Linearization(residual[use], np.einsum("ni,nid->nd", rows * inverse[use, None], moves))
+        rows = (rows * inverse[use, None])[:, None]
+        return Linearization(residual[use], chained(rows, use, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

@@ -7,7 +7,7 @@ from abs_service.images import ColorImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import color_rows
+from abs_service.tracker.terms.gradients import chained, color_rows
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
 from calib.noise.base import LOG_SQRT_2PI
@@ -69,10 +69,9 @@ class ColorTerm:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
-        vertices, moves = (self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, jacobian))
-        rows = color_rows(self._image, self._view.camera, vertices)
-        change = (rows * self._inverse_deviation) @ moves
-        return Linearization(residual[use].ravel(), change.reshape(-1, jacobian.shape[2]))
+        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
+        rows = color_rows(self._image, self._view.camera, vertices) * self._inverse_deviation
+        return Linearization(residual[use].ravel(), chained(rows, use, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

@@ -7,7 +7,7 @@ from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, stack, summarize
-from abs_service.tracker.terms.gradients import channel_rows, depth_rows
+from abs_service.tracker.terms.gradients import chained, channel_rows, depth_rows
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.jit import kernel
@@ -96,12 +96,11 @@ class DepthTerm:
     def _linearize_measured(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         residual, inverse_deviation, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
-        vertices, normals, change = (
-            self._view.spread(surface, values)[use]
-            for values in (surface.vertices[0].T, surface.normals[0].T, jacobian)
+        vertices, normals = (
+            self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, surface.normals[0].T)
         )
         rows = depth_rows(vertices, normals, self._view.camera.center) * inverse_deviation[use, None]
-        return Linearization(residual[use], np.einsum("ni,nid->nd", rows, change))
+        return Linearization(residual[use], chained(rows[:, None], use, self._view.spread(surface, jacobian)))
 
     def _linearize_free(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
@@ -111,11 +110,12 @@ class DepthTerm:
         pixel = self._view.synthesize(surface).pixel[0]
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
-        vertices, change = (self._view.spread(surface, values)[out] for values in (surface.vertices[0].T, jacobian))
+        vertices = self._view.spread(surface, surface.vertices[0].T)[out]
         distances = self._free_m[1:-1, 1:-1]
         slope = channel_rows(distances, np.zeros_like(distances), self._view.camera, vertices)
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
-        return Linearization(away[out] * weight, np.einsum("ni,nid->nd", slope * weight[:, None], change))
+        rows = (slope * weight[:, None])[:, None]
+        return Linearization(away[out] * weight, chained(rows, out, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
