@@ -207,6 +207,49 @@ def picture_deviation(noise: PictureNoise, values: np.ndarray | float) -> np.nda
     return np.sqrt(noise.sigma**2 + (relative * np.asarray(values)) ** 2)
 
 
+def channel_cost(  # one argument per symbol
+    camera: Camera,
+    noise: PictureNoise,
+    image: np.ndarray,
+    channel: np.ndarray,
+    covered: np.ndarray,
+    looks: np.ndarray,
+    vertices: np.ndarray,
+    normals: np.ndarray,
+    outlier_share: float,
+) -> float:
+    """−Σ_v log of the density of the measured number given the vertex's own in the channel that its pixel has.
+
+    Uniform where one of them is unknown; where something covers the object, what an agreeing number costs on average.
+    The deviation is that of the measured number.
+    """
+    total, uniform = 0.0, np.exp(-noise.uniform)
+    for vertex, normal, look in zip(vertices, normals, looks):
+        pixel = seen_pixel(camera, vertex, normal)
+        density = uniform
+        if pixel is not None and np.isfinite(image[pixel]) and np.isfinite(look[channel[pixel]]):
+            sigma = picture_deviation(noise, float(image[pixel]))
+            if covered[pixel]:
+                total += 0.5 + np.log(np.sqrt(2 * np.pi) * sigma) - np.log(1 - outlier_share)
+                continue
+            e = (float(image[pixel]) - look[channel[pixel]]) / sigma
+            density = np.exp(-0.5 * e**2) / (np.sqrt(2 * np.pi) * sigma)
+        total -= np.log(max((1 - outlier_share) * density, outlier_share * uniform))
+    return float(total)
+
+
+def lambert(vertex: np.ndarray, normal: np.ndarray, lamp: np.ndarray) -> float:
+    """Cosine of incidence over squared distance; 0 where the vertex faces away from the lamp."""
+    d = float(np.linalg.norm(lamp - vertex))
+    return max(float(normal @ (lamp - vertex)) / d, 0.0) / d**2
+
+
+def meeting_point(begin: np.ndarray, end: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+    """(s, t, q) of begin + q (end − begin) = a + s (b − a) + t (c − a), for a triangle (3, 3) of a, b, c."""
+    a, b, c = triangle
+    return np.linalg.solve(np.column_stack([b - a, c - a, begin - end]), begin - a)
+
+
 def stretch_cost(rest: np.ndarray, vertices: np.ndarray, edges: np.ndarray, deviation: float) -> float:
     """½ Σ (relative change of length / deviation)² over the edges."""
     total = 0.0

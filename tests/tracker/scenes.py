@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from abs_service.images import ColorImage, DepthImage
+from abs_service.images import DepthImage, Image
 from abs_service.observation import Observation, Source
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
@@ -81,7 +81,7 @@ def in_sight(camera: Camera, count: int) -> Surface:
     return as_surface((np.tile(camera.center + axis, (count, 1)), np.tile(-axis, (count, 1))))
 
 
-def observation(t_ns: int = 0, missing: tuple[str, ...] = (), **images: DepthImage | ColorImage) -> Observation:
+def observation(t_ns: int = 0, missing: tuple[str, ...] = (), **images: Image) -> Observation:
     """An observation of images by sensor name."""
     return Observation(0, t_ns, dict(images), {name: Source(0, t_ns) for name in images}, missing)
 

@@ -13,6 +13,9 @@ MOST_GROWTH = 2.0
 def pinhole_of(camera: Camera) -> Camera:
     """The pinhole at the same place, with the same focal lengths, whose image covers the camera's field of view.
 
+    On the axis, where the lens does not distort, pixels of both have the same centres. Otherwise the nearest pixel
+    would be off by the same part of a pixel all over the middle of the image: a shift of the surface.
+
     Where a wide lens would need more than twice the size, the rim is left out.
     """
     if camera.lens.is_pinhole:
@@ -23,8 +26,10 @@ def pinhole_of(camera: Camera) -> Camera:
     ideal = directions[:, :2] / directions[:, 2:] * (camera.fx, camera.fy)
     half = np.array([camera.width, camera.height]) * MOST_GROWTH / 2
     low, high = np.maximum(ideal.min(axis=0), -half), np.minimum(ideal.max(axis=0), half)
-    width, height = (np.ceil(high - low - 1e-6).astype(int) + 1).tolist()
-    return Camera(width, height, camera.fx, camera.fy, float(-low[0]), float(-low[1]), T_rs=camera.T_rs)
+    center = np.array([camera.cx, camera.cy])
+    axis = center + np.ceil(-low - center - 1e-6)
+    width, height = (np.ceil(high + axis - 1e-6).astype(int) + 1).tolist()
+    return Camera(width, height, camera.fx, camera.fy, *axis.tolist(), T_rs=camera.T_rs)
 
 
 def lookup(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
