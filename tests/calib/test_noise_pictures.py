@@ -52,7 +52,7 @@ def test_the_density_is_the_normal_one(model, real, deviations):
     assert np.exp(pictures.log_density(model, real + deviations * spread, real)) == pytest.approx(density, rel=1e-4)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(MODELS, REAL, SEEDS)
 def test_samples_have_the_model_s_mean_and_deviation(model, real, seed):
     n, spread = 10_000, float(reference.picture_deviation(model, real))
@@ -72,7 +72,7 @@ def test_taking_the_deviation_at_the_measured_value_changes_the_sum_as_documente
     assert np.trapezoid(density, measured) == pytest.approx(1 + relative**2, abs=4 * relative**4 + 1e-5)
 
 
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(st.sampled_from(sorted(FITS)), st.floats(0.5, 25), SEEDS)
 def test_one_deviation_is_found_again_whatever_outliers_there_are(name, sigma, seed):
     generator = np.random.default_rng(seed)
@@ -113,7 +113,7 @@ def test_what_is_cut_off_at_black_or_white_does_not_count():
     assert np.isfinite(measured[:, 1]).all()
 
 
-@settings(max_examples=15)
+@settings(max_examples=5)
 @given(st.floats(5, 100), st.floats(0.02, 0.3), SEEDS)
 def test_both_parts_of_an_intensity_s_deviation_are_found_again(sigma, relative, seed):
     generator = np.random.default_rng(seed)
@@ -149,7 +149,7 @@ def test_an_intensity_whose_brighter_pixels_err_less_is_still_a_model(dark):
     assert 0 < proportional.sigma < 20
 
 
-@settings(max_examples=10)
+@settings(max_examples=4)
 @given(SEEDS)
 def test_crosstalk_is_found_again_from_known_colors(seed):
     generator = np.random.default_rng(seed)
@@ -198,7 +198,7 @@ def test_the_probabilities_of_a_barrier_are_those_of_its_errors(model, interrupt
     assert model.cost(interrupted)[crossing] == pytest.approx(-told)
 
 
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(BARRIERS, SEEDS)
 def test_readings_of_a_barrier_err_as_often_as_it_says_and_tell_it_again(model, seed):
     generator = np.random.default_rng(seed)

@@ -44,7 +44,7 @@ def test_the_four_orders_are_what_their_names_say():
 
 
 @pytest.mark.parametrize("name", NOISES)
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(seeds)
 def test_the_cost_is_the_likelihood(name, seed):
     """Values near those of the vertices, some beyond all noise, some unknown, some covered by what stands before."""
@@ -85,7 +85,7 @@ def test_lambert_s_law_is_its_equation(seed):
     np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(seeds, st.sampled_from(["grey", *BAYER_ORDERS]))
 def test_the_euclidean_cost_is_the_weighted_squares(seed, name):
     """What is unknown, or differs by more than the cut-off, costs as much as a difference of the cut-off."""

@@ -79,7 +79,7 @@ class Scene:
 
 
 @ALL
-@settings(max_examples=5)
+@settings(max_examples=4)
 @given(
     st.lists(st.floats(-0.25, 0.25), min_size=3, max_size=3), st.lists(st.floats(-0.02, 0.02), min_size=3, max_size=3)
 )
