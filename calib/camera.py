@@ -77,7 +77,9 @@ class Camera:
         ideal = points_s[..., :2] / depth[..., 0]
         by_ideal = self.lens.jacobian(ideal) * np.array([[self.fx], [self.fy]]) / depth
         by_depth = -np.sum(by_ideal * ideal[..., None, :], axis=-1, keepdims=True)
-        return np.concatenate([by_ideal, by_depth], axis=-1) @ self.T_rs[:3, :3].T
+        by_point = np.concatenate([by_ideal, by_depth], axis=-1)
+        # One product of matrices for all points: n small ones take several times as long.
+        return (by_point.reshape(-1, 3) @ self.T_rs[:3, :3].T).reshape(by_point.shape)
 
     def distance(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
         """Radial distance (…,) [m] from the camera centre, eq. 11."""

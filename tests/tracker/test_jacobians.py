@@ -44,7 +44,7 @@ bends = st.lists(st.integers(-1500, 1500), min_size=1, max_size=8).map(lambda mi
 
 
 @pytest.mark.parametrize("name", MODELS)
-@given(seed=seeds, size=st.sampled_from([0.0, 1e-6, 0.01, 0.05]))
+@given(seed=seeds, size=st.sampled_from([0.0, 1e-6, 0.01, 0.02]))
 def test_derivatives_are_those_of_deform(name, seed, size):
     """To the rounding of 32-bit vertices over a step of a millimetre, per metre of the surface's motion."""
     model = MODELS[name]

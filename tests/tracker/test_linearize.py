@@ -13,7 +13,7 @@ from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.terms.base import Bounds, Linearization, stack
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.gradients import chained, depth_rows
+from abs_service.tracker.terms.gradients import chained, color_rows, depth_rows
 from calib.camera import Camera
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
@@ -99,6 +99,30 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
         predicted = linear.jacobian[:, parameter] * step
         np.testing.assert_allclose(moved, predicted, atol=0.11)
         assert np.abs(predicted).max() > 0.4
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_color_rows_are_a_regression_on_the_neighbourhood(seed):
+    """At the rim the last pixel goes on, and where nothing is known the pixel's own colour does."""
+    generator = np.random.default_rng(seed)
+    camera = Camera(12, 9, 30.0, 32.0, 5.5, 4.0)
+    image = generator.uniform(0, 255, (9, 12, 3)).astype(np.float32)
+    vertices = generator.uniform(-0.15, 0.15, (20, 3)) * [1, 0.7, 1] + [0, 0, 1]
+    column, row = np.floor(camera.project(vertices) + 0.5).astype(int).clip(0, [11, 8]).T
+    unknown = generator.random((9, 12)) < 0.2
+    unknown[row, column] = False
+    image[unknown] = np.nan
+    steps = np.arange(-2, 3)
+    weights = np.exp(-0.5 * (steps**2 + steps[:, None] ** 2))
+    expected = np.zeros((20, 3, 2))
+    for v in range(20):
+        rows, columns = (row[v] + steps).clip(0, 8), (column[v] + steps).clip(0, 11)
+        patch = image[rows][:, columns].astype(float)
+        patch = np.where(np.isnan(patch), image[row[v], column[v]], patch)
+        sums = [np.einsum("ij,ijc->c", weights * on, patch) for on in (steps, steps[:, None])]
+        expected[v] = np.stack(sums, axis=-1) / np.sum(weights * steps**2)
+    found = color_rows(image, camera, vertices)
+    np.testing.assert_allclose(found, expected @ camera.projection_jacobian(vertices), rtol=0, atol=1e-3)
 
 
 def test_only_inliers_and_what_is_in_free_space_are_linearized():

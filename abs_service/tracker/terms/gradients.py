@@ -41,12 +41,10 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         vertices: positions (n, 3) [m].
     """
     pixels, projection = _projected(camera, vertices)
-    column, row = _neighborhood(pixels, image.shape[:2])
-    patches = image[row, column].astype(np.float64)
-    patches = np.where(np.isfinite(patches), patches, patches[:, RADIUS_PX : RADIUS_PX + 1, RADIUS_PX : RADIUS_PX + 1])
     weights = _bell()
-    slopes = np.stack([weights * _STEPS, weights * _STEPS[:, None]], axis=-1) / np.sum(weights * _STEPS**2)
-    return np.einsum("nrkc,rkd->ncd", patches, slopes) @ projection
+    rows = np.empty((len(pixels), image.shape[2], 3))
+    _color_rows(image, pixels, weights / np.sum(weights * _STEPS**2), projection, rows)
+    return rows
 
 
 def channel_rows(
@@ -120,6 +118,33 @@ def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDA
     column = np.clip(pixels[:, :1] + steps, 0, shape[1] - 1)
     row = np.clip(pixels[:, 1:] + steps, 0, shape[0] - 1)
     return column[:, None, :], row[:, :, None]
+
+
+@kernel
+def _color_rows(
+    image: NDArray[np.float32],
+    pixels: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    projection: NDArray[np.float64],
+    rows: NDArray[np.float64],
+) -> None:
+    """Regression of the colours around pixels (n, 2) on column and row, times how these move (n, 2, 3)."""
+    height, width, channels = image.shape
+    side, reach = weights.shape[0], weights.shape[0] // 2
+    for v in range(pixels.shape[0]):
+        column, row = pixels[v, 0], pixels[v, 1]
+        own = image[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
+        for c in range(channels):
+            right, down = 0.0, 0.0
+            for i in range(side):
+                y = min(max(row + i - reach, 0), height - 1)
+                for j in range(side):
+                    color = image[y, min(max(column + j - reach, 0), width - 1), c]
+                    value = weights[i, j] * (own[c] if np.isnan(color) else color)
+                    right += (j - reach) * value
+                    down += (i - reach) * value
+            for k in range(3):
+                rows[v, c, k] = right * projection[v, 0, k] + down * projection[v, 1, k]
 
 
 @kernel
