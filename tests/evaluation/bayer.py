@@ -31,7 +31,7 @@ from tests.tracker.driving import default_plan, frame_set, simulate
 CODES: Mapping[str, str] = {"bilinear": "", "edge-aware": "_EA"}
 VARIANTS = ("direct", *CODES)
 #: Deviations [levels of 256] to choose from.
-SIGMAS = (10.0, 15.0, 20.0, 25.0, 30.0, 40.0)
+SIGMAS = (5.0, 10.0, 20.0, 30.0, 40.0, 60.0, 80.0)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -2,21 +2,27 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ColorImage
+from abs_service.images import ChannelImage, ColorImage
+from abs_service.readers import BAYER_ORDERS
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.priors import MotionPrior, StretchPrior
 from abs_service.tracker.priors import Settings as PriorSettings
+from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.base import Bounds, Linearization, stack
+from abs_service.tracker.terms.channel import ChannelTerm
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
 from abs_service.tracker.terms.gradients import chained, color_rows, depth_rows
+from abs_service.tracker.terms.illumination import Passive
 from calib.camera import Camera
+from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.rig import Rig, Sensor
 from tests.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet, sparse
 
 #: Many fine pixels, so that rounding to one of them is small against the steps of the derivatives.
@@ -123,6 +129,27 @@ def test_color_rows_are_a_regression_on_the_neighbourhood(seed):
         expected[v] = np.stack(sums, axis=-1) / np.sum(weights * steps**2)
     found = color_rows(image, camera, vertices)
     np.testing.assert_allclose(found, expected @ camera.projection_jacobian(vertices), rtol=0, atol=1e-3)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(BAYER_ORDERS)))
+def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
+    generator = np.random.default_rng(seed)
+    mesh = sheet(7, 9, height=lambda x, y: 1.0 + 0.1 * x, size=(0.2, 0.14))
+    rig = Rig("r", {"bayer": Sensor("bayer", COLOR, GaussianBayer(50.0))})
+    model, synthesizer = Rigid(mesh), Sparse(rig, mesh)
+    looks = generator.uniform(100, 150, (len(synthesizer.canvas.vertices), 3)).astype(np.float32)
+    term = ChannelTerm("bayer", synthesizer, looks, GaussianBayer(50.0), Passive(), BOUNDS)
+    picture = generator.uniform(100, 150, (COLOR.height, COLOR.width)).astype(np.float32)
+    term.observe(ChannelImage(picture, BAYER_ORDERS[order]), model.deform(model.rest[None]))
+    linear = term.linearize(model.deform(model.rest[None]), model.jacobian(model.rest))
+    assert len(linear.residual) == len(mesh.vertices)
+    for step in np.diag([1e-4, 1e-4, 1e-4, 2e-5, 2e-5, 1e-4]):
+        there, back = (model.deform((model.rest + part)[None]) for part in (step, -step))
+        stays = term._view.synthesize(there).pixel[0] == term._view.synthesize(back).pixel[0]
+        actual = (term._residuals(there)[0] - term._residuals(back)[0]) / 2
+        assert stays.mean() > 0.5
+        np.testing.assert_allclose((linear.jacobian @ step)[stays], actual[stays], rtol=0.02, atol=2e-4)
 
 
 def test_only_inliers_and_what_is_in_free_space_are_linearized():

@@ -49,6 +49,13 @@ class View(Protocol):
         """Synthesises a population of deformed meshes."""
         ...
 
+    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+        """How the attributes of a population of one change around its samples in the image (m, channels, 2).
+
+        To the right and down, per pixel; NaN where only the samples' own attributes are known.
+        """
+        ...
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
         ...

@@ -111,6 +111,11 @@ class DenseView:
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
+    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+        """NaN: the image tells better than the lattice how they change."""
+        samples, _ = self._render(surface)
+        return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n, …) of the vertices, interpolated at the samples (m, …) of a population of one."""
         samples, _ = self._render(surface)

@@ -50,6 +50,10 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
 class Slopes(Protocol):
     """How the appearance changes around the vertices in one camera's image."""
 
+    def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """To the right and down (n, channels, 2), for values (n, channels); NaN where it is not known."""
+        ...
+
     def look(self, predicted: Surface) -> None:
         """Takes where the surface, a population of one, is expected in this frame."""
         ...
@@ -71,7 +75,11 @@ class Slopes(Protocol):
 
 
 class Level:
-    """Around a vertex everything looks like the vertex."""
+    """Around a vertex everything is taken to look like the vertex, for want of anything better."""
+
+    def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """NaN (n, channels, 2): what is not known is not said to be level."""
+        return np.full((*values.shape, 2), np.nan, np.float32)
 
     def look(self, predicted: Surface) -> None:
         """Nothing depends on where the surface is."""
@@ -105,6 +113,10 @@ class Relief:
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
+
+    def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """As last looked; 0 at vertices whose surroundings were not seen."""
+        return self._per_pixel
 
     def look(self, predicted: Surface) -> None:
         """Finds how the appearance changes in the image where the surface, a population of one, is expected.

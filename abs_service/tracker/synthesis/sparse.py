@@ -121,6 +121,10 @@ class SparseView:
         )
         return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
 
+    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+        """As where the surface was expected."""
+        return self._slopes.per_pixel(self._attributes)
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values

@@ -162,6 +162,10 @@ class _SharedView:
         common = self._projection.synthesize(surface)
         return Synthesis(common.pixel, common.distance, self._attributes)
 
+    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+        """NaN: only the vertices' own attributes are known."""
+        return np.full((*self._attributes.shape[1:], 2), np.nan, np.float32)
+
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values

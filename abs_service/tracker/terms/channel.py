@@ -1,5 +1,6 @@
 """A sensor whose pixels hold one number each: grey, a Bayer mosaic, amplitudes, infra-red."""
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
@@ -9,7 +10,7 @@ from abs_service.images import ChannelImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import chained, channel_rows
+from abs_service.tracker.terms.gradients import chained, channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
@@ -93,14 +94,13 @@ class ChannelTerm:
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The inliers' normalised residuals, and how they change with the parameters.
 
-        The slope of the image is that of the pixel's own channel. What light makes of a turning surface changes slower
-        than its texture, and is left to the search.
+        What light makes of a turning surface changes slower than its texture, and is left to the search.
         """
         residual, inverse, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
-        rows = channel_rows(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, vertices)
-        rows = (rows * inverse[use, None])[:, None]
+        slopes = self._slopes(surface)[use] * inverse[use, None]
+        rows = slopes[:, None] @ self._view.camera.projection_jacobian(vertices)
         return Linearization(residual[use], chained(rows, use, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:
@@ -110,6 +110,21 @@ class ChannelTerm:
         hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, np.abs(residual), mean)
+
+    def _slopes(self, surface: Surface) -> NDArray[np.float64]:
+        """How the channel of each sample's pixel changes there per pixel to the right and down (m, 2).
+
+        A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
+        the surface's own where that is known, which is also exactly how a residual changes within a pixel.
+        """
+        seen = self._view.synthesize(surface)
+        channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
+        own = self._view.slopes(surface)[np.arange(len(channel)), channel]
+        slopes = self._illumination.shine(replace(seen, attributes=own[None]), surface, self._view).attributes[0]
+        slopes, unknown = slopes.astype(np.float64), np.isnan(own).any(axis=1)
+        samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
+        slopes[unknown] = channel_slopes(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples)
+        return slopes
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""

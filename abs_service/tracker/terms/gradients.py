@@ -40,7 +40,7 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    pixels, projection = _projected(camera, vertices)
+    pixels, projection = _pixels(camera, vertices), camera.projection_jacobian(vertices)
     weights = _bell()
     rows = np.empty((len(pixels), image.shape[2], 3))
     _color_rows(image, pixels, weights / np.sum(weights * _STEPS**2), projection, rows)
@@ -55,6 +55,20 @@ def channel_rows(
 ) -> NDArray[np.float64]:
     """Derivatives (n, 3) of the measured value at a vertex's pixel by the vertex, in the image's unit per metre.
 
+    Arguments as for `channel_slopes`.
+    """
+    slopes = channel_slopes(values, channels, camera, vertices)
+    return np.einsum("nd,ndi->ni", slopes, camera.projection_jacobian(vertices))
+
+
+def channel_slopes(
+    values: NDArray[np.float32],
+    channels: NDArray[np.float32],
+    camera: Camera,
+    vertices: NDArray[np.floating],
+) -> NDArray[np.float64]:
+    """How the measured value changes at a vertex's pixel, to the right and down (n, 2), in the image's unit per pixel.
+
     Behind a Bayer mosaic the slope is that of the lattice of pixels with the same channel: between channels the values
     jump, and a slope across them is none of the surface's.
 
@@ -64,14 +78,12 @@ def channel_rows(
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    pixels, projection = _projected(camera, vertices)
-    column, row = _neighborhood(pixels, values.shape)
+    column, row = _neighborhood(_pixels(camera, vertices), values.shape)
     patches = values[row, column].astype(np.float64)
     same = channels[row, column] == channels[row[:, RADIUS_PX], column[:, :, RADIUS_PX]][..., None]
     weights = _bell() * (same & np.isfinite(patches))
     patches = np.where(weights > 0, patches, 0.0)
-    slopes = np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
-    return np.einsum("nd,ndi->ni", slopes, projection)
+    return np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
 
 
 def chained(rows: NDArray[np.float64], chosen: NDArray[np.bool_], moves: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -103,10 +115,9 @@ def _slope(
     return np.where(spread > 1e-6, (weights * centered * patches).sum(axis=(1, 2)) / np.maximum(spread, 1e-6), 0.0)
 
 
-def _projected(camera: Camera, vertices: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Pixels (n, 2) of vertices (n, 3), and derivatives (n, 2, 3) of their projection [px/m]."""
-    points = np.asarray(vertices, np.float64)
-    return np.floor(camera.project(points) + 0.5).astype(int), camera.projection_jacobian(points)
+def _pixels(camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Pixels (n, 2) of vertices (n, 3)."""
+    return np.floor(camera.project(np.asarray(vertices, np.float64)) + 0.5).astype(int)
 
 
 def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
