@@ -7,7 +7,7 @@ from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, stack, summarize
-from abs_service.tracker.terms.gradients import chained, channel_rows, depth_rows
+from abs_service.tracker.terms.gradients import chained, color_rows, depth_rows
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.jit import kernel
@@ -111,10 +111,9 @@ class DepthTerm:
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
         vertices = self._view.spread(surface, surface.vertices[0].T)[out]
-        distances = self._free_m[1:-1, 1:-1]
-        slope = channel_rows(distances, np.zeros_like(distances), self._view.camera, vertices)
+        distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
-        rows = (slope * weight[:, None])[:, None]
+        rows = color_rows(distances, self._view.camera, vertices) * weight[:, None, None]
         return Linearization(away[out] * weight, chained(rows, out, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:

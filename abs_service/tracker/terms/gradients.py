@@ -33,10 +33,11 @@ def depth_rows(
 
 
 def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Derivatives (n, 3 channels, 3) of the measured colour at a vertex's pixel by the vertex, in levels per metre.
+    """Derivatives (n, channels, 3) of the measurement at a vertex's pixel by the vertex, in the image's unit per metre.
 
     Args:
-        image: colour image (height, width, 3), 0…255, NaN where nothing is known: there it is taken to be level.
+        image: what every pixel measured (height, width, channels), a colour for example; NaN where nothing is known:
+            there it is taken to be level.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
@@ -45,20 +46,6 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
     rows = np.empty((len(pixels), image.shape[2], 3))
     _color_rows(image, pixels, weights / np.sum(weights * _STEPS**2), projection, rows)
     return rows
-
-
-def channel_rows(
-    values: NDArray[np.float32],
-    channels: NDArray[np.float32],
-    camera: Camera,
-    vertices: NDArray[np.floating],
-) -> NDArray[np.float64]:
-    """Derivatives (n, 3) of the measured value at a vertex's pixel by the vertex, in the image's unit per metre.
-
-    Arguments as for `channel_slopes`.
-    """
-    slopes = channel_slopes(values, channels, camera, vertices)
-    return np.einsum("nd,ndi->ni", slopes, camera.projection_jacobian(vertices))
 
 
 def channel_slopes(
@@ -139,7 +126,7 @@ def _color_rows(
     projection: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> None:
-    """Regression of the colours around pixels (n, 2) on column and row, times how these move (n, 2, 3)."""
+    """Regression of the image around pixels (n, 2) on column and row, times how these move (n, 2, 3)."""
     height, width, channels = image.shape
     side, reach = weights.shape[0], weights.shape[0] // 2
     for v in range(pixels.shape[0]):
