@@ -148,7 +148,8 @@ class Frame:
 
     def si(self) -> NDArray[np.float32]:
         """The image in `unit` as float32, NaN where there is no return."""
-        values = self.data.astype(np.float32) * np.float32(self.scale)
+        values = self.data.astype(np.float32)
+        values *= np.float32(self.scale)
         if self.invalid is not None:
             values[self.data == self.invalid] = np.nan
         return values

@@ -9,7 +9,7 @@ from abs_service.images import ChannelImage, ColorImage
 from abs_service.readers import BAYER_ORDERS, ONE_CHANNEL
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.terms.channel import ChannelTerm
+from abs_service.tracker.terms.channel import ChannelTerm, _border, _fill
 from abs_service.tracker.terms.illumination import Active, Passive, lambert
 from calib.noise.bayer import GaussianBayer
 from calib.noise.grey import GaussianGrey
@@ -124,3 +124,25 @@ def test_a_colour_image_is_not_one_number_per_pixel():
     made = term(GaussianGrey(), np.ones((4, 1), np.float32))
     with pytest.raises(TypeError, match="sensor color has noise of one channel but delivered ColorImage"):
         made.observe(ColorImage(np.zeros((*SHAPE, 3), np.uint8)), in_sight(CAMERA, 4))
+
+
+@settings(max_examples=20)
+@given(seeds, st.sampled_from([ONE_CHANNEL, *BAYER_ORDERS.values()]))
+def test_texels_are_value_channel_inverse_deviation_and_normaliser(seed, pattern):
+    """Deviations that change from pixel to pixel, and such that stay; what is unknown has the channel 0."""
+    generator = np.random.default_rng(seed)
+    shape = tuple(generator.integers(1, 9, 2))
+    values = generator.uniform(0, 255, shape).astype(np.float32)
+    deviation = generator.choice(np.array([2, 3, 50], np.float32), shape)
+    found, image = np.empty((*shape, 4), np.float32), ChannelImage(values, pattern)
+    _fill(values, pattern, deviation, 0.7, found)
+    expected = np.stack([values, image.channel, 1 / deviation, np.log(deviation) + np.float32(0.7)], axis=-1)
+    np.testing.assert_allclose(found, expected, rtol=1e-5)
+    found[generator.random(shape) < 0.3] = np.nan
+    bordered = np.ones((shape[0] + 2, shape[1] + 2, 4), np.float32)
+    _border(found, bordered)
+    expected = np.pad(found, ((1, 1), (1, 1), (0, 0)))
+    expected[..., 1] = np.nan_to_num(expected[..., 1])
+    frame = np.pad(np.zeros(shape, bool), 1, constant_values=True)
+    expected[frame, 0] = np.nan
+    np.testing.assert_array_equal(bordered, expected)

@@ -54,23 +54,19 @@ class ChannelTerm:
         self._noise = noise
         self._bounds = bounds
         self._image = np.zeros((1, 1, 4), np.float32)
+        self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
 
     def observe(self, image: Image, predicted: Surface) -> None:
         """Takes an image; NaN, which the border is as well, stands for no measurement."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
-        deviation = self._noise.deviation(image.values)
-        texels = np.empty((*image.values.shape, 4), np.float32)
-        texels[..., VALUE] = image.values
-        texels[..., CHANNEL] = image.channel
-        texels[..., INVERSE] = 1 / deviation
-        texels[..., NORMALIZER] = np.log(deviation) + (LOG_SQRT_2PI + self._bounds.inlier)
+        self._texels = texels = _fitting(self._texels, image.values.shape)
+        constant = LOG_SQRT_2PI + self._bounds.inlier
+        _fill(image.values, image.channels, self._noise.deviation(image.values), constant, texels)
         self._image = self._synthesizer.image(self.sensor, texels)
-        texture = np.zeros((self._image.shape[0] + 2, self._image.shape[1] + 2, 4), np.float32)
-        texture[..., VALUE] = np.nan
-        texture[1:-1, 1:-1] = self._image
-        texture[..., CHANNEL] = np.nan_to_num(texture[..., CHANNEL])
+        texture = _fitting(self._texture, (self._image.shape[0] + 2, self._image.shape[1] + 2))
+        _border(self._image, texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
 
@@ -134,6 +130,49 @@ class ChannelTerm:
         residual = (texels[:, VALUE] - own) * texels[:, INVERSE]
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
         return np.where(measured, residual, np.inf), texels[:, INVERSE], measured
+
+
+def _fitting(buffer: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """The last image's memory as (height, width, 4) if it has that size: new memory takes as long as filling it."""
+    size = (*shape, 4)
+    return buffer.reshape(size) if buffer.size == np.prod(size) else np.empty(size, np.float32)
+
+
+@kernel
+def _fill(
+    values: NDArray[np.float32],
+    channels: NDArray[np.uint8],
+    deviation: NDArray[np.float32],
+    constant: float,
+    texels: NDArray[np.float32],
+) -> None:
+    """Texels (height, width, 4) of an image, its pattern of channels and the deviation of each value."""
+    rows, columns = channels.shape
+    last, inverse, normalizer = np.float32(-1), np.float32(0), np.float32(0)
+    for row in range(values.shape[0]):
+        part = 0
+        for column in range(values.shape[1]):
+            texel, sigma = texels[row, column], deviation[row, column]
+            if sigma != last:  # most often they are all alike, and a logarithm takes as long as all the rest
+                last, inverse, normalizer = sigma, np.float32(1) / sigma, np.log(sigma) + np.float32(constant)
+            texel[VALUE] = values[row, column]
+            texel[CHANNEL] = channels[row % rows, part]
+            part = part + 1 if part + 1 < columns else 0
+            texel[INVERSE] = inverse
+            texel[NORMALIZER] = normalizer
+
+
+@kernel
+def _border(image: NDArray[np.float32], texture: NDArray[np.float32]) -> None:
+    """An image (height, width, 4) with a border that holds no values; what is unknown has the channel 0."""
+    height, width = image.shape[:2]
+    beside = np.array([np.nan, 0, 0, 0], np.float32)
+    texture[0], texture[-1], texture[:, 0], texture[:, -1] = beside, beside, beside, beside
+    for row in range(height):
+        for column in range(width):
+            for part in range(4):
+                value = image[row, column, part]
+                texture[row + 1, column + 1, part] = np.float32(0) if part == CHANNEL and np.isnan(value) else value
 
 
 @kernel
