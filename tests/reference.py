@@ -143,6 +143,24 @@ def distance(camera: Camera, vertex: np.ndarray) -> float:
     return float(np.sqrt(np.sum((camera.T_rs[:3, 3] - vertex) ** 2)))
 
 
+def distance_at_center(camera: Camera, vertex: np.ndarray, normal: np.ndarray) -> float:
+    """d of where the line of sight of the pixel's centre meets the plane through a vertex, in lines of sight (u, w, 1).
+
+    A plane that is seen at a cosine below 0.2 is turned to that; what no pixel sees is as far as it is.
+    """
+    pixel = seen_pixel(camera, vertex, normal)
+    if pixel is None:
+        return distance(camera, vertex)
+    R_sr = camera.T_rs[:3, :3].T
+    x, y, z = R_sr @ (vertex - camera.T_rs[:3, 3])
+    column, row = project(camera, vertex)
+    aside = np.array([(pixel[1] - column) / camera.fx, (pixel[0] - row) / camera.fy, 0.0])
+    sight = np.array([x / z, y / z, 1.0]) + aside
+    length = np.linalg.norm(sight)
+    n = R_sr @ normal
+    return float(z * length * (1 - n @ aside / min(n @ sight, -0.2 * length)))
+
+
 def seen_pixel(camera: Camera, vertex: np.ndarray, normal: np.ndarray) -> tuple[int, int] | None:
     """Row and column of p = ⌊P_s(v) + (½, ½)⌋ (20); None outside the image, behind the camera or facing away."""
     column, row = np.floor(project(camera, vertex) + 0.5)
@@ -171,7 +189,7 @@ def depth_cost(  # one argument per symbol
         pixel = seen_pixel(camera, vertex, normal)
         density = 1 / range_m
         if pixel is not None and np.isfinite(image[pixel]):
-            x, a = np.array([distance(camera, vertex)]), np.array([float(amplitude[pixel])])
+            x, a = np.array([distance_at_center(camera, vertex, normal)]), np.array([float(amplitude[pixel])])
             p = (np.array([pixel[0]]), np.array([pixel[1]]))
             sigma = noise.deviation(x, a, p)[0]
             e = (image[pixel] - x[0] - noise.mean(x, a, p)[0]) / sigma

@@ -20,7 +20,8 @@ class Synthesis:
         pixel: index (population, m) into the sensor's flattened texture with a border of one pixel; 0, in the border,
             where the sensor cannot see the sample (outside the image, behind the camera, or facing away); −1 where
             there is no sample, which costs nothing.
-        distance: radial distance from the camera centre (population, m) [m], eq. 11.
+        distance: radial distance from the camera centre (population, m) [m], eq. 11: of where the line of sight of the
+            pixel's centre, which is what was measured, meets the tangential plane; of the sample itself in the border.
         attributes: what the surface carries there, such as its colour, (population or 1, m, channels).
     """
 

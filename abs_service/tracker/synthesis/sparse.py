@@ -18,6 +18,9 @@ from calib.rig import Rig
 #: A vertex is hidden behind the mesh's own surface if that is nearer to the camera by more than this [m].
 HIDING_M = 0.01
 
+#: A surface that is seen at a flatter angle (cosine) is taken for one at this, where distances are told beside a vertex.
+LEAST_COSINE = 0.2
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -160,12 +163,17 @@ def _synthesize(
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
 ) -> None:
-    """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r²."""
-    half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
+    """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r².
+
+    The line of sight of the pixel's centre meets the tangential plane at n · v / (n · d) = z (1 − n · Δ / (n · d)), where
+    Δ is from the vertex's line of sight (u, w, 1) to that one, d; the lens is taken for undistorted in between.
+    """
+    zero, half, one, two = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
     fx, fy, cx, cy = matrix
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     stride = width + 2
-    right, bottom, farthest = np.float32(width), np.float32(height), np.float32(limit)
+    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
+    columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
@@ -183,11 +191,16 @@ def _synthesize(
             radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
             column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx + half
             row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy + half
-            inside = column >= 0 and column < right and row >= 0 and row < bottom
+            inside = column >= 0 and column < columns and row >= 0 and row < rows
             seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
             place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
             pixel[k, v] = -1 if hidden[v] else place
-            distance[k, v] = np.sqrt(x * x + y * y + z * z)
+            right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
+            down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
+            u, w = u + right, w + down
+            length = np.sqrt(u * u + w * w + one)
+            along = min(nx * u + ny * w + nz, flattest * length)
+            distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
 
 
 @kernel
@@ -205,10 +218,11 @@ def _synthesize_pinhole(
     distance: NDArray[np.float32],
 ) -> None:
     """Eqs. 11, 12 and 20: what `_synthesize` is without distortion, whose coefficients are ignored."""
-    half, one = np.float32(0.5), np.float32(1)
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     fx, fy, cx, cy = matrix
     stride = width + 2
-    right, bottom, farthest = np.float32(width), np.float32(height), np.float32(limit)
+    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
+    columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
@@ -225,8 +239,13 @@ def _synthesize_pinhole(
             facing = nx * x + ny * y + nz * z < 0
             column = fx * u + cx + half
             row = fy * w + cy + half
-            inside = column >= 0 and column < right and row >= 0 and row < bottom
+            inside = column >= 0 and column < columns and row >= 0 and row < rows
             seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
             place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
             pixel[k, v] = -1 if hidden[v] else place
-            distance[k, v] = np.sqrt(x * x + y * y + z * z)
+            right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
+            down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
+            u, w = u + right, w + down
+            length = np.sqrt(u * u + w * w + one)
+            along = min(nx * u + ny * w + nz, flattest * length)
+            distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
