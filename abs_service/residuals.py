@@ -1,6 +1,5 @@
 """Whether the sensors err as their noise models say: what a tracker's health tells about it, once a second."""
 
-from collections.abc import Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,18 +34,15 @@ class _Sum:
 class ResidualWatch:
     """Enters into health the gauge `residual_variance.<sensor>`, and a warning where a sensor's noise model is wrong.
 
-    A depth sensor may err neither more nor less than its model says. The deviation of a colour covers as well what the
-    synthesis leaves out, and that is alike in neighbouring vertices and channels; so the deviation that tracks best is
-    larger than what the residuals show, and only one that is too small is wrong.
+    A deviation that is too small rejects good measurements; one that is too large gives the sensor too little weight
+    beside the others, and makes the covariance of Θ depend on what the priors allow.
 
     Args:
         health: of the tracker.
-        depth: names of the depth sensors.
     """
 
-    def __init__(self, health: Health, depth: Set[str]):
+    def __init__(self, health: Health):
         self._health = health
-        self._depth = depth
         self._begin_ns = 0
         self._sums: dict[str, _Sum] = {}
         self._warned: set[str] = set()
@@ -70,7 +66,7 @@ class ResidualWatch:
     def _judge(self, sensor: str, variance: float) -> None:
         self._health.gauge(f"residual_variance.{sensor}", variance)
         low, high = SETTLED if sensor in self._warned else ALLOWED
-        wrong = variance > high or (variance < low and sensor in self._depth)
+        wrong = not low <= variance <= high
         (self._warned.add if wrong else self._warned.discard)(sensor)
         level = Level.WARNING if wrong else Level.OK
         self._health.report(f"noise of {sensor}", level, _advice(sensor, variance) if wrong else "")

@@ -27,7 +27,6 @@ from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
 from calib.camera import Camera
 from calib.rig import Noise, Rig
-from drivers.frame import Kind
 from drivers.sensor_model import decode_camera
 
 #: How long one question for calibrations waits for answers [s].
@@ -95,7 +94,7 @@ def _live(
         NewestSets(frames, synchroniser, time.monotonic_ns),
         EstimatePublisher(bus, speaker, name, plans.model_name(settings, name), rig.calib_id),
         health,
-        ResidualWatch(health, {sensor for sensor, stream in members if stream == Kind.DEPTH}),
+        ResidualWatch(health),
         time.monotonic_ns,
         settings.trackers[name].budget_ms,
     )

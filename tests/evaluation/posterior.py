@@ -1,6 +1,6 @@
 """How often the truth lies inside the region that should hold it 95 times of 100.
 
-  python -m tests.evaluation.posterior [--seeds 1 2 3] [--frames 150] [--device sheet]
+  python -m tests.evaluation.posterior [--seeds 1 2 3] [--frames 150] [--device sheet] [--sigma 4]
 
 Images and truth are from the simulator's ray-casting, which knows nothing of control points. Tested in every frame but
 the first, which defines the material points:
@@ -13,7 +13,7 @@ the first, which defines the material points:
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,14 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.priors import StretchPrior
 from abs_service.tracker.uncertainty import propagated
 from abs_service.tracking import Tracking
+from calib.noise.color import GaussianColor
+from calib.rig import Rig
 from drivers.simulated.simulation import Simulation
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 
 SHARE = 0.95
+#: Deviation of a colour in the default rig [levels of 256].
+DEMO_SIGMA = 4.0
 
 
 @dataclass(frozen=True)
@@ -65,11 +69,11 @@ class Frame:
     points: NDArray[np.float64]
 
 
-def coverage(uri: str, frames: int) -> Coverage:
-    """Tracks a simulated device with the default tracker."""
+def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
+    """Tracks a simulated device with the default tracker and `sigma` as deviation of its colours [levels]."""
     simulation = simulate(uri)
     rows, said, true = [], [], []
-    for frame in list(tracked(simulation, frames))[1:]:
+    for frame in list(tracked(simulation, frames, sigma))[1:]:
         error, known = frame.points - frame.estimate.vertices, frame.estimate.covariance
         jacobian = frame.model.jacobian(frame.estimate.theta)
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
@@ -88,10 +92,10 @@ def coverage(uri: str, frames: int) -> Coverage:
     return Coverage(*np.mean(rows, axis=0).tolist(), *lengths_mm)
 
 
-def tracked(simulation: Simulation, frames: int) -> Iterator[Frame]:
+def tracked(simulation: Simulation, frames: int, sigma: float) -> Iterator[Frame]:
     """Every frame of a simulation; the mesh is made from the first."""
     model = _KeptModel()
-    tracking, truths = Tracking(rig_of(simulation), default_plan(model=model)), TruthComparison()
+    tracking, truths = Tracking(_rig(simulation, sigma), default_plan(model=model)), TruthComparison()
     for k in range(frames):
         images, truth = simulation.expose(k)
         truths.add_truth(truth.t_host_ns, truth.points_r)
@@ -102,6 +106,13 @@ def tracked(simulation: Simulation, frames: int) -> Iterator[Frame]:
         if points is None or model.made is None:
             raise RuntimeError(f"no mesh in exposure 0 of {simulation}")
         yield Frame(model.made, estimate, points)
+
+
+def _rig(simulation: Simulation, sigma: float) -> Rig:
+    rig = rig_of(simulation)
+    return replace(
+        rig, sensors=dict(rig.sensors) | {"color": replace(rig.sensors["color"], noise=GaussianColor(sigma))}
+    )
 
 
 class _KeptModel:
@@ -148,12 +159,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
     parser.add_argument("--frames", type=int, default=150)
     parser.add_argument("--device", default="sheet", help="scene, or scene?key=value&…, of the simulated device")
+    parser.add_argument("--sigma", type=float, default=DEMO_SIGMA, help="deviation of a colour [levels of 256]")
     arguments = parser.parse_args()
     print("| seed | vertices | without the mesh's own | Θ as sensed | directions | Θ | said mm | in truth mm |")
     print("|---|---|---|---|---|---|---|---|")
     for seed in arguments.seeds:
         joint = "&" if "?" in arguments.device else "?"
-        found = coverage(f"simulated://{arguments.device}{joint}seed={seed}", arguments.frames)
+        found = coverage(f"simulated://{arguments.device}{joint}seed={seed}", arguments.frames, arguments.sigma)
         print(
             f"| {seed} | {found.vertices:.1%} | {found.bare:.1%} | {found.sensed:.1%} | {found.directions:.1f} | "
             f"{found.theta:.1%} | {found.said_mm:.2f} | {found.true_mm:.2f} |",

@@ -44,7 +44,7 @@ class Bench:
             self.sets,
             EstimatePublisher(self.bus, self.speaker, "sheet", "nurbs", RIG.calib_id),
             self.health,
-            ResidualWatch(self.health, {"tof"}),
+            ResidualWatch(self.health),
             self.clock,
             budget_ms,
         )

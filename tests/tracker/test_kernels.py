@@ -88,7 +88,7 @@ def test_without_distortion_a_shorter_kernel_says_the_same(seed):
 @few
 @given(seeds)
 def test_a_plane_is_as_far_as_the_pixels_that_see_it_measure(seed):
-    """Wherever on it the vertices are; the lens bends the half pixel beside them by a few per cent, which is ignored."""
+    """Wherever on it the vertices are; the lens bends half a pixel by a few per cent, which is ignored."""
     generator = np.random.default_rng(seed)
     n = np.array([*generator.uniform(-1, 1, 2), -1.0])
     n /= np.linalg.norm(n)

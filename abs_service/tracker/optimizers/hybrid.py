@@ -37,7 +37,7 @@ class Settings:
         restarts: how often the population may double in the first frame, where the object is searched for widely.
     """
 
-    steps: Annotated[int, Ge(1)] = 3
+    steps: Annotated[int, Ge(1)] = 12
     tolerance: Annotated[float, Gt(0)] = 1.0
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 25

@@ -18,7 +18,7 @@ from calib.rig import Rig
 #: A vertex is hidden behind the mesh's own surface if that is nearer to the camera by more than this [m].
 HIDING_M = 0.01
 
-#: A surface that is seen at a flatter angle (cosine) is taken for one at this, where distances are told beside a vertex.
+#: Flattest angle (cosine) at which a surface's slope is followed to a pixel's centre.
 LEAST_COSINE = 0.2
 
 
@@ -165,8 +165,7 @@ def _synthesize(
 ) -> None:
     """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r².
 
-    The line of sight of the pixel's centre meets the tangential plane at n · v / (n · d) = z (1 − n · Δ / (n · d)), where
-    Δ is from the vertex's line of sight (u, w, 1) to that one, d; the lens is taken for undistorted in between.
+    A pixel's line of sight d, beside the vertex's by Δ, meets the tangential plane at z (1 − n · Δ / (n · d)).
     """
     zero, half, one, two = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
     fx, fy, cx, cy = matrix
