@@ -16,7 +16,7 @@ from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.priors import StretchPrior
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.depth import FREE_SCALE_M, DepthTerm, _write_constants
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -189,6 +189,22 @@ def test_what_one_measurement_costs(distance, expected):
         "outlier": SHARE / RANGE_M,
     }
     assert cost == pytest.approx(-np.log(density[expected]), rel=1e-5)
+
+
+@few
+@given(seeds)
+def test_pixels_that_say_nothing_of_distances_become_constants(seed):
+    generator = np.random.default_rng(seed)
+    height, width = generator.integers(1, 8, 2)
+    texture = generator.normal(size=(height + 2, width + 2, 8)).astype(np.float32)
+    silent = generator.uniform(size=(height, width)) < 0.3
+    free_m = (generator.uniform(0, 0.5, (height, width)) * (generator.uniform(size=(height, width)) < 0.3)).astype("f4")
+    expected = texture.copy()
+    inner = expected[1:-1, 1:-1]
+    inner[silent] = np.eye(8)[6] * -2.5
+    inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
+    _write_constants(silent, free_m, -2.5, 7.0, texture)
+    np.testing.assert_allclose(texture, expected, rtol=1e-5)
 
 
 @few

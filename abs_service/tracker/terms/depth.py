@@ -51,7 +51,8 @@ class DepthTerm:
         self._foreground = np.where(seen.foreground, distance, np.nan)
         self._obscured = np.pad(seen.foreground | seen.hole, 1).ravel()
         self._free_m = np.pad(seen.free_m, 1)
-        self._texture = self._classified(texture, seen).reshape(-1, 8)
+        self._silence(texture, seen)
+        self._texture = texture.reshape(-1, 8)
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of what stands before the object."""
@@ -63,23 +64,16 @@ class DepthTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Nothing more: a depth sensor sees for itself what stands before the object."""
 
-    def _classified(self, texture: NDArray[np.float32], seen: Visibility) -> NDArray[np.float32]:
-        """The texture (height + 2, width + 2, 8) with constants where a measurement says nothing about distances.
+    def _silence(self, texture: NDArray[np.float32], seen: Visibility) -> None:
+        """Puts constants into the texture (height + 2, width + 2, 8) where a pixel says nothing about distances.
 
         Behind an occluder, and where returns are missing, a vertex costs what one that agrees costs on average, so that
         it has no reason to move there or away. In free space it costs an outlier, and more the farther it is from the
         object.
         """
-        inner = texture[1:-1, 1:-1].copy()
-        if seen.object.any():
-            inner[seen.foreground | seen.hole] = 0
-            inner[seen.foreground | seen.hole, 6] = np.median(inner[seen.object, 6]) + 0.5
-        free = seen.free_m > 0
-        inner[free] = 0
-        inner[free, 6] = self._bounds.outlier - self._bounds.inlier + seen.free_m[free] / FREE_SCALE_M
-        result = texture.copy()
-        result[1:-1, 1:-1] = inner
-        return result
+        silent = seen.foreground | seen.hole
+        agreeing = np.median(texture[1:-1, 1:-1, 6][seen.object]) + 0.5 if seen.object.any() else 0.0
+        _write_constants(silent, seen.free_m, agreeing, self._bounds.outlier - self._bounds.inlier, texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,); the outlier share is mixed in by the larger of the two densities."""
@@ -134,6 +128,25 @@ class DepthTerm:
         inside = np.clip(t, -WINDOW_M, WINDOW_M)
         inverse = texels[:, 3] + inside * (texels[:, 4] + inside * texels[:, 5])
         return (t - texels[:, 1] - texels[:, 2] * inside) * inverse, inverse, (seen.pixel[0] > 0) & (texels[:, 3] > 0)
+
+
+@kernel
+def _write_constants(
+    silent: NDArray[np.bool_],
+    free_m: NDArray[np.float32],
+    agreeing: float,
+    outlier: float,
+    texture: NDArray[np.float32],
+) -> None:
+    """Texels that cost `agreeing` where a pixel is silent, and outlier + d / s where it is d > 0 into free space."""
+    per_metre = np.float32(1 / FREE_SCALE_M)
+    for row in range(silent.shape[0]):
+        for column in range(silent.shape[1]):
+            free = free_m[row, column]
+            if free > 0 or silent[row, column]:
+                texel = texture[row + 1, column + 1]
+                texel[:] = 0
+                texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)
 
 
 @kernel
