@@ -17,7 +17,7 @@ from tests.service.takes import WALL_NS, write_take
 COUNT = 20
 SIMULATION = parse("simulated://sheet?seed=1").build()
 #: Another number than the default, which the replay must not take.
-TOML = config.to_toml(config.load_default()).replace("\nsteps = 3\n", "\nsteps = 2\n")
+TOML = config.to_toml(config.load_default()).replace("\nsteps = 12\n", "\nsteps = 2\n")
 FIRST = 30  # the sheet begins to move
 
 
