@@ -72,7 +72,7 @@ class DepthTerm:
         object.
         """
         silent = seen.foreground | seen.hole
-        agreeing = np.median(texture[1:-1, 1:-1, 6][seen.object]) + 0.5 if seen.object.any() else 0.0
+        agreeing = float(np.median(texture[1:-1, 1:-1, 6][seen.object])) + 0.5 if seen.object.any() else 0.0
         _write_constants(silent, seen.free_m, agreeing, self._bounds.outlier - self._bounds.inlier, texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
