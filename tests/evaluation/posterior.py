@@ -13,7 +13,7 @@ the first, which defines the material points:
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,10 +27,8 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.priors import StretchPrior
 from abs_service.tracker.uncertainty import propagated
 from abs_service.tracking import Tracking
-from calib.noise.color import GaussianColor
-from calib.rig import Rig
 from drivers.simulated.simulation import Simulation
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+from tests.tracker.driving import default_plan, frame_set, rig_of, simulate, with_color_deviation
 
 SHARE = 0.95
 #: Deviation of a colour in the default rig [levels of 256].
@@ -95,7 +93,10 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
 def tracked(simulation: Simulation, frames: int, sigma: float) -> Iterator[Frame]:
     """Every frame of a simulation; the mesh is made from the first."""
     model = _KeptModel()
-    tracking, truths = Tracking(_rig(simulation, sigma), default_plan(model=model)), TruthComparison()
+    tracking, truths = (
+        Tracking(with_color_deviation(rig_of(simulation), sigma), default_plan(model=model)),
+        TruthComparison(),
+    )
     for k in range(frames):
         images, truth = simulation.expose(k)
         truths.add_truth(truth.t_host_ns, truth.points_r)
@@ -106,13 +107,6 @@ def tracked(simulation: Simulation, frames: int, sigma: float) -> Iterator[Frame
         if points is None or model.made is None:
             raise RuntimeError(f"no mesh in exposure 0 of {simulation}")
         yield Frame(model.made, estimate, points)
-
-
-def _rig(simulation: Simulation, sigma: float) -> Rig:
-    rig = rig_of(simulation)
-    return replace(
-        rig, sensors=dict(rig.sensors) | {"color": replace(rig.sensors["color"], noise=GaussianColor(sigma))}
-    )
 
 
 class _KeptModel:

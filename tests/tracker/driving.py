@@ -11,6 +11,7 @@ from abs_service.commands import plans
 from abs_service.evaluation import Errors, TruthComparison
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking import Plan, Tracking
+from calib.noise.color import GaussianColor
 from calib.rig import Rig
 from drivers.frame import Frame, FrameSet
 from drivers.simulated import address
@@ -28,6 +29,12 @@ def default_plan(**changes: object) -> Plan:
 def rig_of(simulation: Simulation) -> Rig:
     """The default rig around a simulation's cameras."""
     return plans.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
+
+
+def with_color_deviation(rig: Rig, sigma: float) -> Rig:
+    """A rig with a colour camera, whose colours deviate by `sigma` [levels of 256]."""
+    color = dataclasses.replace(rig.sensors["color"], noise=GaussianColor(sigma))
+    return dataclasses.replace(rig, sensors=dict(rig.sensors) | {"color": color})
 
 
 def simulate(uri: str) -> Simulation:
