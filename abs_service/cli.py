@@ -1,7 +1,8 @@
 """The command line. Each command is a module of `abs_service.commands`, imported only when it is chosen.
 
 Such a module has a docstring (its help; examples after the first paragraph), `add_arguments(parser)` and
-`run(arguments) -> int`, which returns the exit code.
+`run(arguments) -> int`, which returns the exit code. Or it is a package with commands of its own, named by its
+`COMMANDS`: `abs-service calibrate rig` is `abs_service.commands.calibrate.rig`.
 """
 
 import argparse
@@ -9,7 +10,8 @@ import difflib
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib import import_module
 from types import ModuleType
 
@@ -54,13 +56,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
     lifeline.hold()
-    given = list(sys.argv[1:] if argv is None else argv)
-    if not given:
-        _parser().print_help(sys.stderr)
-        return Exit.USER
-    chosen = _parser().parse_args(given[:1])
-    module = import_module(f"abs_service.commands.{MODULES.get(chosen.command, chosen.command)}")
-    arguments = _command_parser(chosen.command, module).parse_args(given[1:])
+    name, commands, given = "", COMMANDS, list(sys.argv[1:] if argv is None else argv)
+    module = import_module("abs_service.commands")
+    while commands:
+        parser = _parser() if not name else _group_parser(name, module, commands)
+        if not given:
+            parser.print_help(sys.stderr)
+            return Exit.USER
+        chosen = parser.parse_args(given[:1]).command
+        name, given = f"{name} {chosen}".strip(), given[1:]
+        module = import_module(f"{module.__name__}.{MODULES.get(chosen, chosen)}")
+        commands = getattr(module, "COMMANDS", {})
+    arguments = _command_parser(name, module).parse_args(given)
     logging.basicConfig(
         level=arguments.log_level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr
     )
@@ -80,27 +87,41 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
     parser = argparse.ArgumentParser(
         prog="abs-service",
         usage="abs-service [--help] [--version] COMMAND …",
         description="Tells every other program, live, how the thing in front of depth cameras deforms.\n\n"
-        "commands:\n" + "\n".join(lines),
+        + _listed(COMMANDS),
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"abs-service {abs_service.__version__}")
-    parser.add_argument("command", type=_command, help=argparse.SUPPRESS)
+    parser.add_argument("command", type=partial(_command, COMMANDS), help=argparse.SUPPRESS)
     return parser
 
 
-def _command(name: str) -> str:
-    if name in COMMANDS:
+def _group_parser(name: str, module: ModuleType, commands: Mapping[str, str]) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=f"abs-service {name}",
+        usage=f"abs-service {name} [--help] COMMAND …",
+        description=f"{module.__doc__}\n{_listed(commands)}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("command", type=partial(_command, commands), help=argparse.SUPPRESS)
+    return parser
+
+
+def _listed(commands: Mapping[str, str]) -> str:
+    width = max(map(len, commands))
+    return "commands:\n" + "\n".join(f"  {name:<{width}}  {text}" for name, text in commands.items())
+
+
+def _command(commands: Mapping[str, str], name: str) -> str:
+    if name in commands:
         return name
-    close = difflib.get_close_matches(name, COMMANDS, n=1)
+    close = difflib.get_close_matches(name, commands, n=1)
     guess = f' Did you mean "{close[0]}"?' if close else ""
-    raise argparse.ArgumentTypeError(f'there is no command "{name}".{guess} There are: {", ".join(COMMANDS)}')
+    raise argparse.ArgumentTypeError(f'there is no command "{name}".{guess} There are: {", ".join(commands)}')
 
 
 def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:

@@ -81,6 +81,41 @@ def test_without_a_command_the_help_is_shown(capsys):
     assert all(name in shown for name in cli.COMMANDS)
 
 
+@pytest.fixture
+def group(command, monkeypatch):
+    """A group `calls` with one command, the `act` of `command`."""
+    act = command(lambda arguments: arguments.times)
+    module = types.SimpleNamespace(
+        __name__="abs_service.commands.calls", __doc__="Calls others.\n", COMMANDS={"act": "acts"}
+    )
+    monkeypatch.setitem(cli.COMMANDS, "calls", "calls")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(sys.modules, "abs_service.commands.calls.act", act)
+
+
+@pytest.mark.usefixtures("group")
+class TestGroups:
+    def test_a_command_of_a_group_gets_its_arguments(self):
+        assert cli.main(["calls", "act", "--times", "7"]) == 7
+
+    def test_the_help_of_a_group_lists_its_commands(self, capsys):
+        assert cli.main(["calls"]) == Exit.USER
+        shown = capsys.readouterr().err
+        assert "Calls others." in shown
+        assert "act  acts" in shown
+
+    def test_an_unknown_command_of_a_group_is_answered_with_the_closest(self, capsys):
+        with pytest.raises(SystemExit) as caught:
+            cli.main(["calls", "cat"])
+        assert caught.value.code == Exit.USER
+        assert 'Did you mean "act"?' in capsys.readouterr().err
+
+    def test_the_help_of_a_command_names_its_group(self, capsys):
+        with pytest.raises(SystemExit):
+            cli.main(["calls", "act", "--help"])
+        assert "usage: abs-service calls act" in capsys.readouterr().out
+
+
 def test_help_imports_no_command_and_nothing_heavy():
     code = (
         "import sys; from abs_service import cli\n"
