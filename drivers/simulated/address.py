@@ -25,6 +25,9 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "rate": values.number(float, 0.1, 200),
     "noise": values.number(float, 0, 10),
     "offset": values.number(float, -0.5, 0.5),
+    "wiggle": values.number(float, 0, 0.1),
+    "dark": values.number(float, -100, 100),
+    "pattern": values.number(float, 0, 0.1),
     "bend": values.number(float, 0, 90),
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
@@ -35,11 +38,17 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "weight": values.number(float, 0.001, 2),
     "texture": values.one_of("smooth", "fine"),
     "lens": values.numbers(len(COEFFICIENTS), -1, 1),
+    "distance": values.number(float, 0.1, 10),
+    "reflectivity": values.number(float, 0.01, 1),
+    "tilt": values.number(float, -70, 70),
     "order": values.one_of(*ORDERS),
     "blur": values.number(float, 0, 10),
     "crosstalk": values.number(float, 0, 0.5),
     **dict.fromkeys(OPTICS, values.size),
 }
+
+#: The scenes in which something is to be tracked.
+MOVING = frozenset(SCENES) - {"wall"}
 
 #: The keys that mean something in some scenes only, and in which.
 SCENES_OF: Mapping[str, frozenset[str]] = {
@@ -48,6 +57,12 @@ SCENES_OF: Mapping[str, frozenset[str]] = {
     "turn": frozenset({"sheet", "board", "pair"}),
     "stiffness": frozenset({"strip"}),
     "weight": frozenset({"strip"}),
+    "distance": frozenset({"wall"}),
+    "reflectivity": frozenset({"wall"}),
+    "tilt": frozenset({"wall"}),
+    "speed": MOVING,
+    "occluder": MOVING,
+    "leave": MOVING,
 }
 
 
@@ -63,6 +78,9 @@ class Address:
         rate: exposures per second [Hz].
         noise: factor on all random errors; 0 leaves only what digits do.
         offset: mean offset of the time-of-flight head's distances [m].
+        wiggle: size of its periodic offset [m].
+        dark: its offset of dark surfaces, times the amplitude [m].
+        pattern: standard deviation of its pixels' own offsets [m].
         bend: largest bend of the sheet from end to end [degrees].
         speed: factor on the speed of all motion; with 0 nothing ever moves.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
@@ -71,6 +89,9 @@ class Address:
         leave: from when until when it is out of view [s]; in the address `leave=3,5`.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
+        distance: of the bare wall, along the rig's z axis [m].
+        reflectivity: of the bare wall, the same for all light.
+        tilt: of the bare wall, about the rig's y axis [degrees].
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
         lens: distortion of all heads, `calib.lens.COEFFICIENTS`; `lens=-0.2,0.05` is a barrel's k1 and k2.
         order: of the Bayer head's filters, one of `ORDERS`.
@@ -85,6 +106,9 @@ class Address:
     rate: float = 30.0
     noise: float = 1.0
     offset: float = 0.0
+    wiggle: float = 0.0
+    dark: float = 0.0
+    pattern: float = 0.0
     bend: float = 60.0
     speed: float = 1.0
     jitter_ms: float = 0.0
@@ -93,6 +117,9 @@ class Address:
     leave: tuple[float, float] = (math.inf, math.inf)
     stiffness: float = 0.01
     weight: float = 0.3
+    distance: float = 1.0
+    reflectivity: float = 0.5
+    tilt: float = 0.0
     texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
     order: str = "grbg"
@@ -115,12 +142,18 @@ class Address:
             fine=fine,
             stiffness=self.stiffness,
             weight=self.weight,
+            distance=self.distance,
+            reflectivity=self.reflectivity,
+            tilt=math.radians(self.tilt),
         )
         equipment = Equipment(
             sizes=self.sizes,
             rate_hz=self.rate,
             noise=self.noise,
             offset=self.offset,
+            wiggle=self.wiggle,
+            dark=self.dark,
+            pattern=self.pattern,
             lens=Lens(np.array(self.lens)),
             mosaic=Mosaic(self.order, self.blur, self.crosstalk),
             samples=2 if fine else 1,

@@ -25,7 +25,7 @@ class Equipment:
         sizes: width and height [px] of heads that differ from their default.
         rate_hz: exposures per second.
         noise: factor on all random errors.
-        offset: mean offset of the time-of-flight head's distances [m].
+        offset, wiggle, dark, pattern: offsets of the time-of-flight head; see `Address`.
         lens: distortion of all heads that make images.
         mosaic: of the Bayer head.
         samples: lines of sight per pixel and axis of the colour and Bayer heads.
@@ -35,6 +35,9 @@ class Equipment:
     rate_hz: float = 30.0
     noise: float = 1.0
     offset: float = 0.0
+    wiggle: float = 0.0
+    dark: float = 0.0
+    pattern: float = 0.0
     lens: Lens = field(default_factory=Lens)
     mosaic: Mosaic = field(default_factory=Mosaic)
     samples: int = 1
@@ -72,6 +75,9 @@ class Equipment:
         return replace(
             default,
             mu_offset=self.offset,
+            mu_wiggle=self.wiggle,
+            mu_amplitude=self.dark,
+            pattern=self.pattern,
             sigma_offset=self.noise * default.sigma_offset,
             sigma_distance=self.noise * default.sigma_distance,
             sigma_amplitude=self.noise * default.sigma_amplitude,

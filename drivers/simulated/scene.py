@@ -1,11 +1,12 @@
 """A scene: surfaces to track, what may hide them, and the wall behind everything."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
+from calib.pose import Pose
 from drivers.simulated.body import Body, Surface, SurfaceBody, Thing
 from drivers.simulated.texture import Texture
 
@@ -44,17 +45,19 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Things that move before the wall z = `WALL_Z`.
+    """Things that move before a wall.
 
     Attributes:
         surfaces: what is to be tracked; none ever hides another.
         wall: texture of the wall, centred on the rig's z axis.
         occluders: what is always in front of the surfaces.
+        T_rw: pose of the wall: its plane is z = 0 of frame w; by default z = `WALL_Z` of the rig.
     """
 
     surfaces: tuple[Surface, ...]
     wall: Texture
     occluders: tuple[Thing, ...] = ()
+    T_rw: Pose = field(default_factory=lambda: pose.from_rotation_vector((0, 0, 0), (0, 0, WALL_Z)))
 
     def at(self, t: float) -> Moment:
         """Where everything is at time `t` [s] after the start."""

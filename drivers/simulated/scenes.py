@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from calib import pose
 from drivers.simulated.body import Surface
 from drivers.simulated.excursion import Excursion
 from drivers.simulated.hand import Hand
@@ -31,6 +32,7 @@ class Choices:
         fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
+        distance, reflectivity, tilt: of the bare wall [m], [rad].
     """
 
     seed: int = 1
@@ -41,6 +43,9 @@ class Choices:
     fine: bool = False
     stiffness: float = 0.01
     weight: float = 0.3
+    distance: float = 1.0
+    reflectivity: float = 0.5
+    tilt: float = 0.0
 
 
 def sheet(choices: Choices) -> Scene:
@@ -111,8 +116,20 @@ def pair(choices: Choices) -> Scene:
     return _scene(choices, *sheets)
 
 
+def wall(choices: Choices) -> Scene:
+    """Nothing but a wall of one brightness, for static sequences: `choices.distance` away and turned about y."""
+    T_rw = pose.from_rotation_vector((0, choices.tilt, 0), (0, 0, choices.distance))
+    return Scene((), Texture(np.full((2, 2, 4), choices.reflectivity, np.float32), 1.0), T_rw=T_rw)
+
+
 #: The scenes by the name that an address calls them.
-SCENES: Mapping[str, Callable[[Choices], Scene]] = {"sheet": sheet, "board": board, "strip": strip, "pair": pair}
+SCENES: Mapping[str, Callable[[Choices], Scene]] = {
+    "sheet": sheet,
+    "board": board,
+    "strip": strip,
+    "pair": pair,
+    "wall": wall,
+}
 
 
 def _scene(choices: Choices, *surfaces: Surface) -> Scene:

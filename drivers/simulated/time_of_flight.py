@@ -15,6 +15,12 @@ from drivers.simulated.view import Sight, View
 #: Unambiguous range [m] and the steps that it is digitised in: a SwissRanger SR4000 at 30 MHz.
 RANGE_M, LEVELS = 5.0, 2**14
 
+#: Period of the wiggling error [m]: four to the unambiguous range, since the third and fifth harmonic cause it.
+WIGGLE_M = RANGE_M / 4
+
+#: Seed of what distinguishes the pixels of this sensor.
+_MADE = 1
+
 #: σ of the default noise as a polynomial: row i belongs to the power i of the distance [m], column j to the power j of
 #: the amplitude. For amplitudes from 2000 to 10000 it errs by less than 0.3 mm; below, it is up to a quarter too small.
 SIGMA_POLYNOMIAL = ((1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14), (5.0e-4, 0.0, 0.0, 0.0))
@@ -24,13 +30,16 @@ SIGMA_POLYNOMIAL = ((1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14), (5.0e-4, 0
 class TimeOfFlightNoise:
     """The true law of the errors: at distance x [m] and amplitude a, what is measured is x + μ + σ · N(0, 1).
 
-    μ(x, a) = mu_offset + mu_amplitude / a and σ(x, a) = sigma_offset + sigma_distance · x + sigma_amplitude / a. With
-    the defaults μ is 0, and σ is 3 to 6.5 mm on the sheet and 4 to 25 mm on the wall. `SIGMA_POLYNOMIAL` is that σ as
-    the tracker's noise model can express it.
+    μ(x, a) = mu_offset + mu_wiggle · sin(2π x / `WIGGLE_M`) + mu_amplitude / a, plus an offset that each pixel has for
+    itself, and σ(x, a) = sigma_offset + sigma_distance · x + sigma_amplitude / a. With the defaults μ is 0, and σ is 3
+    to 6.5 mm on the sheet and 4 to 25 mm on the wall. `SIGMA_POLYNOMIAL` is that σ as the tracker's noise model can
+    express it.
 
     Attributes:
         mu_offset: mean offset [m].
+        mu_wiggle: size of the periodic offset [m] ("wiggling": the modulated light is no sine).
         mu_amplitude: mean offset times amplitude [m].
+        pattern: standard deviation of the pixels' own offsets [m], which never change ("fixed pattern").
         sigma_offset: deviation of the brightest, closest return [m].
         sigma_distance: growth of the deviation with the distance.
         sigma_amplitude: deviation times amplitude [m].
@@ -39,16 +48,18 @@ class TimeOfFlightNoise:
     """
 
     mu_offset: float = 0.0
+    mu_wiggle: float = 0.0
     mu_amplitude: float = 0.0
+    pattern: float = 0.0
     sigma_offset: float = 0.0015
     sigma_distance: float = 0.0005
     sigma_amplitude: float = 9.0
     amplitude: float = 25.0
     least_amplitude: float = 500.0
 
-    def mu(self, a: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Mean offset [m] at amplitude `a`."""
-        return self.mu_offset + self.mu_amplitude / a
+    def mu(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Mean offset [m] of the pixels on average, at distance `x` [m] and amplitude `a`."""
+        return self.mu_offset + self.mu_wiggle * np.sin(2 * np.pi / WIGGLE_M * x) + self.mu_amplitude / a
 
     def sigma(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.floating]:
         """Deviation [m] at distance `x` [m] and amplitude `a`."""
@@ -60,6 +71,9 @@ class TimeOfFlight:
 
     The amplitude is what of the sensor's light is `returned`. A pixel at a rim mixes what it sees of
     a body and what is behind it by their amplitudes, which puts its distance between the two ("flying pixel").
+
+    Attributes:
+        pattern: the pixels' own offsets (height, width) [m]: those of the sensor, whatever the seed of a scene is.
     """
 
     def __init__(
@@ -73,13 +87,16 @@ class TimeOfFlight:
         )
         self._view = View(scene, camera)
         self._wall_amplitude = returned(self._view.wall)
+        normal = np.random.default_rng(_MADE).standard_normal((camera.height, camera.width), np.float32)
+        self.pattern = np.float32(noise.pattern) * normal
 
     def expose(self, exposure: Exposure) -> list[Frame]:
         """Takes depth and amplitude of one exposure."""
         distance, amplitude = self.ideal(self._view.look(exposure.moment))
         normal = exposure.generator.standard_normal((2, *distance.shape), np.float32)
         with np.errstate(divide="ignore", invalid="ignore"):
-            measured = distance + self.noise.mu(amplitude) + self.noise.sigma(distance, amplitude) * normal[0]
+            measured = distance + self.noise.mu(distance, amplitude) + self.pattern
+            measured += self.noise.sigma(distance, amplitude) * normal[0]
             brightness = amplitude + self.noise.amplitude * normal[1]
             lost = ~(measured > 0) | ~(brightness >= self.noise.least_amplitude)
         depth = np.clip(np.rint(np.where(lost, 0, measured) * (LEVELS / RANGE_M)), 0, LEVELS - 1).astype("<u2")

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib import pose
 from calib.camera import Camera
 from drivers.simulated.body import Appearance, Body
-from drivers.simulated.scene import WALL_Z, Moment, Scene
+from drivers.simulated.scene import Moment, Scene
 
 #: What a body's outline may miss of it [px].
 _MARGIN = 3
@@ -65,16 +66,17 @@ class View:
         return Sight(seen.share, seen.distance, seen.cosine, seen.albedo, region)
 
     def _look_at_wall(self, scene: Scene) -> Sight:
-        directions_r = self.rays @ self._camera.T_rs[:3, :3].T
+        T_ws = pose.inverse(scene.T_rw) @ self._camera.T_rs
+        directions_w = self.rays @ T_ws[:3, :3].T
         with np.errstate(divide="ignore"):
-            distance = (WALL_Z - self._camera.center[2]) / directions_r[..., 2]
+            distance = -T_ws[2, 3] / directions_w[..., 2]
         distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
-        points_r = (self._camera.center + directions_r * distance[..., None]).astype(np.float32)
+        points_w = (T_ws[:3, 3] + directions_w * distance[..., None]).astype(np.float32)
         return Sight(
             share=np.ones_like(distance, np.float32),
             distance=distance.astype(np.float32),
-            cosine=np.abs(directions_r[..., 2]).astype(np.float32),
-            albedo=scene.wall.at(points_r[..., 0], points_r[..., 1]),
+            cosine=np.abs(directions_w[..., 2]).astype(np.float32),
+            albedo=scene.wall.at(points_w[..., 0], points_w[..., 1]),
             region=(slice(0, self._camera.height), slice(0, self._camera.width)),
         )
 

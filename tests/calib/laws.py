@@ -38,7 +38,7 @@ def time_of_flight(seed: int, n: int = 20_000, outliers: float = 0.0, brightest:
     x = generator.uniform(*DISTANCES, n)
     reflected = WHITE * generator.choice([0.15, 0.5, 0.9], n) * generator.uniform(0.6, 1, n) / x**2
     a = np.clip(reflected, AMPLITUDES[0], brightest)
-    measured = x + TOF.mu(a) + TOF.sigma(x, a) * generator.standard_normal(n)
+    measured = x + TOF.mu(x, a) + TOF.sigma(x, a) * generator.standard_normal(n)
     digits = np.rint(scattered(generator, measured, outliers) * (LEVELS / RANGE_M)) * (RANGE_M / LEVELS)
     amplitude = np.rint(a + TOF.amplitude * generator.standard_normal(n))
     return Samples(digits, x, amplitude, *somewhere(n))

@@ -27,7 +27,7 @@ def errors(model, x, a, mean, sigma):
 def test_time_of_flight_is_found_again_all_over_its_domain(seed, outliers):
     model = tof_amplitude.fit(laws.time_of_flight(seed, outliers=outliers))
     x, a = laws.grid()
-    mean, sigma = errors(model, x, a, laws.TOF.mu(a), laws.TOF.sigma(x, a))
+    mean, sigma = errors(model, x, a, laws.TOF.mu(x, a), laws.TOF.sigma(x, a))
     assert mean < 1e-3
     assert sigma < 0.10
 
@@ -39,7 +39,7 @@ def test_a_polynomial_fits_where_the_amplitudes_are_of_one_order(seed):
     samples = samples.take((samples.amplitude > 2000) & (samples.amplitude < 10_000))
     model = gaussian_polynomial.fit(samples, sigma_degrees=(1, 2), mu_degrees=(1, 2))
     x, a, p = samples.true, samples.amplitude, samples.pixels
-    assert np.abs(model.mean(x, a, p) - laws.TOF.mu(a)).max() < 1e-3
+    assert np.abs(model.mean(x, a, p) - laws.TOF.mu(x, a)).max() < 1e-3
     assert np.quantile(np.abs(model.deviation(x, a, p) / laws.TOF.sigma(x, a) - 1), 0.97) < 0.10
 
 
@@ -179,7 +179,7 @@ def test_where_the_domain_s_corner_holds_no_sample_no_offset_is_trusted(seed):
     """A polynomial says something there: here up to 9 cm, if nothing held it, for a far and bright surface."""
     model = gaussian_polynomial.fit(laws.time_of_flight(seed, outliers=0.05), (1, 3), (1, 3))
     (x, a), p = laws.grid(), laws.somewhere(400)
-    error = np.abs(model.mean(x, a, p) - laws.TOF.mu(a))
+    error = np.abs(model.mean(x, a, p) - laws.TOF.mu(x, a))
     assert error.max() < 0.025
     assert (error / model.deviation(x, a, p)).max() < 3
 

@@ -104,7 +104,9 @@ def test_deviation_and_offset_of_time_of_flight_follow_the_declared_law() -> Non
     depths = np.array([expose(simulation, k)[0]["tof/depth"].si() for k in range(30)])  # the first second is at rest
     distance, amplitude = head.ideal(head._view.look(simulation.scene.at(0.0)))
     bright = amplitude > 1000
-    normalized = ((depths - distance - head.noise.mu(amplitude)) / head.noise.sigma(distance, amplitude))[:, bright]
+    normalized = ((depths - distance - head.noise.mu(distance, amplitude)) / head.noise.sigma(distance, amplitude))[
+        :, bright
+    ]
     assert head.noise == TimeOfFlightNoise(mu_offset=0.02)
     assert np.abs(normalized.mean()) < 0.01
     assert normalized.std() == pytest.approx(1, abs=0.01)

@@ -30,7 +30,7 @@ def time_of_flight(fit) -> list[float]:
         model = fit(laws.time_of_flight(seed, outliers=OUTLIERS))
         quality = judge(model, laws.time_of_flight(seed + 100, outliers=OUTLIERS))
         sigma = np.abs(model.deviation(x, a, p) / laws.TOF.sigma(x, a) - 1).max() * 100
-        mean = np.abs(model.mean(x, a, p) - laws.TOF.mu(a)).max() * 1e3
+        mean = np.abs(model.mean(x, a, p) - laws.TOF.mu(x, a)).max() * 1e3
         rows.append([sigma, mean, *_told(quality)])
     return _over_seeds(rows)
 
