@@ -1,0 +1,99 @@
+"""Where a result comes from: the command, its date and version, and the data with their hashes."""
+
+import hashlib
+import shlex
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import abs_service
+
+_CHUNK = 1 << 20
+
+
+class DataError(Exception):
+    """Data that a result is said to come from, but that cannot be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class DataFile:
+    """A file or a folder that a result was computed from.
+
+    Attributes:
+        name: its name, without the folders before it: those differ from machine to machine, and are nobody's business.
+        sha256: hash of the content; of a folder, that of all its files with their names.
+    """
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a result comes from.
+
+    Attributes:
+        command: command line that computed it; the home folder of whoever did is `~`.
+        date: when, ISO 8601 in UTC.
+        version: of the program.
+        data: what it was computed from.
+    """
+
+    command: str
+    date: str
+    version: str = abs_service.__version__
+    data: tuple[DataFile, ...] = ()
+
+
+def trace(
+    arguments: Sequence[str], data: Sequence[Path], clock: Callable[[], int] = time.time_ns, home: Path | None = None
+) -> Provenance:
+    """The provenance of what a command is about to compute.
+
+    Args:
+        arguments: command line after the program's name.
+        data: files and folders that it reads.
+        clock: wall-clock time [ns since the epoch].
+        home: folder that is written as `~`; None for the user's.
+
+    Raises:
+        DataError: one of the files cannot be read.
+    """
+    away = str(Path.home() if home is None else home).rstrip("/")
+    said = [argument.replace(f"{away}/", "~/") if away else argument for argument in arguments]
+    date = datetime.fromtimestamp(clock() // 1_000_000_000, UTC).isoformat().replace("+00:00", "Z")
+    command = " ".join(["abs-service", *map(_quoted, said)])
+    return Provenance(command, date, data=tuple(fingerprint(path) for path in data))
+
+
+def fingerprint(path: Path) -> DataFile:
+    """Name and hash of a file, or of a folder with everything in it.
+
+    Raises:
+        DataError: it cannot be read.
+    """
+    try:
+        resolved = path.resolve()
+        if not resolved.is_dir():
+            return DataFile(resolved.name, _sha256(resolved))
+        digest = hashlib.sha256()
+        for file in sorted(file for file in resolved.rglob("*") if file.is_file()):
+            digest.update(f"{_sha256(file)} {file.relative_to(resolved).as_posix()}\n".encode())
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+    return DataFile(f"{resolved.name}/", digest.hexdigest())
+
+
+def _quoted(argument: str) -> str:
+    # A quoted ~ would no longer be the home folder to a shell.
+    return f"~/{shlex.quote(argument[2:])}" if argument.startswith("~/") else shlex.quote(argument)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while chunk := file.read(_CHUNK):
+            digest.update(chunk)
+    return digest.hexdigest()

@@ -1,0 +1,168 @@
+"""What a calibration command found out, for people and programs: text, tables, pictures and verdicts.
+
+`abs_service.calibration.page` writes a report as an HTML page and as JSON with the same numbers.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.calibration.provenance import Provenance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Level(IntEnum):
+    """How far a result can be relied on. The worst of a report is the exit code of its command."""
+
+    GOOD = 0
+    DOUBTFUL = 1
+    BAD = 2
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """One judgement, in plain words.
+
+    Attributes:
+        level: how far what it is about can be relied on.
+        text: one sentence that says what is so, with the number that it rests on.
+        advice: what to do about it; "" if nothing.
+        about: the sensor, pair or board that it judges; "" for the whole.
+    """
+
+    level: Level
+    text: str
+    advice: str = ""
+    about: str = ""
+
+
+#: None and NaN are shown as a dash, a level as its mark.
+Cell = str | float | Level | None
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table: heading, unit ("" if none) and the format of its numbers."""
+
+    title: str
+    unit: str = ""
+    format: str = ".4g"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table: caption, columns, and rows of as many cells; the first cell of a row says what the row is about."""
+
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """An encoded picture: caption, what those learn who do not see it, type (`image/png`) and bytes."""
+
+    caption: str
+    alt: str
+    media_type: str
+    content: bytes = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of a report under a heading of its own; paragraphs, tables and pictures in any order."""
+
+    title: str
+    blocks: tuple[str | Table | Picture, ...]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a command found out.
+
+    Attributes:
+        title: such as "Calibration of rig demo".
+        provenance: where it comes from.
+        verdicts: judgements, the most important first.
+        sections: the evidence.
+        values: what only programs want, by name; goes into the JSON form as it is.
+    """
+
+    title: str
+    provenance: Provenance
+    verdicts: tuple[Verdict, ...]
+    sections: tuple[Section, ...]
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def level(self) -> Level:
+        """The worst of all verdicts, which is also the exit code of the command; good if there are none."""
+        return max((verdict.level for verdict in self.verdicts), default=Level.GOOD)
+
+
+def drawing(figure: "Figure", caption: str, alt: str) -> Picture:
+    """A matplotlib figure as a picture that stays sharp at every size."""
+    import io  # noqa: PLC0415  together with matplotlib, which only those load who draw
+
+    import matplotlib as mpl  # noqa: PLC0415
+
+    buffer = io.BytesIO()
+    # The same figure gives the same bytes: no date, and no random names inside.
+    with mpl.rc_context({"svg.hashsalt": "abs-service"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return Picture(caption, alt, "image/svg+xml", buffer.getvalue())
+
+
+def photo(image: NDArray[np.uint8], caption: str, alt: str) -> Picture:
+    """A grey (height, width) or RGB (height, width, 3) image as a picture."""
+    encoded = cv2.imencode(".png", image[..., ::-1] if image.ndim == 3 else image)[1]
+    return Picture(caption, alt, "image/png", encoded.tobytes())
+
+
+def to_json(report: Report) -> dict[str, Any]:
+    """The report as plain data for `json.dumps`, numbers in full precision; NaN, which JSON lacks, is null."""
+    return {
+        "title": report.title,
+        "verdict": str(report.level),
+        "exit_code": int(report.level),
+        "verdicts": [_plain(asdict(verdict)) for verdict in report.verdicts],
+        "values": _plain(report.values),
+        "sections": [
+            {"title": section.title, "blocks": [_block(block) for block in section.blocks]}
+            for section in report.sections
+        ],
+        "provenance": asdict(report.provenance),
+    }
+
+
+def _block(block: str | Table | Picture) -> dict[str, Any]:
+    if isinstance(block, str):
+        return {"text": block}
+    if isinstance(block, Picture):
+        return {"picture": {"caption": block.caption, "alt": block.alt}}
+    columns = [{"title": column.title, "unit": column.unit} for column in block.columns]
+    return {"table": {"caption": block.caption, "columns": columns, "rows": _plain(block.rows)}}
+
+
+def _plain(value: Any) -> Any:
+    """Levels by name, arrays as lists, nothing that JSON lacks."""
+    if isinstance(value, Level):
+        return str(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
