@@ -23,6 +23,8 @@ proto: .venv/.dev ## regenerate the wire code from proto/abs/v1/*.proto
 constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
 	@$(COMPILE) --group dev --constraints constraints.txt --output-file constraints-dev.txt
+	@$(COMPILE) --all-extras --constraints constraints-dev.txt --output-file constraints-devices.txt
+devices: .venv/.devices ## install every device SDK as well; the tests of their drivers are skipped without
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -36,4 +38,6 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
 .venv/.dev: .venv/.run constraints-dev.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-dev.txt && touch $@
-.PHONY: help run test check lint format bench proto constraints clean
+.venv/.devices: .venv/.dev constraints-devices.txt
+	@$(PIP) --require-hashes --only-binary :all: -r constraints-devices.txt && touch $@
+.PHONY: help run test check lint format bench proto constraints devices clean

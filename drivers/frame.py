@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Kind(StrEnum):
-    """What the numbers of an image mean."""
+    """What the numbers of an image mean; a `DEVIATION` is what the sensor says of the depth beside it, as σ."""
 
     DEPTH = "depth"
     AMPLITUDE = "amplitude"
@@ -21,6 +21,7 @@ class Kind(StrEnum):
     PHASE = "phase"
     DISPARITY = "disparity"
     BINARY = "binary"
+    DEVIATION = "deviation"
 
 
 class Geometry(StrEnum):
@@ -44,7 +45,7 @@ class FrameError(ValueError):
 
 
 #: The unit of an image that declares none, by its kind; the others hold numbers that only the device understands.
-_UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.BINARY: "1"}
+_UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.DEVIATION: "m", Kind.BINARY: "1"}
 
 #: Pixel encodings as in foxglove.RawImage, with the array they hold: (dtype, channels).
 ENCODINGS: Mapping[str, tuple[np.dtype, int]] = {

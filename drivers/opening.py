@@ -1,13 +1,15 @@
-"""Opens a device by its address; the address's scheme is the name of a module of this package."""
+"""Opens a device by its address, or another program's recording: the scheme is the name of a module of this package."""
 
 import importlib
 import pkgutil
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from urllib.parse import urlsplit
 
 import drivers
 from drivers.device import AddressError, Device
+from drivers.footage import Footage
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -27,6 +29,15 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     if driver is None:
         raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
     return driver.open_device(uri, clock)
+
+
+def open_recording(program: str, path: Path) -> Footage:
+    """Opens a file that another program recorded with `drivers.<program>.open_recording`; only that driver is imported.
+
+    Raises:
+        FootageError: it cannot be read.
+    """
+    return importlib.import_module(f"drivers.{program}").open_recording(path)
 
 
 def available() -> list[str]:

@@ -16,7 +16,9 @@ import abs_service
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("abs_service", "drivers", "calib")
+CONSTRAINTS = ("constraints.txt", "constraints-dev.txt", "constraints-devices.txt")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+EXTRAS = [line for extra in PROJECT["project"]["optional-dependencies"].values() for line in extra]
 
 # Where a path means the same on every Linux machine.
 STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
@@ -50,6 +52,7 @@ def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
     [
         ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
         ("constraints-dev.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
+        ("constraints-devices.txt", EXTRAS),
     ],
 )
 def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> None:
@@ -59,7 +62,7 @@ def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> N
     )
 
 
-@pytest.mark.parametrize("name", ["constraints.txt", "constraints-dev.txt"])
+@pytest.mark.parametrize("name", CONSTRAINTS)
 def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
     """An installer that insists on hashes accepts nothing less; a list compiled from old metadata may fall short."""
     pins = _pins(name)
@@ -67,10 +70,12 @@ def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
 
 
 def test_running_and_testing_use_the_same_versions() -> None:
-    assert _pins("constraints.txt").items() <= _pins("constraints-dev.txt").items()
+    tested, devices = _pins("constraints-dev.txt"), _pins("constraints-devices.txt")
+    assert _pins("constraints.txt").items() <= tested.items()
+    assert {pin: version for pin, version in devices.items() if tested.get(pin, version) != version} == {}
 
 
-@pytest.mark.parametrize("name", ["constraints.txt", "constraints-dev.txt"])
+@pytest.mark.parametrize("name", CONSTRAINTS)
 def test_every_pin_has_a_hash_and_no_address(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     assert all("--hash=sha256:" in pin for pin in re.split(r"\n(?=\w)", text)[1:])
@@ -95,7 +100,7 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
 
 
 def test_what_the_packages_import_is_required_by_name() -> None:
-    declared = {_normal(Requirement(line).name) for line in PROJECT["project"]["dependencies"]}
+    declared = {_normal(Requirement(line).name) for line in [*PROJECT["project"]["dependencies"], *EXTRAS]}
     distributions = dict(packages_distributions()) | {"pydantic_core": ["pydantic"]}  # pydantic's own, documented by it
     undeclared = {
         f"{path.relative_to(ROOT)}: {module}"

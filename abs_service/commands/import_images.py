@@ -1,11 +1,16 @@
-"""Turns a folder of image files into a recording that `abs-service replay` tracks.
+"""Turns images or a recording of another program into a recording that `abs-service replay` tracks.
 
   abs-service import data/cloth --layout pairs --camera cloth.toml --out cloth.mcap
   abs-service import data/cloth --layout pairs --camera cloth.toml --depth 'd*.png' --color 'c*.jpg' --out cloth.mcap
   abs-service import rgbd_dataset_freiburg1_xyz --layout tum --out xyz.mcap
+  abs-service import kinect.mkv --layout azure --out kinect.mcap
 
-Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so the recording begins
-in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images and their times.
+Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
+process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 bag). See docs/devices.md.
+
+Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
+the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
+and their times.
 
 Depth images have one channel of 16 bits, in millimetres (`pairs`) or 1/5000 m (`tum`), colour images have 8 bits. The
 camera file says what took them; without a table `color` in it there are no colour images:
@@ -32,23 +37,19 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from abs.v1.common_pb2 import Header
-from rich.console import Console
-from rich.progress import track
-
-from abs_service import announcements, keys
-from abs_service.commands import camera_file
+from abs_service.commands import camera_file, import_file
 from abs_service.commands.camera_file import CameraFile
 from abs_service.exits import Exit
-from calib.camera import Camera
-from drivers import codec
-from drivers.frame import Frame, Geometry
-from drivers.image_folder.images import ColorImages, DepthImages, Images, in_order
+from drivers.footage import Footage
+from drivers.frame import Geometry
+from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
-from drivers.mcap_file import McapFile
+from drivers.opening import open_recording
 
 #: Metres per unit of depth images whose camera file does not tell.
 DEPTH_SCALES = {"pairs": 0.001, "tum": 1 / 5000}
+#: Layouts that are one file and know their cameras.
+RECORDINGS = ("azure", "o3r", "oak", "realsense")
 
 
 class ImportOptionError(Exception):
@@ -57,12 +58,12 @@ class ImportOptionError(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service import`."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder with the images")
-    parser.add_argument("--layout", choices=sorted(DEPTH_SCALES), required=True, help="how the images are named")
+    parser.add_argument("path", type=Path, metavar="PATH", help="folder with the images, or file")
+    parser.add_argument("--layout", choices=sorted([*DEPTH_SCALES, *RECORDINGS]), required=True, help="what it is")
     parser.add_argument(
         "--out", type=Path, required=True, metavar="FILE.mcap", help="recording to write; must not exist"
     )
-    parser.add_argument("--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON; optional for tum")
+    parser.add_argument("--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON (pairs; tum: optional)")
     parser.add_argument("--depth", default="depth_*.png", metavar="GLOB", help="depth images (pairs; %(default)s)")
     parser.add_argument("--color", default="color_*.png", metavar="GLOB", help="colour images (pairs; %(default)s)")
     parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
@@ -74,22 +75,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Imports; what is wrong with the images or options is raised as an error of this package or of `drivers`."""
-    cameras = _cameras(arguments)
     rig_toml = _rig(arguments.rig)
-    streams = _streams(arguments, cameras)
+    footage = _footage(arguments)
     if arguments.out.exists():
         raise ImportOptionError(f"{arguments.out}: exists already; remove it or choose another name")
     partial = arguments.out.with_name(f"{arguments.out.name}.partial")
     try:
-        _write(partial, arguments.folder.resolve().name, streams, rig_toml)
+        counts = import_file.write(partial, arguments.path.resolve().stem, footage, rig_toml)
         partial.rename(arguments.out)
     except OSError as error:
         raise ImportOptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error
     finally:
         partial.unlink(missing_ok=True)
-    counts = ", ".join(f"{len(images.files)} {name}" for name, images in streams.items())
-    print(f"{arguments.out}: {counts} images")
+    names = (
+        (stream if sensor == stream else f"{sensor}/{stream}", number) for (sensor, stream), number in counts.items()
+    )
+    print(f"{arguments.out}: {', '.join(f'{number} {name}' for name, number in names)} images")
     return Exit.OK
+
+
+def _footage(arguments: argparse.Namespace) -> Footage:
+    if arguments.layout not in RECORDINGS:
+        return ImageFolder(_streams(arguments, _cameras(arguments)))
+    for option in ("camera", "mask"):
+        if getattr(arguments, option) is not None:
+            raise ImportOptionError(f"--{option}: a recording with layout {arguments.layout} needs none")
+    return open_recording(arguments.layout, arguments.path)
 
 
 def _cameras(arguments: argparse.Namespace) -> CameraFile:
@@ -119,7 +130,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     numbered = arguments.layout == "pairs"
     if arguments.mask is not None and not numbered:
         raise ImportOptionError("--mask: only layout pairs has masks")
-    folder, rate = arguments.folder, arguments.rate
+    folder, rate = arguments.path, arguments.rate
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
     depth = cameras.depth
@@ -149,44 +160,6 @@ def _masks(depth: Sequence[ImageFile], folder: Path, pattern: str | None, rate_h
         if file.seq not in masks:
             raise ImageFolderError(f"{file.path}: no mask that matches {pattern!r} has the number {file.seq}")
     return masks
-
-
-def _write(path: Path, rig: str, streams: Mapping[str, Images], rig_toml: bytes) -> None:
-    cameras = {sensor: images.camera for sensor, images in streams.items()}
-    start_ns = min(images.files[0].t_ns for images in streams.values())
-    total = sum(len(images.files) for images in streams.values())
-    with path.open("wb") as stream:
-        file = McapFile(stream)
-        if rig_toml:
-            file.attach("rig.toml", "text/toml", rig_toml, start_ns)
-        _write_cameras(file, rig, cameras, start_ns)
-        frames = in_order(list(streams.values()))
-        for frame in track(frames, "importing", total, console=Console(stderr=True), transient=True):
-            _write_frame(file, rig, frame)
-        file.finish()
-
-
-def _write_cameras(file: McapFile, rig: str, cameras: Mapping[str, Camera], wall_ns: int) -> None:
-    for sensor, camera in cameras.items():
-        model = announcements.sensor_model(_header(rig, wall_ns, 0), sensor, camera, {})
-        calibration = announcements.calibration(sensor, camera, wall_ns)
-        for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
-            file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
-    transforms = announcements.transforms(cameras, wall_ns)
-    file.write(f"/{keys.TRANSFORMS}", transforms.DESCRIPTOR.full_name, transforms.SerializeToString(), wall_ns, 0)
-
-
-def _write_frame(file: McapFile, rig: str, frame: Frame) -> None:
-    topic, wall_ns = keys.image(frame.sensor, frame.stream), frame.t_host_ns
-    info = codec.encode_info(frame, _header(rig, wall_ns, frame.seq))
-    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
-    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
-
-
-def _header(rig: str, wall_ns: int, seq: int) -> Header:
-    header = Header(t_host_ns=wall_ns, seq=seq, rig=rig, boot_id="import")
-    header.stamp.FromNanoseconds(wall_ns)
-    return header
 
 
 def _rate(text: str) -> float:

@@ -116,11 +116,32 @@ class ColorImages:
         )
 
 
-def in_order(streams: Sequence[Images]) -> Iterator[Frame]:
-    """The frames of all streams in the order of their times, each read when it is asked for."""
-    numbered = [[(file.t_ns, number, file) for file in images.files] for number, images in enumerate(streams)]
-    for _, number, file in heapq.merge(*numbered, key=lambda entry: entry[:2]):
-        yield streams[number].frame(file)
+@dataclass(frozen=True)
+class ImageFolder:
+    """The images of a folder.
+
+    Attributes:
+        streams: by the sensor's name.
+    """
+
+    streams: Mapping[str, Images]
+
+    @property
+    def cameras(self) -> Mapping[str, Camera]:
+        """What took them, by sensor name."""
+        return {sensor: images.camera for sensor, images in self.streams.items()}
+
+    @property
+    def total(self) -> int:
+        """Number of images."""
+        return sum(len(images.files) for images in self.streams.values())
+
+    def frames(self) -> Iterator[Frame]:
+        """The frames of all streams in the order of their times, each read when it is asked for."""
+        streams = list(self.streams.values())
+        numbered = [[(file.t_ns, number, file) for file in images.files] for number, images in enumerate(streams)]
+        for _, number, file in heapq.merge(*numbered, key=lambda entry: entry[:2]):
+            yield streams[number].frame(file)
 
 
 def _read(path: Path, camera: Camera) -> NDArray[np.generic]:

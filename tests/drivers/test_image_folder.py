@@ -8,7 +8,7 @@ import pytest
 
 from calib.camera import Camera
 from drivers.frame import Geometry, Kind
-from drivers.image_folder.images import ColorImages, DepthImages, in_order
+from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 
 CAMERA = Camera(4, 3, 4.0, 4.0, 1.5, 1.0)
@@ -129,7 +129,7 @@ def test_colour_is_red_green_blue(tmp_path: Path) -> None:
 def test_frames_come_in_the_order_of_their_times(tmp_path: Path) -> None:
     depth = [ImageFile(save(tmp_path / f"d_{k}.png", depth_image()), k, 100 * k) for k in range(3)]
     color = [ImageFile(save(tmp_path / f"c_{k}.png", depth_image().astype(np.uint8)), k, 80 * k) for k in range(3)]
-    frames = in_order([DepthImages(depth, CAMERA, 0.001), ColorImages(color, CAMERA)])
+    frames = ImageFolder({"depth": DepthImages(depth, CAMERA, 0.001), "color": ColorImages(color, CAMERA)}).frames()
     assert [(frame.sensor, frame.t_host_ns) for frame in frames] == [
         ("depth", 0),
         ("color", 0),

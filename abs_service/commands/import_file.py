@@ -1,0 +1,74 @@
+"""Writes what `abs-service import` reads: a recording as the recorder would have made it, without noise models."""
+
+from collections import Counter
+from collections.abc import Mapping
+from itertools import chain
+from pathlib import Path
+
+from abs.v1.common_pb2 import Header
+from rich.console import Console
+from rich.progress import track
+
+from abs_service import announcements, keys
+from calib.camera import Camera
+from drivers import codec
+from drivers.footage import Footage, FootageError
+from drivers.frame import Frame
+from drivers.mcap_file import McapFile
+
+
+def write(path: Path, rig: str, footage: Footage, rig_toml: bytes) -> Mapping[tuple[str, str], int]:
+    """Writes a recording.
+
+    Args:
+        path: file to write; one that exists is replaced.
+        rig: name of the rig.
+        footage: what it holds.
+        rig_toml: configuration to attach, empty for none.
+
+    Returns:
+        Number of images by (sensor, stream).
+
+    Raises:
+        FootageError: it cannot be read, or there is nothing in it.
+        OSError: the file cannot be written.
+    """
+    frames = iter(footage.frames())
+    first = next(frames, None)
+    if first is None:
+        raise FootageError("there is no image in it")
+    counts: Counter[tuple[str, str]] = Counter()
+    with path.open("wb") as stream:
+        file = McapFile(stream)
+        if rig_toml:
+            file.attach("rig.toml", "text/toml", rig_toml, first.t_host_ns)
+        _write_cameras(file, rig, footage.cameras, first.t_host_ns)
+        console = Console(stderr=True)
+        for frame in track(chain([first], frames), "importing", footage.total, console=console, transient=True):
+            _write_frame(file, rig, frame)
+            counts[frame.key] += 1
+        file.finish()
+    return counts
+
+
+def _write_cameras(file: McapFile, rig: str, cameras: Mapping[str, Camera], wall_ns: int) -> None:
+    for sensor, camera in cameras.items():
+        model = announcements.sensor_model(_header(rig, wall_ns, 0), sensor, camera, {})
+        calibration = announcements.calibration(sensor, camera, wall_ns)
+        for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
+            file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
+    transforms = announcements.transforms(cameras, wall_ns)
+    file.write(f"/{keys.TRANSFORMS}", transforms.DESCRIPTOR.full_name, transforms.SerializeToString(), wall_ns, 0)
+
+
+def _write_frame(file: McapFile, rig: str, frame: Frame) -> None:
+    topic, wall_ns = keys.image(frame.sensor, frame.stream), frame.t_host_ns
+    info = codec.encode_info(frame, _header(rig, wall_ns, frame.seq))
+    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
+
+
+def _header(rig: str, wall_ns: int, seq: int) -> Header:
+    header = Header(t_host_ns=wall_ns, seq=seq, rig=rig, boot_id="import")
+    header.stamp.FromNanoseconds(wall_ns)
+    return header

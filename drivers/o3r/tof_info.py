@@ -1,0 +1,77 @@
+"""The chunk TOF_INFO: what the camera says about itself. Source: ifm3d, modules/deserialize (Apache-2.0)."""
+
+import math
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+
+from calib.camera import Camera, CameraError
+from calib.lens import Lens, LensError
+from drivers.o3r.chunks import ChunkError
+
+#: Version, metres and amplitude per digit, normalisation of three amplitudes, pose of the optics in the user's
+#: coordinates, then twice a model with 32 numbers: from pixels to directions and, the one that is used, from
+#: directions to pixels.
+_INFO = struct.Struct("<I2f3f6f I32f I32f")
+#: What versions 3 and 4 add: times of three exposures [ns], their durations [s], temperature of the light source [°C].
+_MORE = struct.Struct("<3Q3ff")
+_BROWN_CONRADY = 1
+
+
+@dataclass(frozen=True, slots=True)
+class TofInfo:
+    """What the camera says about itself.
+
+    Attributes:
+        distance_m: length of one digit of a distance [m].
+        amplitude: value of one digit of an amplitude.
+        model: number of the lens model.
+        parameters: of the lens model: fx, fy, mx, my, skew, then distortion.
+        exposure_s: the longest of the exposures [s], NaN if it is not told.
+        temperature_c: of the light source [°C], NaN if it is not told.
+    """
+
+    distance_m: float
+    amplitude: float
+    model: int
+    parameters: tuple[float, ...]
+    exposure_s: float
+    temperature_c: float
+
+    def camera(self, width: int, height: int) -> Camera:
+        """The camera of images of a size. ifm counts pixels from their corners, we from their centres.
+
+        Raises:
+            ChunkError: a lens model that is not understood.
+        """
+        fx, fy, mx, my, skew, k1, k2, p1, p2, k3 = self.parameters[:10]
+        if self.model != _BROWN_CONRADY or skew != 0:
+            raise ChunkError(
+                f"TOF_INFO: lens model {self.model} with skew {skew:g} is not supported, only model {_BROWN_CONRADY} "
+                "(Bouguet, heads with a narrow view) without skew"
+            )
+        try:
+            return Camera(width, height, fx, fy, mx - 0.5, my - 0.5, Lens(np.array([k1, k2, p1, p2, k3])))
+        except (CameraError, LensError) as error:
+            raise ChunkError(f"TOF_INFO: {error}") from error
+
+
+def parse(content: bytes) -> TofInfo:
+    """Reads the chunk's content.
+
+    Raises:
+        ChunkError: it is too short, or its units are no positive numbers.
+    """
+    if len(content) < _INFO.size:
+        raise ChunkError(f"TOF_INFO needs {_INFO.size} bytes, has {len(content)}")
+    values = _INFO.unpack_from(content)
+    distance_m, amplitude = values[1:3]
+    if not (0 < distance_m < math.inf and 0 < amplitude < math.inf):
+        raise ChunkError(f"TOF_INFO: {distance_m} m and {amplitude} per digit must be positive")
+    model, *parameters = values[45:]
+    exposure_s = temperature_c = math.nan
+    if len(content) >= _INFO.size + _MORE.size:
+        *exposures, temperature_c = _MORE.unpack_from(content, _INFO.size)[3:]
+        exposure_s = max(exposures) if all(0 <= exposure < 1 for exposure in exposures) else math.nan
+    return TofInfo(distance_m, amplitude, model, tuple(parameters), exposure_s, temperature_c)
