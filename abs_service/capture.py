@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from abs_service.health import Health, Level
-from drivers.device import AddressError, Device, DeviceError, DeviceState, Sink, Truth
+from drivers.device import Device, DeviceError, DeviceState, FinalError, Sink, Truth
 from drivers.frame import Frame
 
 _log = logging.getLogger(__name__)
@@ -81,7 +81,7 @@ class DeviceKeeper:
         while not self._stop.is_set():
             try:
                 delivered, reason = self._serve_once()
-            except AddressError as error:
+            except FinalError as error:
                 self.refusal = error
                 delivered, reason = False, str(error)
             except DeviceError as error:
@@ -170,3 +170,6 @@ class _Watch:
     def on_state(self, state: DeviceState, reason: str) -> None:
         self.state = (state, reason)
         self._sink.on_state(state, reason)
+
+    def on_warning(self, condition: str, message: str) -> None:
+        self._sink.on_warning(condition, message)

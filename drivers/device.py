@@ -1,4 +1,14 @@
-"""The contract between the service and every device."""
+"""The contract between the service and every device.
+
+A driver is a module or package of `drivers`, named like the scheme of its addresses, with two functions:
+
+- `open_device(uri: str, clock: Callable[[], int]) -> Device`: `clock` is CLOCK_MONOTONIC [ns]; what has to be chosen
+  before opening (sizes, rates, mode) stands in the query of the address. `scheme://` alone is the only device attached.
+- `discover(timeout_s: float) -> list[Found]`, see `drivers.discovery`.
+
+A driver opens, delivers, and says when it cannot go on; whoever keeps it (`abs_service.capture`) notices silence and
+opens it again. No driver reconnects by itself. docs/devices.md says the same at more length.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,19 +19,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from drivers.frame import Frame, Kind
+from drivers.capabilities import Capabilities
+from drivers.controls import Controls
+from drivers.errors import AddressError, ControlError, DeviceError, FinalError, SdkMissingError
+from drivers.frame import Frame
 
-
-class DeviceError(Exception):
-    """A device cannot be opened or stopped working; the message says what to do about it."""
-
-
-class AddressError(DeviceError):
-    """An address that no device can have, now or later; opening it again is of no use."""
+__all__ = [
+    "AddressError",
+    "ControlError",
+    "Device",
+    "DeviceError",
+    "DeviceInfo",
+    "DeviceState",
+    "FinalError",
+    "SdkMissingError",
+    "Sink",
+    "Truth",
+]
 
 
 class DeviceState(StrEnum):
-    """Where a device is in its life."""
+    """Where a device is in its life. Drivers report CLOSED, OPENING, STREAMING and FAILED; their keeper the others."""
 
     CLOSED = "closed"
     OPENING = "opening"
@@ -32,26 +50,22 @@ class DeviceState(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class StreamInfo:
-    """One stream a device offers: its sensor (optical head), name, kind, encoding, size [px] and rate [Hz]."""
-
-    sensor: str
-    stream: str
-    kind: Kind
-    encoding: str
-    width: int
-    height: int
-    rate_hz: float
-
-
-@dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """Who a device is: URI that opens it, model, serial number and firmware."""
+    """Who a device is.
+
+    Attributes:
+        uri: address that opens this very device again, by its serial number, on whatever port it is then.
+        model: what it is called.
+        serial: its serial number, "" if it cannot be read.
+        firmware: its version, "" if unknown.
+        link: how it is attached and how fast, "USB 3, 5 Gbit/s", say; "" if unknown.
+    """
 
     uri: str
     model: str
     serial: str
     firmware: str = ""
+    link: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +100,22 @@ class Sink(Protocol):
         """Learns that the device changed its state, and why in plain words."""
         ...
 
+    def on_warning(self, condition: str, message: str) -> None:
+        """Learns that something needs attention though the device streams; `message` "" says that it is over.
+
+        Args:
+            condition: name of what is watched: "usb speed", "temperature".
+            message: what is wrong and what to do about it, in plain words.
+        """
+        ...
+
 
 class Device(Protocol):
-    """A source of frames. `close` may be called at any time and any number of times."""
+    """A source of frames, opened. All methods may be called from any thread.
+
+    Driver threads never wait for anyone: a frame that cannot be delivered is dropped and counted by its cause. What is
+    incomplete or of the wrong size is never delivered.
+    """
 
     @property
     def info(self) -> DeviceInfo:
@@ -96,8 +123,8 @@ class Device(Protocol):
         ...
 
     @property
-    def streams(self) -> tuple[StreamInfo, ...]:
-        """What it delivers."""
+    def capabilities(self) -> Capabilities:
+        """What it delivers and what can be set."""
         ...
 
     @property
@@ -106,22 +133,37 @@ class Device(Protocol):
         ...
 
     @property
+    def controls(self) -> Controls:
+        """What can be set, from opening to closing."""
+        ...
+
+    @property
+    def state(self) -> DeviceState:
+        """Where the device is in its life: CLOSED before `start` and after `stop`."""
+        ...
+
+    @property
     def counters(self) -> Mapping[str, int]:
-        """Frames delivered and dropped, by cause."""
+        """`frames` delivered, and frames dropped by cause; they only grow while the device is open."""
+        ...
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """What it measures of itself; names end in their unit: `temperature_c`, `clock.tof/depth.drift_ppm`."""
         ...
 
     def start(self, sink: Sink) -> None:
-        """Begins to deliver to `sink` from a thread of the device's own.
+        """Begins to deliver to `sink` from a thread of the device's own, in a new epoch. Nothing if it is running.
 
         Raises:
-            DeviceError: the device cannot stream.
+            DeviceError: the device cannot stream, or was closed.
         """
         ...
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again."""
+        """Ends delivery; after it returns the sink is not called again. May be called at any time, and by the sink."""
         ...
 
     def close(self) -> None:
-        """Releases the device."""
+        """Stops and releases the device, also while another thread reads or starts it; any number of times."""
         ...

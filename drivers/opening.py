@@ -1,15 +1,21 @@
-"""Opens a device by its address, or another program's recording: the scheme is the name of a module of this package."""
+"""Opens devices, and other programs' recordings, by name, and finds what is attached; a scheme names a module."""
 
 import importlib
 import pkgutil
 from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
+from threading import Thread
 from types import ModuleType
 from urllib.parse import urlsplit
 
 import drivers
-from drivers.device import AddressError, Device
+from drivers.device import AddressError, Device, DeviceInfo
+from drivers.discovery import Availability, Found
 from drivers.footage import Footage
+
+#: What a driver may take longer than it was given before it is left behind [s].
+_GRACE_S = 1.0
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -43,6 +49,40 @@ def open_recording(program: str, path: Path) -> Footage:
 def available() -> list[str]:
     """Schemes of all drivers; imports every module of this package, which by contract imports no device SDK."""
     return [module.name for module in pkgutil.iter_modules(drivers.__path__) if _driver(module.name)]
+
+
+def discover(timeout_s: float) -> list[Found]:
+    """What is attached, of all drivers, which look at the same time; never raises.
+
+    Args:
+        timeout_s: time that each driver has. One that takes longer, or breaks, is reported as faulty.
+    """
+    searches = {scheme: _search(scheme, timeout_s) for scheme in available()}
+    return [one for scheme, search in searches.items() for one in _result(scheme, search, timeout_s + _GRACE_S)]
+
+
+def _search(scheme: str, timeout_s: float) -> Future[list[Found]]:
+    """Looks from a daemon thread: a driver that hangs must not keep the process from ending."""
+    result: Future[list[Found]] = Future()
+
+    def run() -> None:
+        try:
+            result.set_result(importlib.import_module(f"drivers.{scheme}").discover(timeout_s))
+        except Exception as error:
+            result.set_exception(error)
+
+    Thread(target=run, name=f"discover {scheme}", daemon=True).start()
+    return result
+
+
+def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[Found]:
+    try:
+        return search.result(timeout_s)
+    except TimeoutError:
+        reason = f"the driver has not answered for {timeout_s:g} s"
+    except Exception as error:
+        reason = f"the driver broke while looking: {error!r}"
+    return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, "please report this")]
 
 
 def _driver(scheme: str) -> ModuleType | None:

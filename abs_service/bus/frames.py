@@ -59,6 +59,9 @@ class FramePublisher:
     def on_state(self, state: DeviceState, reason: str) -> None:
         """See `drivers.device.Sink.on_state`; the state travels in the health of whoever looks after the device."""
 
+    def on_warning(self, condition: str, message: str) -> None:
+        """See `drivers.device.Sink.on_warning`; warnings travel in the health, too."""
+
     def close(self) -> None:
         """Publishes what waits and ends the thread; may be called again."""
         self._queue.close()

@@ -5,11 +5,12 @@ from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit
 
 from drivers.device import AddressError, Device
+from drivers.discovery import Found
 from drivers.replay.contents import RecordingError
 from drivers.replay.device import ReplayDevice
 from drivers.replay.recording import Recording
 
-__all__ = ["Recording", "RecordingError", "ReplayDevice", "open_device"]
+__all__ = ["Recording", "RecordingError", "ReplayDevice", "discover", "open_device"]
 
 _SPEEDS = (0.01, 100.0)
 _DELAYS_S = (0.0, 3600.0)
@@ -39,6 +40,11 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         return ReplayDevice(uri, Recording(path), speed, values["loop"] == "1", clock, delay_s=delay_s)
     except RecordingError as error:
         raise AddressError(str(error)) from error
+
+
+def discover(timeout_s: float) -> list[Found]:
+    """Nothing: recordings are found in folders."""
+    return []
 
 
 def _number(uri: str, key: str, value: str, limits: tuple[float, float]) -> float:

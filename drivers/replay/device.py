@@ -5,7 +5,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from calib.camera import Camera
-from drivers.device import DeviceInfo, DeviceState, Sink, StreamInfo, Truth
+from drivers.capabilities import Capabilities, ClockInfo, StreamInfo
+from drivers.controls import Controls
+from drivers.delivery import Delivery
+from drivers.device import DeviceInfo, DeviceState, Sink, Truth
 from drivers.frame import Frame
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
@@ -44,55 +47,68 @@ class ReplayDevice:
         delay_s: float = 0.0,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="replay", serial=recording.path.name)
-        self.streams: tuple[StreamInfo, ...] = _streams(recording, speed)
+        self.capabilities = Capabilities(_streams(recording, speed))
         self.cameras: Mapping[str, Camera] = recording.cameras
+        self.controls = Controls()
         self._recording = recording
         self._speed = speed
         self._loop = loop
         self._clock = clock
         self._wait = wait
         self._delay_s = delay_s
-        self._counters = {"frames": 0, "unpaired": 0}
+        self._delivery = Delivery(self.capabilities.streams, causes=["unpaired"])
         self._next_epoch = 0
-        self._stop = threading.Event()
         self._thread = threading.Thread()
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, and images or descriptions in the file that were `unpaired`."""
-        return dict(self._counters)
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """Nothing: the clocks of the recording are no more."""
+        return {}
 
     def start(self, sink: Sink) -> None:
-        """Begins at the beginning; a device that is running goes on as it is."""
-        if self._thread.is_alive():
-            return
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(sink, self._stop), name="replay", daemon=True)
-        self._thread.start()
+        """Begins at the beginning; a device that is running goes on as it is.
+
+        Raises:
+            DeviceError: the device was closed.
+        """
+        if stop := self._delivery.begin(sink, f"begins {self._delay_s:g} s after it was started"):
+            self._thread = threading.Thread(target=self._run, args=(stop,), name="replay", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again, unless the sink itself called it."""
-        self._stop.set()
+        """Ends delivery; after it returns the sink is not called again."""
+        self._delivery.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
         """Stops; the file is not kept open."""
+        self._delivery.release()
         self.stop()
 
-    def _run(self, sink: Sink, stop: threading.Event) -> None:
-        sink.on_state(DeviceState.OPENING, f"begins {self._delay_s:g} s after it was started")
+    def _run(self, stop: threading.Event) -> None:
         self._wait(stop, self._delay_s)
-        sink.on_state(DeviceState.STREAMING, f"replaying {self._recording.path}")
+        self._delivery.report(DeviceState.STREAMING, f"replaying {self._recording.path}")
         try:
-            while self._play(sink, stop) and self._loop:
+            while self._play(stop) and self._loop:
                 pass
         except (RecordingError, OSError) as error:
-            sink.on_state(DeviceState.FAILED, str(error))
+            self._delivery.report(DeviceState.FAILED, str(error))
             return
-        sink.on_state(DeviceState.CLOSED, "stopped" if stop.is_set() else "the recording ended")
+        if not stop.is_set():
+            self._delivery.end("the recording ended")
 
-    def _play(self, sink: Sink, stop: threading.Event) -> bool:
+    def _play(self, stop: threading.Event) -> bool:
         """Plays the file once; tells whether to go on. Each epoch of the file becomes one of the device."""
         start_ns = self._clock()
         epochs: dict[int, int] = {}
@@ -103,13 +119,12 @@ class ReplayDevice:
             if self._wait(stop, max(t_host_ns - self._clock(), 0) * 1e-9):
                 break
             if isinstance(item, Truth):
-                sink.on_truth(replace(item, t_host_ns=t_host_ns))
+                self._delivery.truth(replace(item, t_host_ns=t_host_ns))
                 continue
             epoch = epochs.setdefault(item.epoch, self._next_epoch + len(epochs))
-            sink.on_frame(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
-            self._counters["frames"] += 1
+            self._delivery.frame(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
         else:
-            self._counters["unpaired"] += self._recording.unpaired
+            self._delivery.drop("unpaired", self._recording.unpaired)
         self._next_epoch += len(epochs)
         return not stop.is_set()
 
@@ -133,6 +148,7 @@ def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
             frame.data.shape[1],
             frame.data.shape[0],
             speed * max(recording.counts[frame.key] - 1, 1) / max(recording.duration_s, 1e-3),
+            ClockInfo(frame.clock_domain, frame.tick_hz),
         )
         for frame in (first[key] for key in recording.counts)
     )

@@ -6,6 +6,7 @@ Nothing here knows the tracker's models: what makes the images shares no code wi
 from collections.abc import Callable
 
 from drivers.device import Device
+from drivers.discovery import Found
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 
@@ -17,3 +18,8 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         AddressError: the address is not understood; names key, value and what is allowed.
     """
     return SimulatedDevice(uri, parse(uri).build(), clock)
+
+
+def discover(timeout_s: float) -> list[Found]:
+    """Nothing: a simulated device is never attached, and always there."""
+    return []

@@ -5,7 +5,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from calib.camera import Camera
-from drivers.device import DeviceInfo, DeviceState, Sink, StreamInfo
+from drivers.capabilities import Capabilities
+from drivers.controls import Controls
+from drivers.delivery import Delivery
+from drivers.device import DeviceInfo, DeviceState, Sink
 from drivers.simulated.simulation import Simulation
 
 #: Waits until the event is set or so many seconds have passed; tells whether it is set.
@@ -29,67 +32,75 @@ class SimulatedDevice:
         self, uri: str, simulation: Simulation, clock: Callable[[], int], wait: Wait = threading.Event.wait
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="simulated", serial=f"seed {simulation.seed}")
-        self.streams: tuple[StreamInfo, ...] = tuple(s for head in simulation.heads.values() for s in head.streams)
+        self.capabilities = Capabilities(tuple(s for head in simulation.heads.values() for s in head.streams))
         self.cameras: Mapping[str, Camera] = {name: head.camera for name, head in simulation.heads.items()}
+        self.controls = Controls()
         self._simulation = simulation
         self._clock = clock
         self._wait = wait
-        self._counters = {"frames": 0, "late": 0}
-        self._epoch = -1
-        self._stop = threading.Event()
+        self._delivery = Delivery(self.capabilities.streams, causes=["late"])
         self._thread = threading.Thread()
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, and exposures skipped because it was too `late` for them."""
-        return dict(self._counters)
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """Nothing: its clock is the host's."""
+        return {}
 
     def start(self, sink: Sink) -> None:
-        """Begins anew at exposure 0, in a new epoch; a device that is running goes on as it is."""
-        if self._thread.is_alive():
-            return
-        self._epoch += 1
-        self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._run, args=(sink, self._stop), name="simulated", daemon=True)
-        self._thread.start()
+        """Begins anew at exposure 0, in a new epoch; a device that is running goes on as it is.
+
+        Raises:
+            DeviceError: the device was closed.
+        """
+        if stop := self._delivery.begin(sink, "preparing the simulation"):
+            self._thread = threading.Thread(target=self._run, args=(stop,), name="simulated", daemon=True)
+            self._thread.start()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again, unless the sink itself called it."""
-        self._stop.set()
+        """Ends delivery; after it returns the sink is not called again."""
+        self._delivery.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
         """Stops; there is nothing else to release."""
+        self._delivery.release()
         self.stop()
 
-    def _run(self, sink: Sink, stop: threading.Event) -> None:
+    def _run(self, stop: threading.Event) -> None:
         try:
-            sink.on_state(DeviceState.OPENING, "preparing the simulation")
             self._simulation.frames(0)  # compiles the kernels, which must not make the first exposures late
-            sink.on_state(DeviceState.STREAMING, "simulated exposures follow")
-            self._stream(sink, stop)
+            self._delivery.report(DeviceState.STREAMING, "simulated exposures follow")
+            self._stream(stop, self._delivery.epoch)
         except Exception as error:
-            sink.on_state(DeviceState.FAILED, f"the simulation failed: {error!r}")
+            self._delivery.report(DeviceState.FAILED, f"the simulation failed: {error!r}")
             raise
-        sink.on_state(DeviceState.CLOSED, "stopped")
 
-    def _stream(self, sink: Sink, stop: threading.Event) -> None:
+    def _stream(self, stop: threading.Event, epoch: int) -> None:
         first_ns = self._clock()
         period_ns = self._simulation.time_ns(1)
         k = 0
         while True:
             behind = (self._clock() - first_ns - self._simulation.time_ns(k)) // period_ns
             if behind > 0:
-                self._counters["late"] += behind
+                self._delivery.drop("late", behind)
                 k += behind
             frames, truths = self._simulation.frames(k), self._simulation.truths(k)
             if self._wait(stop, max(first_ns + self._simulation.time_ns(k) - self._clock(), 0) * 1e-9):
                 return
             for truth in truths:
-                sink.on_truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
-            for frame in frames:
+                self._delivery.truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
+            for frame in () if stop.is_set() else frames:
                 t_host_ns, t_arrival_ns = first_ns + frame.t_host_ns, self._clock()
-                sink.on_frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=self._epoch))
-                self._counters["frames"] += 1
+                self._delivery.frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=epoch))
             k += 1

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from drivers.device import StreamInfo
+from drivers.capabilities import ClockInfo, StreamInfo
 from drivers.frame import Frame, Geometry, Kind
 from drivers.simulated.scene import Moment
 
-#: Rate of the simulated device's own clock [1/s].
-TICK_HZ = 1e9
+#: The simulated device's own clock; it counts from the first exposure.
+CLOCK = ClockInfo("simulated", 1e9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class Exposure:
             geometry=geometry,
             invalid=invalid,
             t_device_ticks=self.t_ns,
-            tick_hz=TICK_HZ,
-            clock_domain="simulated",
+            tick_hz=CLOCK.tick_hz,
+            clock_domain=CLOCK.domain,
             t_sigma_ns=self.t_sigma_ns,
             calib_id=camera.calib_id,
         )
@@ -85,4 +85,4 @@ class Head(Protocol):
 
 def stream_of(sensor: str, stream: str, kind: Kind, encoding: str, camera: Camera, rate_hz: float) -> StreamInfo:
     """The stream of a head whose images have the camera's size."""
-    return StreamInfo(sensor, stream, kind, encoding, camera.width, camera.height, rate_hz)
+    return StreamInfo(sensor, stream, kind, encoding, camera.width, camera.height, rate_hz, CLOCK)

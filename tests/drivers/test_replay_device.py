@@ -41,6 +41,8 @@ class Sink:
         if state in {DeviceState.CLOSED, DeviceState.FAILED}:
             self.done.set()
 
+    def on_warning(self, condition: str, message: str) -> None: ...
+
 
 class Time:
     """A clock that moves only when someone waits."""
@@ -72,12 +74,12 @@ def test_a_replay_keeps_its_pace_and_looks_like_now(tmp_path: Path, speed: float
             assert item.epoch == 0
     assert device.counters == {"frames": 18, "unpaired": 0}
     assert sink.states[-1] == (DeviceState.CLOSED, "the recording ended")
-    assert [(s.sensor, s.stream) for s in device.streams] == [
+    assert [(s.sensor, s.stream) for s in device.capabilities.streams] == [
         ("tof", "depth"),
         ("tof", "amplitude"),
         ("color", "color"),
     ]
-    assert {(s.width, s.height) for s in device.streams} == {(32, 24)}
+    assert {(s.width, s.height) for s in device.capabilities.streams} == {(32, 24)}
 
 
 def test_a_replay_can_give_those_who_watch_time_to_get_ready(tmp_path: Path) -> None:

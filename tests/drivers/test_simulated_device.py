@@ -35,6 +35,8 @@ class Recorder:
         assert reason
         self.states.append(state)
 
+    def on_warning(self, condition: str, message: str) -> None: ...
+
 
 @dataclass
 class Time:
@@ -122,7 +124,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
     uri = f"simulated://board?seed=2&sensors={heads}&rate=15&color=64x48&tof=32x24"
     device = open_device(uri, Time().clock)
     assert device.info.uri == uri
-    assert [f"{s.sensor}/{s.stream}" for s in device.streams] == [
+    assert [f"{s.sensor}/{s.stream}" for s in device.capabilities.streams] == [
         "tof/depth",
         "tof/amplitude",
         "structured_light/depth",
@@ -133,7 +135,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
     ]
     assert isinstance(device, SimulatedDevice)
     frames, _ = device._simulation.expose(0)
-    for stream, frame in zip(device.streams, frames, strict=True):
+    for stream, frame in zip(device.capabilities.streams, frames, strict=True):
         camera = device.cameras[stream.sensor]
         assert (frame.kind, frame.encoding, frame.calib_id) == (stream.kind, stream.encoding, camera.calib_id)
         assert frame.data.shape[:2] == (stream.height, stream.width) == (camera.height, camera.width)

@@ -68,6 +68,8 @@ class Log:
 
     def on_state(self, state: DeviceState, reason: str) -> None: ...
 
+    def on_warning(self, condition: str, message: str) -> None: ...
+
 
 def test_the_device_tells_the_truth_about_both() -> None:
     log = Log()

@@ -21,6 +21,8 @@ from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib import pose
 from calib.camera import Camera
+from drivers.capabilities import Capabilities
+from drivers.controls import Controls
 from drivers.device import AddressError, DeviceError, DeviceInfo, DeviceState
 from drivers.frame import Frame, Kind
 from tests.service.loopback import LoopbackBus
@@ -32,7 +34,10 @@ class FakeDevice:
     """Does what it is told."""
 
     info = DeviceInfo("fake://", "fake", "1")
-    streams = ()
+    capabilities = Capabilities(())
+    controls = Controls()
+    gauges: dict[str, float] = {}  # noqa: RUF012
+    state = DeviceState.CLOSED
 
     def __init__(self, heads=("head", "other"), start=lambda sink: None):
         self.cameras = dict.fromkeys(heads, CAMERA)
@@ -60,6 +65,9 @@ class Collector:
         pass
 
     def on_state(self, state, reason):
+        pass
+
+    def on_warning(self, condition, message):
         pass
 
 

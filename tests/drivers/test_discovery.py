@@ -1,0 +1,65 @@
+"""What is attached is found whatever the drivers do, and an address means one device or says which there are."""
+
+import sys
+import threading
+from types import ModuleType
+
+import pytest
+
+import drivers
+from drivers import opening
+from drivers.device import DeviceError, DeviceInfo
+from drivers.discovery import Availability, Found, choose
+
+ONE, OTHER = (Found(DeviceInfo(f"oak://{serial}", "OAK-D", serial)) for serial in ("111", "222"))
+BUSY = Found(DeviceInfo("oak://333", "OAK-D", "333"), Availability.BUSY, "another program has it", "close that program")
+
+
+def test_an_address_without_a_serial_number_is_the_only_device() -> None:
+    assert choose([ONE], "oak", "") is ONE
+    assert choose([ONE, OTHER], "oak", "222") is OTHER
+
+
+@pytest.mark.parametrize(
+    ("found", "serial", "complaint"),
+    [
+        ([], "", "^no oak device is attached$"),
+        ([ONE], "9", "^oak://9 is not attached; attached: oak://111$"),
+        ([], "9", "^oak://9 is not attached; attached: none$"),
+        ([ONE, OTHER], "", "^2 oak devices are attached; say which one: oak://111, oak://222$"),
+        ([BUSY], "", "^oak://333: another program has it; close that program$"),
+    ],
+)
+def test_an_address_that_means_no_device_is_explained(found: list[Found], serial: str, complaint: str) -> None:
+    with pytest.raises(DeviceError, match=complaint):
+        choose(found, "oak", serial)
+
+
+def test_a_driver_that_breaks_or_hangs_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    ending = threading.Event()
+
+    def breaks(timeout_s: float) -> list[Found]:
+        raise OSError("no bus")
+
+    def hangs(timeout_s: float) -> list[Found]:
+        ending.wait(30)
+        return []
+
+    searches = {"breaks": breaks, "hangs": hangs, "works": lambda timeout_s: [ONE]}
+    for name, discover in searches.items():
+        module = ModuleType(f"drivers.{name}")
+        module.discover = discover  # pyright: ignore[reportAttributeAccessIssue]
+        monkeypatch.setitem(sys.modules, f"drivers.{name}", module)
+        monkeypatch.setattr(drivers, name, module, raising=False)
+    monkeypatch.setattr(opening, "available", lambda: list(searches))
+    monkeypatch.setattr(opening, "_GRACE_S", 0.0)
+    broken, hanging, working = opening.discover(0.2)
+    ending.set()
+    assert (broken.availability, hanging.availability) == (Availability.FAULTY, Availability.FAULTY)
+    assert "OSError('no bus')" in broken.reason
+    assert hanging.reason == "the driver has not answered for 0.2 s"
+    assert working is ONE
+
+
+def test_every_driver_can_be_asked_what_is_attached() -> None:
+    assert all(callable(sys.modules[f"drivers.{scheme}"].discover) for scheme in opening.available())
