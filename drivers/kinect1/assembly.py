@@ -1,0 +1,159 @@
+"""Packets become images, or are dropped and counted: an image of which anything is missing is never delivered."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+from drivers.kinect1.packets import HEADER_BYTES, PacketFormat
+
+#: Why an image was dropped: packets that never came; a packet that is none of this stream; one that is too short, or
+#: too many or too few of them; an image that began before the one before it had ended.
+CAUSES = ("lost_packets", "bad_header", "wrong_size", "resynchronised")
+LOST, HEADER, SIZE, RESYNC = range(4)
+
+# The assembler's state, an array that the kernel changes. PLACE is the number of the packet within the image that is
+# expected next, -1 while the beginning of an image is awaited; the causes count images, MISSING counts packets.
+PLACE, SEQ, TICKS, BEGAN, COMPLETE, MISSING, FIRST_CAUSE = range(7)
+STATE_SIZE = FIRST_CAUSE + len(CAUSES)
+
+
+@kernel
+def assemble(packets, lengths, begin, state, image, base, payload):
+    """Copies payload into `image` until it is complete or the packets are at an end.
+
+    Args:
+        packets: (n, at least 12 + payload) uint8, one packet a row.
+        lengths: (n,) how many bytes of each row came; 0 in a microframe without a packet.
+        begin: the first row to read.
+        state: (STATE_SIZE,) int64, see above; BEGAN is the row of the image's first packet, negative if that was in an
+            earlier call.
+        image: (bytes of an image,) uint8.
+        base, payload: see `PacketFormat`.
+
+    Returns:
+        The row to go on with; COMPLETE of the state is 1 if an image is complete.
+    """
+    count = (image.size + payload - 1) // payload
+    state[COMPLETE] = 0
+    for row in range(begin, min(packets.shape[0], lengths.size)):
+        length = min(lengths[row], packets.shape[1])
+        if length == 0:
+            continue
+        place = state[PLACE]
+        flag = packets[row, 3] - base if length >= HEADER_BYTES else 0
+        if flag not in (1, 2, 5) or packets[row, 0] != 0x52 or packets[row, 1] != 0x42:
+            if place >= 0:
+                state[FIRST_CAUSE + HEADER] += 1
+            state[PLACE] = -1
+            state[SEQ] = -1  # what follows this one is not known
+            continue
+        seq = np.int64(packets[row, 5])
+        if state[SEQ] >= 0 and seq != state[SEQ]:
+            state[MISSING] += (seq - state[SEQ]) & 255
+            if place > 0 or (place == 0 and flag != 1):
+                state[FIRST_CAUSE + LOST] += 1
+            place = -1
+        state[SEQ] = (seq + 1) & 255
+        if flag == 1:
+            if place > 0:
+                state[FIRST_CAUSE + RESYNC] += 1
+            place = 0
+            ticks = np.int64(0)
+            for i in range(4):
+                ticks |= np.int64(packets[row, 8 + i]) << (8 * i)
+            state[TICKS] = ticks
+            state[BEGAN] = row
+        state[PLACE] = place
+        if place < 0:
+            continue
+        offset = place * payload
+        size = min(payload, image.size - offset)
+        if length < HEADER_BYTES + size or (flag == 1) != (place == 0) or (flag == 5) != (place == count - 1):
+            state[FIRST_CAUSE + SIZE] += 1
+            state[PLACE] = -1
+            continue
+        image[offset : offset + size] = packets[row, HEADER_BYTES : HEADER_BYTES + size]
+        state[PLACE] = place + 1
+        if place + 1 == count:
+            state[PLACE] = 0
+            state[COMPLETE] = 1
+            return row + 1
+    state[BEGAN] -= packets.shape[0]
+    return packets.shape[0]
+
+
+@dataclass(frozen=True, eq=False)
+class RawImage:
+    """One complete image as it came.
+
+    Attributes:
+        data: (bytes of an image,) uint8, packed; valid until the assembler is fed again.
+        ticks: the device's counter in the first packet.
+        row: where its first packet was in the packets last fed; negative if that many packets before them.
+        seq: number of the image; what is missing before it was dropped.
+    """
+
+    data: NDArray[np.uint8]
+    ticks: int
+    row: int
+    seq: int
+
+
+class Assembler:
+    """Makes images of the packets of one stream.
+
+    A packet may be longer than needed (what is beyond is ignored), but not shorter.
+
+    Args:
+        form: what the packets are like.
+    """
+
+    def __init__(self, form: PacketFormat) -> None:
+        self._form = form
+        self._image = np.zeros(form.image_bytes, np.uint8)
+        self._state = np.zeros(STATE_SIZE, np.int64)
+        self._state[[PLACE, SEQ]] = -1
+        self._dropped = dict.fromkeys(CAUSES, 0)
+        self._seq = -1
+        self._last_ticks = 0
+        self._known = 0  # dropped images that were counted before the last complete one
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Images that were dropped, by `CAUSES`."""
+        counted = self._state[FIRST_CAUSE:]
+        return {cause: extra + int(counted[i]) for i, (cause, extra) in enumerate(self._dropped.items())}
+
+    @property
+    def missing(self) -> int:
+        """Packets that never came; of 256 lost in a row nothing is noticed here, but the image is."""
+        return int(self._state[MISSING])
+
+    def feed(self, packets: NDArray[np.uint8], lengths: NDArray[np.integer]) -> Iterator[RawImage]:
+        """The images that the packets complete, one after the other.
+
+        Args:
+            packets: (n, drivers.kinect1.packets.PACKET_BYTES), one packet a row.
+            lengths: (n,) how many bytes of each row came.
+        """
+        row = 0
+        while row < len(packets):
+            row = assemble(packets, lengths, row, self._state, self._image, self._form.base, self._form.payload)
+            if self._state[COMPLETE]:
+                yield self._complete()
+
+    def _complete(self) -> RawImage:
+        ticks = int(self._state[TICKS])
+        known = int(self._state[FIRST_CAUSE:].sum())
+        if self._seq < 0:
+            self._seq = 0
+        else:
+            # The counter tells of images of which not a single packet came, too.
+            passed = max(1, round(((ticks - self._last_ticks) & 0xFFFFFFFF) / self._form.period_ticks))
+            self._dropped["lost_packets"] += max(0, passed - 1 - (known - self._known))
+            self._seq += max(passed, 1 + known - self._known)
+        self._last_ticks, self._known = ticks, known
+        return RawImage(self._image, ticks, int(self._state[BEGAN]), self._seq)

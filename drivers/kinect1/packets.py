@@ -1,0 +1,57 @@
+"""What the camera sends over USB: packets with a header, of which a fixed number is one image.
+
+A packet is `R B 0 flag ? seq ? ? ticks`, the last being 32 bits, and then payload. `flag` is the stream's base with 1
+in an image's first packet, 5 in its last and 2 between; `seq` counts the packets of the stream. All numbers are
+little-endian.
+"""
+
+from dataclasses import dataclass
+
+#: Bytes of a packet's header, and the most that a packet has with it: two transactions of a microframe.
+HEADER_BYTES, PACKET_BYTES = 12, 1920
+
+#: Rate of the counter in the headers [1/s]. Its 32 bits wrap every 71.58 s.
+TICK_HZ = 60e6
+
+
+@dataclass(frozen=True)
+class PacketFormat:
+    """How the images of one kind are cut into packets.
+
+    Attributes:
+        endpoint: address of the isochronous pipe.
+        base: what all its flags have in common.
+        payload: bytes of an image in each packet but the last.
+        width, height: of an image [px].
+        bits: of a pixel; packed, most significant first.
+        rate_hz: images per second.
+    """
+
+    endpoint: int
+    base: int
+    payload: int
+    width: int
+    height: int
+    bits: int
+    rate_hz: float = 30.0
+
+    @property
+    def image_bytes(self) -> int:
+        """Bytes of an image."""
+        return self.width * self.height * self.bits // 8
+
+    @property
+    def packets(self) -> int:
+        """Packets of an image."""
+        return -(-self.image_bytes // self.payload)
+
+    @property
+    def period_ticks(self) -> int:
+        """Ticks from one image to the next."""
+        return round(TICK_HZ / self.rate_hz)
+
+
+#: Depth takes 7260 of the 8000 microframes in a second. Colour and infra-red images share a pipe.
+DEPTH = PacketFormat(0x82, 0x70, 1748, 640, 480, 11)
+COLOR = PacketFormat(0x81, 0x80, 1908, 640, 480, 8)
+INFRARED = PacketFormat(0x81, 0x80, 1908, 640, 488, 10)

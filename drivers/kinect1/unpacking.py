@@ -1,0 +1,59 @@
+"""Packed pixels become numbers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+
+
+@kernel
+def look_up_11(packed, table, result):
+    """Writes `table[v]` for each 11-bit number v; eight of them are in eleven bytes, most significant bit first.
+
+    Args:
+        packed: (11 n,) uint8.
+        table: (2048,) uint16.
+        result: (8 n,) uint16.
+    """
+    for i in range(min(packed.size // 11, result.size // 8)):
+        # Eleven bytes as two words that overlap: 88 bits do not fit into one.
+        high = np.uint64(0)
+        for k in range(8):
+            high = (high << np.uint64(8)) | np.uint64(packed[11 * i + k])
+        low = np.uint64(0)
+        for k in range(3, 11):
+            low = (low << np.uint64(8)) | np.uint64(packed[11 * i + k])
+        for k in range(5):
+            result[8 * i + k] = table[(high >> np.uint64(53 - 11 * k)) & np.uint64(2047)]
+        for k in range(5, 8):
+            result[8 * i + k] = table[(low >> np.uint64(77 - 11 * k)) & np.uint64(2047)]
+
+
+@kernel
+def unpack_10(packed, result):
+    """Writes the 10-bit numbers; four of them are in five bytes, most significant bit first.
+
+    Args:
+        packed: (5 n,) uint8.
+        result: (4 n,) uint16.
+    """
+    for i in range(min(packed.size // 5, result.size // 4)):
+        word = np.uint64(0)
+        for k in range(5):
+            word = (word << np.uint64(8)) | np.uint64(packed[5 * i + k])
+        for k in range(4):
+            result[4 * i + k] = (word >> np.uint64(30 - 10 * k)) & np.uint64(1023)
+
+
+def depth(packed: NDArray[np.uint8], table: NDArray[np.uint16], height: int, width: int) -> NDArray[np.uint16]:
+    """Looked-up 11-bit pixels, (height, width)."""
+    result = np.zeros(height * width, np.uint16)
+    look_up_11(packed, table, result)
+    return result.reshape(height, width)
+
+
+def infrared(packed: NDArray[np.uint8], height: int, width: int) -> NDArray[np.uint16]:
+    """10-bit pixels, (height, width)."""
+    result = np.zeros(height * width, np.uint16)
+    unpack_10(packed, result)
+    return result.reshape(height, width)

@@ -1,0 +1,75 @@
+"""What an emulated camera shows, cut into packets beforehand, so that serving it costs next to nothing."""
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from drivers.kinect1.packets import HEADER_BYTES, PACKET_BYTES, PacketFormat
+
+#: Microframes per second, and images per second of all formats that are emulated.
+MICROFRAMES_HZ, RATE_HZ = 8000, 30
+
+
+class Film:
+    """Images shown one after the other, over and over, at the pace of the USB's microframes.
+
+    Image i begins in microframe ⌈i · 8000 / 30⌉; one packet of it goes out in every microframe until it is complete.
+
+    Args:
+        form: how images are cut.
+        images: packed images.
+        lost: share of the packets that never arrive; which ones depends on the microframe only.
+        seed: chooses them.
+    """
+
+    def __init__(self, form: PacketFormat, images: Sequence[bytes], lost: float = 0.0, seed: int = 1) -> None:
+        self.form = form
+        self.images = images
+        self._packets = np.stack([_cut(form, image) for image in images])
+        self._lengths = np.full(form.packets, HEADER_BYTES + form.payload, np.uint32)
+        self._lengths[-1] = HEADER_BYTES + form.image_bytes - (form.packets - 1) * form.payload
+        self._lost = np.random.default_rng(seed).random(80021) < lost
+
+    def microframes(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """What `count` microframes from the first on carry: packets (count, PACKET_BYTES), and how long each is."""
+        u = np.arange(first, first + count)
+        number = u * RATE_HZ // MICROFRAMES_HZ
+        place = u - begin(number)
+        used = (place < self.form.packets) & ~self._lost[u % len(self._lost)]
+        packets = np.zeros((count, PACKET_BYTES), np.uint8)
+        lengths = np.where(used, self._lengths[np.minimum(place, self.form.packets - 1)], 0).astype(np.uint32)
+        number, place = number[used], place[used]
+        packets[used] = self._packets[number % len(self.images), place]
+        packets[used, 5] = number * self.form.packets + place
+        packets[used, 8:12] = (number * self.form.period_ticks).astype("<u4")[:, None].view(np.uint8)
+        return packets, lengths
+
+    def shown(self, number: int) -> bytes:
+        """The image with a number."""
+        return self.images[number % len(self.images)]
+
+    def is_whole(self, number: int) -> bool:
+        """Whether every packet of the image arrives."""
+        return not self._lost[(begin(number) + np.arange(self.form.packets)) % len(self._lost)].any()
+
+
+Number = TypeVar("Number", int, np.ndarray)
+
+
+def begin(number: Number) -> Number:
+    """The microframe in which an image begins."""
+    return -(-number * MICROFRAMES_HZ // RATE_HZ)
+
+
+def _cut(form: PacketFormat, image: bytes) -> np.ndarray:
+    """Packets (packets, PACKET_BYTES) of one image, without its number and time."""
+    assert len(image) == form.image_bytes
+    padded = np.zeros(form.packets * form.payload, np.uint8)
+    padded[: len(image)] = np.frombuffer(image, np.uint8)
+    packets = np.zeros((form.packets, PACKET_BYTES), np.uint8)
+    packets[:, :2] = np.frombuffer(b"RB", np.uint8)
+    packets[:, 3] = form.base | 2
+    packets[0, 3], packets[-1, 3] = form.base | 1, form.base | 5
+    packets[:, HEADER_BYTES : HEADER_BYTES + form.payload] = padded.reshape(form.packets, form.payload)
+    return packets

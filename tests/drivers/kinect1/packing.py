@@ -1,0 +1,16 @@
+"""The inverse of what the driver does with pixels, bit by bit: the slow and obvious way."""
+
+import numpy as np
+
+
+def pack(values: np.ndarray, bits: int) -> bytes:
+    """Numbers as a stream of `bits` each, most significant first."""
+    places = np.arange(bits - 1, -1, -1)
+    return np.packbits((values.ravel()[:, None].astype(int) >> places) & 1).tobytes()
+
+
+def unpack(packed: bytes, bits: int) -> np.ndarray:
+    """The numbers of such a stream, (n,); the reference of the driver's kernels."""
+    stream = np.unpackbits(np.frombuffer(packed, np.uint8))
+    whole = stream[: len(stream) // bits * bits].reshape(-1, bits).astype(int)
+    return whole @ (1 << np.arange(bits - 1, -1, -1))
