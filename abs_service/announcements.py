@@ -15,7 +15,12 @@ from abs_service import keys
 from abs_service.envelope import MESSAGES
 from calib import pose
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.lens import Lens
 from drivers.mcap_file import file_descriptor_set
+
+#: What `foxglove.CameraCalibration` calls the lens models.
+_DISTORTION_MODELS = {Lens.name: "rational_polynomial", KannalaBrandt.name: "kannala_brandt"}
 
 
 def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:
@@ -25,7 +30,7 @@ def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:
         frame_id=sensor,
         width=camera.width,
         height=camera.height,
-        distortion_model="rational_polynomial",
+        distortion_model=_DISTORTION_MODELS[camera.lens.name],
         D=camera.lens.coefficients.tolist(),
         K=K,
         R=np.eye(3).ravel().tolist(),
@@ -71,6 +76,7 @@ def sensor_model(
         cx=camera.cx,
         cy=camera.cy,
         lens=camera.lens.coefficients.tolist(),
+        lens_model=camera.lens.name,
         T_rs=camera.T_rs.ravel().tolist(),
         calib_id=camera.calib_id,
         noise=noise.get("type", ""),

@@ -8,6 +8,7 @@ import numpy as np
 from abs_service.tracker.regions import nearest
 from abs_service.tracking import Plan, Tracking, streams
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
 from calib.noise.base import DepthNoise
 from calib.noise.gaussian_polynomial import GaussianPolynomial
@@ -17,18 +18,19 @@ from drivers.frame import Frame, FrameSet, Geometry, Kind
 #: Stand for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
 _DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
+_FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
 #: Stands for every noise of depth: kernels see its texture only, and a map of pixels would not fit the camera.
 _NOISE = GaussianPolynomial(((0.01,),))
 
 
 def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
-    """Tracks and loses a flat board that no sensor ever saw, without and with distortion, with the parts of the plan.
+    """Tracks and loses a flat board that no sensor ever saw, with every kind of lens, with the parts of the plan.
 
     Args:
         noises: noise model of every sensor that the tracker uses, by name; tells what kind of image it takes.
         plan: of the tracker.
     """
-    for camera in (_CAMERA, _DISTORTED):
+    for camera in (_CAMERA, _DISTORTED, _FISHEYE):
         rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
         frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
         tracking = Tracking(rig, replace(plan, region=nearest.Settings()))

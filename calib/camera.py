@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
-from calib.lens import Lens
+from calib.lens import Lens, LensModel
 from calib.pose import Pose
 
 
@@ -34,7 +34,7 @@ class Camera:
     fy: float
     cx: float
     cy: float
-    lens: Lens = field(default_factory=Lens)
+    lens: LensModel = field(default_factory=Lens)
     T_rs: Pose = field(default_factory=pose.identity)
 
     def __post_init__(self) -> None:
@@ -60,7 +60,9 @@ class Camera:
         """Short hash of everything that defines the projection; frames and estimates carry it."""
         numbers = [self.width, self.height, self.fx, self.fy, self.cx, self.cy, *self.lens.coefficients]
         payload = np.concatenate([numbers, self.T_rs.ravel()]).astype("<f8").tobytes()
-        return hashlib.sha256(payload).hexdigest()[:16]
+        # Recordings from before there was a second model have ids without a name.
+        kind = b"" if isinstance(self.lens, Lens) else self.lens.name.encode()
+        return hashlib.sha256(payload + kind).hexdigest()[:16]
 
     def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
         """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points at or behind the camera plane."""

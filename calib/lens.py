@@ -1,18 +1,95 @@
 """Lens distortion `D_s` of eq. 10, on normalised image coordinates (x/z, y/z), and its inverse."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 #: Normalised coordinates that no pixel has; an iteration that goes there finds nothing any more.
 FARTHEST = 1e6
 
+#: How well an inverse is the inverse, in normalised coordinates.
+TOLERANCE = 1e-10
+
 
 class LensError(ValueError):
     """Coefficients that are no lens, or a point for which the distortion has no inverse."""
+
+
+class LensModel(Protocol):
+    """What a camera, a calibration and a warping need of a lens.
+
+    Attributes:
+        name: what rig files and recordings call the model.
+        coefficients: as many as the model has, dimensionless; they cannot be written to.
+    """
+
+    name: ClassVar[str]
+
+    @property
+    def coefficients(self) -> NDArray[np.float64]:
+        """The coefficients (n,)."""
+        ...
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens does not distort at all."""
+        ...
+
+    def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Forward distortion of ideal normalised coordinates, shape (…, 2)."""
+        ...
+
+    def jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Derivatives (…, 2, 2) of `distort` by the ideal normalised coordinates (…, 2)."""
+        ...
+
+    def coefficient_jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Derivatives (…, 2, n) of `distort` at ideal normalised coordinates (…, 2) by the n coefficients."""
+        ...
+
+    def inverse(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2); NaN where none are."""
+        ...
+
+    def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """As `inverse`.
+
+        Raises:
+            LensError: at least one point has no inverse; names one.
+        """
+        ...
+
+
+def filled(given: ArrayLike, names: tuple[str, ...]) -> NDArray[np.float64]:
+    """Coefficients with zeros in place of the trailing ones that were not given, which cannot be written to.
+
+    Raises:
+        LensError: too many, or not finite.
+    """
+    numbers = np.atleast_1d(np.asarray(given, np.float64))
+    if numbers.ndim != 1 or numbers.size > len(names) or not np.all(np.isfinite(numbers)):
+        raise LensError(f"a lens has at most {len(names)} finite coefficients {names}, not {numbers.tolist()}")
+    full = np.zeros(len(names))
+    full[: numbers.size] = numbers
+    full.setflags(write=False)
+    return full
+
+
+def proven(lens: LensModel, xy: NDArray[np.floating], ideal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The ideal coordinates that a lens found for distorted ones, both (…, 2).
+
+    Raises:
+        LensError: somewhere it found none; names the first such point.
+    """
+    missing = np.isnan(ideal).any(axis=-1)
+    if missing.any():
+        first = np.asarray(xy, np.float64)[missing][0]
+        raise LensError(f"the distortion {lens.coefficients.tolist()} has no inverse at normalised {first.tolist()}")
+    return ideal
 
 
 @dataclass(frozen=True)
@@ -26,16 +103,11 @@ class Lens:
         coefficients: (k1, k2, p1, p2, k3, k4, k5, k6), dimensionless, shape (8,).
     """
 
+    name: ClassVar[str] = "brown_conrady"
     coefficients: NDArray[np.float64] = field(default_factory=lambda: np.zeros(8))
 
     def __post_init__(self) -> None:
-        given = np.atleast_1d(np.asarray(self.coefficients, np.float64))
-        if given.ndim != 1 or given.size > 8 or not np.all(np.isfinite(given)):
-            raise LensError(f"a lens has at most 8 finite coefficients {COEFFICIENTS}, not {given.tolist()}")
-        full = np.zeros(8)
-        full[: given.size] = given
-        full.setflags(write=False)
-        object.__setattr__(self, "coefficients", full)
+        object.__setattr__(self, "coefficients", filled(self.coefficients, COEFFICIENTS))
 
     @property
     def is_pinhole(self) -> bool:
@@ -71,31 +143,47 @@ class Lens:
         result[..., 1, 1] = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x
         return result
 
-    def undistort(self, xy: NDArray[np.floating], tolerance: float = 1e-10) -> NDArray[np.float64]:
-        """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method.
+    def coefficient_jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Derivatives (…, 2, 8) of `distort` at ideal normalised coordinates (…, 2) by the coefficients."""
+        k1, k2, _, _, k3, k4, k5, k6 = self.coefficients
+        x, y = np.moveaxis(np.asarray(xy, np.float64), -1, 0)
+        r2 = x * x + y * y
+        below = 1 + r2 * (k4 + r2 * (k5 + r2 * k6))
+        radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below
+        above = np.stack([r2, r2**2, r2**3], axis=-1) / below[..., None]
+        by_radial = np.concatenate([above, -radial[..., None] * above], axis=-1)[..., None, :]
+        result = np.empty((*r2.shape, 2, 8))
+        result[..., [0, 1, 4, 5, 6, 7]] = np.asarray(xy, np.float64)[..., None] * by_radial
+        result[..., 0, 2] = result[..., 1, 3] = 2 * x * y
+        result[..., 0, 3] = r2 + 2 * x * x
+        result[..., 1, 2] = r2 + 2 * y * y
+        return result
 
-        Raises:
-            LensError: where the iteration does not reach `tolerance` (normalised units), with the first such point.
-        """
+    def inverse(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method; NaN where it finds none."""
         target = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
         ideal = target.copy()
         if self.is_pinhole:
             return ideal.reshape(np.shape(xy))
-        for _ in range(30):
-            residual = self.distort(ideal) - target
-            if np.all(np.abs(residual) < tolerance) and np.all(self._is_before_fold(ideal)):
-                return ideal.reshape(np.shape(xy))
-            try:
-                inverse = np.linalg.inv(self.jacobian(ideal))
-            except np.linalg.LinAlgError:  # exactly on a fold
-                break
-            step = np.einsum("nij,nj->ni", inverse, residual)
-            if not np.all(np.abs(step) < FARTHEST):
-                break
-            ideal -= step
-        error = np.where(self._is_before_fold(ideal), np.abs(self.distort(ideal) - target).max(axis=1), np.inf)
-        worst = target[error.argmax()]
-        raise LensError(f"the distortion {self.coefficients.tolist()} has no inverse at normalised {worst.tolist()}")
+        found = np.zeros(len(ideal), np.bool_)
+        with np.errstate(all="ignore"):
+            for _ in range(30):
+                residual = self.distort(ideal) - target
+                found = np.all(np.abs(residual) < TOLERANCE, axis=1) & self._is_before_fold(ideal)
+                if found.all():
+                    break
+                ideal -= _solved(self.jacobian(ideal), residual)
+                ideal[~np.all(np.abs(ideal) < FARTHEST, axis=1)] = np.nan
+        ideal[~found] = np.nan
+        return ideal.reshape(np.shape(xy))
+
+    def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The ideal coordinates whose distortion is `xy`, shape (…, 2).
+
+        Raises:
+            LensError: where there are none.
+        """
+        return proven(self, xy, self.inverse(xy))
 
     def _is_before_fold(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether the distortion is one-to-one from the centre to each point (n, 2).
@@ -108,3 +196,10 @@ class Lens:
             jacobian = self.jacobian(part * xy)
             before &= (np.linalg.det(jacobian) > 0) & (np.trace(jacobian, axis1=1, axis2=2) > 0)
         return before
+
+
+def _solved(matrices: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solutions (n, 2) of systems (n, 2, 2) by Cramer's rule; not finite for a singular one, which spoils no other."""
+    a, b, c, d = np.moveaxis(matrices.reshape(-1, 4), -1, 0)
+    x, y = right.T
+    return np.stack([d * x - b * y, a * y - c * x], axis=-1) / (a * d - b * c)[:, None]

@@ -5,6 +5,7 @@ from abs.v1.sensor_model_pb2 import SensorModel
 
 from calib.camera import Camera
 from calib.lens import Lens
+from calib.lenses import lens_of
 from drivers.codec import CodecError
 
 
@@ -17,6 +18,7 @@ def decode_camera(model: SensorModel) -> Camera:
     try:
         matrix = (model.fx, model.fy, model.cx, model.cy)
         T_rs = np.array(model.T_rs, float).reshape(4, 4)
-        return Camera(model.width, model.height, *matrix, Lens(np.array(model.lens)), T_rs)
+        lens = lens_of(model.lens_model or Lens.name, model.lens)  # older recordings do not say
+        return Camera(model.width, model.height, *matrix, lens, T_rs)
     except ValueError as error:
         raise CodecError(f"the model of sensor {model.sensor!r} is no camera: {error}") from error

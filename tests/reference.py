@@ -129,12 +129,26 @@ def distort(x: float, y: float, coefficients: np.ndarray) -> tuple[float, float]
     return x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2), y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y
 
 
+def distort_fisheye(x: float, y: float, coefficients: np.ndarray) -> tuple[float, float]:
+    """Kannala–Brandt: a point at the angle θ from the axis is θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) from the centre."""
+    r = np.hypot(x, y)
+    theta = np.arctan2(r, 1.0)
+    bent = theta + sum(k * theta ** (3 + 2 * i) for i, k in enumerate(coefficients))
+    return (x, y) if r == 0 else (x / r * bent, y / r * bent)
+
+
+def bend(camera: Camera, x: float, y: float) -> np.ndarray:
+    """D_s in normalised coordinates (2,)."""
+    formula = {"brown_conrady": distort, "fisheye": distort_fisheye}[camera.lens.name]
+    return np.array(formula(x, y, camera.lens.coefficients))
+
+
 def project(camera: Camera, vertex: np.ndarray) -> np.ndarray:
     """P_s(v) = D_s(K_s R_s (v − c_s) / (R_s (v − c_s))_z) (10); NaN where the vertex is not before the camera."""
     x, y, z = camera.T_rs[:3, :3].T @ (vertex - camera.T_rs[:3, 3])
     if z <= 0:
         return np.full(2, np.nan)
-    u, v = distort(x / z, y / z, camera.lens.coefficients)
+    u, v = bend(camera, x / z, y / z)
     return np.array([camera.fx * u + camera.cx, camera.fy * v + camera.cy])
 
 
@@ -146,7 +160,8 @@ def distance(camera: Camera, vertex: np.ndarray) -> float:
 def distance_at_center(camera: Camera, vertex: np.ndarray, normal: np.ndarray) -> float:
     """d of where the line of sight of the pixel's centre meets the plane through a vertex, in lines of sight (u, w, 1).
 
-    A plane that is seen at a cosine below 0.2 is turned to that; what no pixel sees is as far as it is.
+    A plane that is seen at a cosine below 0.2 is turned to that; what no pixel sees is as far as it is. The way to the
+    centre is that in the image; only a fisheye bends it enough to count.
     """
     pixel = seen_pixel(camera, vertex, normal)
     if pixel is None:
@@ -155,6 +170,11 @@ def distance_at_center(camera: Camera, vertex: np.ndarray, normal: np.ndarray) -
     x, y, z = R_sr @ (vertex - camera.T_rs[:3, 3])
     column, row = project(camera, vertex)
     aside = np.array([(pixel[1] - column) / camera.fx, (pixel[0] - row) / camera.fy, 0.0])
+    if camera.lens.name == "fisheye":
+        steps = [
+            bend(camera, x / z + du, y / z + dw) - bend(camera, x / z - du, y / z - dw) for du, dw in 1e-5 * np.eye(2)
+        ]
+        aside[:2] = np.linalg.solve(np.array(steps).T / 2e-5, aside[:2])
     sight = np.array([x / z, y / z, 1.0]) + aside
     length = np.linalg.norm(sight)
     n = R_sr @ normal

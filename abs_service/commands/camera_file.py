@@ -6,13 +6,12 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from abs_service.config.camera import PoseTable
 from abs_service.problems import Key, from_pydantic
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses import LensName, lens_of
 
 Size = Annotated[int, Field(ge=1, le=65535)]
 Focal = Annotated[FiniteFloat, Field(gt=0)]
@@ -34,7 +33,13 @@ class ColorTable(BaseModel):
     cx: FiniteFloat
     cy: FiniteFloat
     lens: Annotated[tuple[FiniteFloat, ...], Field(max_length=8)] = ()
+    lens_model: LensName = "brown_conrady"
     T_rs: PoseTable = PoseTable()
+
+    @model_validator(mode="after")
+    def _is_lens(self) -> "ColorTable":
+        lens_of(self.lens_model, self.lens)
+        return self
 
     def camera(self) -> Camera:
         """The camera that the table describes."""
@@ -45,7 +50,7 @@ class ColorTable(BaseModel):
             self.fy,
             self.cx,
             self.cy,
-            Lens(np.array(self.lens, float)),
+            lens_of(self.lens_model, self.lens),
             self.T_rs.matrix(),
         )
 

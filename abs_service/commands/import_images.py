@@ -25,7 +25,7 @@ camera file says what took them; without a table `color` in it there are no colo
   depth_scale = 0.001     # metres per unit; optional, as are the following
   geometry = "z"          # or "radial": from the camera centre
   invalid = 0             # means "no return"
-  lens = []               # k1 k2 p1 p2 k3 k4 k5 k6, in OpenCV's order
+  lens = []               # k1 k2 p1 p2 k3 k4 k5 k6, in OpenCV's order; k1 k2 k3 k4 if lens_model = "fisheye"
   T_rs = { rotation_vector = [0.0, 0.0, 0.0], translation = [0.0, 0.0, 0.0] }   # sensor to rig
 
   [color]                 # the same keys but depth_scale, geometry and invalid

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
+from calib.lenses import LensName, lens_of
 from calib.pose import Pose
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -56,7 +57,8 @@ class CameraTable(BaseModel):
     Attributes:
         width, height: image size [px].
         fx, fy, cx, cy: camera matrix [px].
-        lens: distortion, OpenCV's first eight coefficients in its order; fewer mean zeros.
+        lens: coefficients of the distortion in OpenCV's order; fewer mean zeros.
+        lens_model: what they are coefficients of: `brown_conrady` (k1, k2, p1, p2, k3 … k6) or `fisheye` (k1 … k4).
         T_rs: pose that maps sensor coordinates to rig coordinates.
     """
 
@@ -69,22 +71,25 @@ class CameraTable(BaseModel):
     cx: FiniteFloat | None = None
     cy: FiniteFloat | None = None
     lens: Annotated[tuple[FiniteFloat, ...], Field(max_length=8)] | None = None
+    lens_model: LensName | None = None
     T_rs: PoseTable | None = None
 
     @model_validator(mode="after")
     def _complete(self) -> "CameraTable":
         missing = [key for key in _MATRIX if getattr(self, key) is None]
-        if missing and (len(missing) < len(_MATRIX) or self.lens is not None):
+        distorts = self.lens is not None or self.lens_model is not None
+        if missing and (len(missing) < len(_MATRIX) or distorts):
             raise ValueError(
                 f"{', '.join(_MATRIX)} belong together, with lens if it distorts; missing: {', '.join(missing)}"
             )
+        lens_of(self.lens_model or Lens.name, self.lens or ())
         return self
 
     def applied_to(self, factory: Camera) -> Camera:
         """The factory calibration with what the table says in its place."""
         given = {key: getattr(self, key) for key in _MATRIX if getattr(self, key) is not None}
         if given:
-            given["lens"] = Lens(np.asarray(self.lens or (), float))
+            given["lens"] = lens_of(self.lens_model or Lens.name, self.lens or ())
         if self.T_rs is not None:
             given["T_rs"] = self.T_rs.matrix()
         return replace(factory, **given)

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-import numpy as np
-
-from calib.lens import COEFFICIENTS, Lens, LensError
+from calib.lens import COEFFICIENTS, LensError, LensModel
+from calib.lenses import lens_of
 from drivers.device import AddressError
 from drivers.simulated import values
 from drivers.simulated.bayer import ORDERS, Mosaic
@@ -41,6 +40,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "distance": values.number(float, 0.1, 10),
     "reflectivity": values.number(float, 0.01, 1),
     "tilt": values.number(float, -70, 70),
+    "lens_model": values.one_of("brown_conrady", "fisheye"),
     "order": values.one_of(*ORDERS),
     "blur": values.number(float, 0, 10),
     "crosstalk": values.number(float, 0, 0.5),
@@ -93,7 +93,8 @@ class Address:
         reflectivity: of the bare wall, the same for all light.
         tilt: of the bare wall, about the rig's y axis [degrees].
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
-        lens: distortion of all heads, `calib.lens.COEFFICIENTS`; `lens=-0.2,0.05` is a barrel's k1 and k2.
+        lens: distortion of all heads; `lens=-0.2,0.05` is a barrel's k1 and k2.
+        lens_model: what `lens` are coefficients of: `brown_conrady`, or `fisheye` with up to four.
         order: of the Bayer head's filters, one of `ORDERS`.
         blur: defocus of the Bayer head: deviation of a Gaussian [px].
         crosstalk: share of what a pixel of the Bayer head collects that its four neighbours read.
@@ -122,6 +123,7 @@ class Address:
     tilt: float = 0.0
     texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
+    lens_model: str = "brown_conrady"
     order: str = "grbg"
     blur: float = 0.0
     crosstalk: float = 0.0
@@ -130,7 +132,7 @@ class Address:
         """The world that the address describes.
 
         Raises:
-            AddressError: light from somewhere in an image cannot have come through the lens.
+            AddressError: no such lens, or light from somewhere in an image cannot have come through it.
         """
         fine = self.texture == "fine"
         choices = Choices(
@@ -154,7 +156,7 @@ class Address:
             wiggle=self.wiggle,
             dark=self.dark,
             pattern=self.pattern,
-            lens=Lens(np.array(self.lens)),
+            lens=self._lens(),
             mosaic=Mosaic(self.order, self.blur, self.crosstalk),
             samples=2 if fine else 1,
         )
@@ -164,6 +166,12 @@ class Address:
         except LensError as error:
             raise AddressError(f"simulated://{self.scene}: lens = {self.lens} is too strong: {error}") from error
         return Simulation(world, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
+
+    def _lens(self) -> LensModel:
+        try:
+            return lens_of(self.lens_model, self.lens)
+        except LensError as error:
+            raise AddressError(f"simulated://{self.scene}: lens_model = {self.lens_model}: {error}") from error
 
 
 def parse(uri: str) -> Address:

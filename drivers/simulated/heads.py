@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lens import Lens, LensModel
 from drivers.simulated import infrared
 from drivers.simulated.barrier import Barrier, BarrierNoise
 from drivers.simulated.bayer import Bayer, Mosaic
@@ -38,7 +38,7 @@ class Equipment:
     wiggle: float = 0.0
     dark: float = 0.0
     pattern: float = 0.0
-    lens: Lens = field(default_factory=Lens)
+    lens: LensModel = field(default_factory=Lens)
     mosaic: Mosaic = field(default_factory=Mosaic)
     samples: int = 1
 

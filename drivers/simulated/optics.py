@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lens import LensModel
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Optics:
     focal_ratio: float
     position: tuple[float, float, float]
 
-    def camera(self, width: int, height: int, lens: Lens) -> Camera:
+    def camera(self, width: int, height: int, lens: LensModel) -> Camera:
         """A camera whose image has `width` pixels; without its lens it would see the same angle as any other width."""
         focal = self.focal_ratio * width
         T_rs = pose.from_rotation_vector((0, 0, 0), self.position)

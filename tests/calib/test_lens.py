@@ -42,6 +42,15 @@ def test_derivatives_of_the_distortion_are_its_differences(xy, k):
     np.testing.assert_allclose(lens.jacobian(xy), np.stack(columns, axis=-1), rtol=0, atol=1e-8)
 
 
+@given(points, coefficients)
+def test_derivatives_by_the_coefficients_are_differences(xy, k):
+    found, step = Lens(np.array(k)).coefficient_jacobian(xy), 1e-5
+    columns = [
+        (Lens(np.array(k) + e).distort(xy) - Lens(np.array(k) - e).distort(xy)) / (2 * step) for e in step * np.eye(8)
+    ]
+    np.testing.assert_allclose(found, np.stack(columns, axis=-1), rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("number", LENSES)
 def test_undistortion_is_the_inverse_and_opencv_s(number):
     lens = Lens(np.array(LENSES[number]))
@@ -61,6 +70,13 @@ def test_undistortion_is_right_or_an_error(xy, k):
     except LensError:
         return
     np.testing.assert_allclose(lens.distort(ideal), xy, atol=1e-9)
+
+
+def test_points_without_inverse_spoil_no_others():
+    lens, good = Lens(np.array([-0.5])), np.array([[0.1, 0.2], [-0.3, 0.1]])
+    found = lens.inverse(np.array([good[0], [0.7, 0.0], good[1], [np.nan, 0.0]]))
+    np.testing.assert_allclose(lens.distort(found[[0, 2]]), good, atol=1e-10)
+    assert np.isnan(found[[1, 3]]).all()
 
 
 def test_a_point_without_inverse_is_named():

@@ -50,6 +50,7 @@ def write_model(file: McapFile, sensor: str, camera: Camera, **changes: object) 
         cx=camera.cx,
         cy=camera.cy,
         lens=camera.lens.coefficients.tolist(),
+        lens_model=camera.lens.name,
         T_rs=camera.T_rs.ravel().tolist(),
         noise="gaussian_polynomial",
     )

@@ -172,6 +172,8 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?lens=round", r"lens = 'round' must be 1 to 8 numbers from -1 to 1 with commas"),
         ("simulated://sheet?lens=0,0,0,0,0,0,0,0,0", "lens = .* must be 1 to 8 numbers"),
         ("simulated://sheet?lens=", "lens = '' must be 1 to 8 numbers"),
+        ("simulated://sheet?lens_model=fish", r"lens_model = 'fish' must be one of \['brown_conrady', 'fisheye'\]"),
+        ("simulated://sheet?lens_model=fisheye&lens=0,0,0,0,1", "lens_model = fisheye: a lens has at most 4 finite"),
         ("simulated://sheet?lens=-0.9", r"lens = \(-0.9,\) is too strong: .* has no inverse"),
         ("simulated://sheet?order=rgb", r"order = 'rgb' must be one of \['bggr', 'gbrg', 'grbg', 'rggb'\]"),
         ("simulated://strip?bend=30", r"bend means nothing in 'strip', only in \['board', 'pair', 'sheet'\]"),

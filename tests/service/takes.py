@@ -57,6 +57,7 @@ def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
     model = SensorModel(sensor=name, width=camera.width, height=camera.height, fx=camera.fx, fy=camera.fy)
     model.cx, model.cy = camera.cx, camera.cy
     model.lens.extend(camera.lens.coefficients.tolist())
+    model.lens_model = camera.lens.name
     model.T_rs.extend(camera.T_rs.ravel().tolist())
     file.write(f"/{name}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
 

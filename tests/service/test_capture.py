@@ -1,10 +1,12 @@
 """Devices are kept delivering, under the names of the rig, and what they are is announced."""
 
+import dataclasses
 import queue
 import threading
 
 import numpy as np
 import pytest
+from abs.v1.common_pb2 import Header
 from abs.v1.health_pb2 import Health as Message
 from abs.v1.sensor_model_pb2 import Config, SensorModel
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -21,10 +23,13 @@ from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib import pose
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
 from drivers.capabilities import Capabilities
+from drivers.codec import CodecError
 from drivers.controls import Controls
 from drivers.device import AddressError, DeviceError, DeviceInfo, DeviceState
 from drivers.frame import Frame, Kind
+from drivers.sensor_model import decode_camera
 from tests.service.loopback import LoopbackBus
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
@@ -237,6 +242,21 @@ def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configura
     assert (tof.parent_frame_id, tof.child_frame_id, tof.rotation.w) == ("rig", "tof", 1.0)
     x, y, z, w = pose.to_quaternion(CAMERA.T_rs)
     assert (color.rotation.x, color.rotation.y, color.rotation.z, color.rotation.w) == (x, y, z, w)
+
+
+def test_viewers_are_told_of_a_fisheye_and_recordings_give_it_back():
+    camera = dataclasses.replace(CAMERA, lens=KannalaBrandt(np.array([0.1, 0.02])))
+    told = announcements.calibration("tof", camera, 0)
+    assert (told.distortion_model, list(told.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
+    model = announcements.sensor_model(Header(), "tof", camera, {})
+    assert (
+        decode_camera(SensorModel.FromString(model.SerializeToString())).calib_id == camera.calib_id == model.calib_id
+    )
+    model.lens_model = ""
+    assert decode_camera(model).lens.name == "brown_conrady"  # a recording from before there were fisheyes
+    model.lens_model = "mirror"
+    with pytest.raises(CodecError, match=r'lens_model = "mirror" is none of'):
+        decode_camera(model)
 
 
 def test_a_head_that_the_device_does_not_have_is_explained(crier):

@@ -82,6 +82,10 @@ def test_a_camera_table_replaces_what_it_names_and_nothing_else():
     assert (camera.width, camera.fy, camera.lens.coefficients[0]) == (320, 301.0, 0.1)
     np.testing.assert_array_equal(camera.T_rs, factory.T_rs)
     assert loads(SENSORS).sensors["tof"].camera.applied_to(factory).calib_id == factory.calib_id
+    fisheye = (
+        loads(SENSORS + table + 'lens_model = "fisheye"\nlens = [0.1]\n').sensors["tof"].camera.applied_to(factory)
+    )
+    assert (fisheye.lens.name, fisheye.lens.coefficients.tolist()) == ("fisheye", [0.1, 0, 0, 0])
 
 
 def test_a_pose_may_be_a_matrix():
@@ -127,6 +131,16 @@ CASES = {
     "a pose of words": ('[sensors.tof.camera]\nT_rs = [["a"]]\n', "4 rows of 4 numbers"),
     "half a camera matrix": ("[sensors.tof.camera]\nfx = 3.0\n", "missing: width, height, fy, cx, cy"),
     "a lens without its camera matrix": ("[sensors.tof.camera]\nlens = [0.1]\n", "missing: width"),
+    "a lens model without its camera matrix": ('[sensors.tof.camera]\nlens_model = "fisheye"\n', "missing: width"),
+    "a lens model that is none": (
+        '[sensors.tof.camera]\nlens_model = "fish"\n',
+        "sensors.tof.camera.lens_model = \"fish\": must be 'brown_conrady' or 'fisheye'",
+    ),
+    "too many coefficients of a fisheye": (
+        "[sensors.tof.camera]\nwidth = 32\nheight = 24\nfx = 30.0\nfy = 30.0\ncx = 16.0\ncy = 12.0\n"
+        'lens_model = "fisheye"\nlens = [0, 0, 0, 0, 1]\n',
+        "a lens has at most 4 finite coefficients ('k1', 'k2', 'k3', 'k4'), not [0.0, 0.0, 0.0, 0.0, 1.0]",
+    ),
     "a noise model that is none": (
         '[sensors.ir]\ndevice = "sim"\nnoise = { type = "colour" }\n',
         'sensors.ir.noise.type = "colour": no such type, did you mean "color"? allowed: bayer, binary, color,',

@@ -86,6 +86,14 @@ def test_a_camera_file_may_be_json_and_say_more_about_depth(folder: Path) -> Non
     assert Recording(folder / "out.mcap").cameras["depth"].lens.coefficients[:2].tolist() == [-0.1, 0.01]
 
 
+def test_a_camera_file_may_describe_a_fisheye(folder: Path) -> None:
+    depth = {"width": 4, "height": 3, "fx": 4, "fy": 4, "cx": 1.5, "cy": 1, "lens": [-0.1], "lens_model": "fisheye"}
+    (folder / "camera.json").write_text(json.dumps({"depth": depth}))
+    assert run(folder, "--camera", str(folder / "camera.json")) == Exit.OK
+    lens = Recording(folder / "out.mcap").cameras["depth"].lens
+    assert (lens.name, lens.coefficients.tolist()) == ("fisheye", [-0.1, 0, 0, 0])
+
+
 def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
     for name, image in (("depth", np.full((480, 640), 5000, np.uint16)), ("rgb", np.zeros((480, 640, 3), np.uint8))):
         cv2.imwrite(str(tmp_path / f"{name}.png"), image)

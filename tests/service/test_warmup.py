@@ -59,6 +59,7 @@ print(json.dumps([before, forms(), estimate.status]))
         {"model": {"type": "posed", "shape": {"type": "flexpad"}}},
         {"model": {"type": "gravity"}, "uri": "simulated://strip?seed=1"},
         {"synthesis": {"type": "sparse"}, "keys": "&lens=0.25"},
+        {"synthesis": {"type": "sparse"}, "keys": "&lens_model=fisheye"},
         {"synthesis": {"type": "undistorted"}, "keys": "&lens=0.25"},
         {"synthesis": {"type": "warped"}, "keys": "&lens=0.25"},
         {"synthesis": {"type": "dense", "step": 2}, "keys": "&lens=0.25"},

@@ -12,6 +12,7 @@ from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
@@ -27,6 +28,9 @@ CAMERA = Camera(
     Lens(np.array([-0.15, 0.03, 1e-3, -1e-3, 0.005])),
     pose.look_at([0.05, -0.03, 0.02], [0.0, 0.0, 1.0]),
 )
+
+#: A fisheye that sees 80° to both sides, where CAMERA is; the sheet fills the same part of its image.
+FISHEYE = Camera(64, 48, 28.0, 28.5, 31.2, 23.9, KannalaBrandt(np.array([0.02, -0.01, 4e-3, -1e-3])), CAMERA.T_rs)
 
 
 def wave(x: np.ndarray, y: np.ndarray) -> np.ndarray:

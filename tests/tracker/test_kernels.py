@@ -14,6 +14,7 @@ from abs_service.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import FREE_SCALE_M, DepthTerm, _write_constants
@@ -25,7 +26,7 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.tracker.scenes import CAMERA, as_surface, depth_image, in_sight, observation, seen, sheet, sparse
+from tests.tracker.scenes import CAMERA, FISHEYE, as_surface, depth_image, in_sight, observation, seen, sheet, sparse
 
 SHARE, RANGE_M = 0.05, 5.0
 NOISE = GaussianPolynomial(((1e-3, 1e-7), (2e-3, 0.0)), ((5e-3,), (-2e-3,)), amplitudes=(0.0, 10_000.0))
@@ -34,9 +35,9 @@ few = settings(max_examples=10 if INTERPRETED else 50)
 seeds = st.integers(0, 2**32 - 1)
 
 
-def scattered(generator: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
+def scattered(generator: np.random.Generator, count: int, width: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Vertices in and around the camera's view, some behind it, with normals in all directions."""
-    vertices = generator.uniform((-0.5, -0.4, 0.4), (0.5, 0.4, 1.6), (count, 3))
+    vertices = generator.uniform((-0.5 * width, -0.4 * width, 0.4), (0.5 * width, 0.4 * width, 1.6), (count, 3))
     vertices[::7, 2] -= 2
     normals = generator.normal(size=(count, 3)) - (0, 0, 1)
     return vertices.astype(np.float32), (normals / np.linalg.norm(normals, axis=1, keepdims=True)).astype(np.float32)
@@ -70,6 +71,26 @@ def test_synthesis_is_eqs_10_11_and_20(seed):
         reference.distance_at_center(CAMERA, *pair) for pair in zip(vertices.astype(float), normals.astype(float))
     ]
     np.testing.assert_allclose(synthesis.distance[0], distances, rtol=1e-5)
+
+
+@few
+@given(seeds)
+def test_synthesis_through_a_fisheye_is_the_same_equations(seed):
+    vertices, normals = scattered(np.random.default_rng(seed), 40, width=5.0)
+    keep = ~undecided(FISHEYE, vertices, normals)
+    surface = as_surface((vertices[keep], normals[keep]))
+    synthesis = seen(FISHEYE, surface)
+    pairs = list(zip(vertices[keep].astype(float), normals[keep].astype(float)))
+    pixels = [reference.seen_pixel(FISHEYE, *pair) for pair in pairs]
+    stride = FISHEYE.width + 2
+    assert synthesis.pixel[0].tolist() == [0 if p is None else (p[0] + 1) * stride + p[1] + 1 for p in pixels]
+    distances = [reference.distance_at_center(FISHEYE, *pair) for pair in pairs]
+    np.testing.assert_allclose(synthesis.distance[0], distances, rtol=2e-5)
+    place, inverse_z = Projection(FISHEYE).project(surface.vertices)
+    found = np.isfinite(inverse_z[0])
+    assert found[synthesis.pixel[0] > 0].all()
+    expected = FISHEYE.project(surface.vertices[0].T.astype(float))
+    np.testing.assert_allclose(place[0, found], expected[found], atol=1e-3)
 
 
 @few

@@ -16,7 +16,7 @@ from calib.noise.constant import Constant
 from calib.noise.grey import GaussianGrey
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.tracker.scenes import CAMERA, as_surface, flat, sheet
+from tests.tracker.scenes import CAMERA, FISHEYE, as_surface, flat, sheet
 
 STEP_M = 1e-3
 #: Of two channels along the flat sheet [1/m].
@@ -76,11 +76,11 @@ def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, 
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_the_kernel_is_its_equation(seed):
+@given(st.integers(0, 2**32 - 1), st.sampled_from([CAMERA, FISHEYE]))
+def test_the_kernels_are_their_equation(seed, camera):
     generator = np.random.default_rng(seed)
     mesh = sheet(5, 6)
-    view = view_of(mesh, CAMERA)
+    view = view_of(mesh, camera)
     view.look(as_surface((mesh.vertices, mesh.normals)))
     vertices = mesh.vertices + generator.normal(0, 0.01, mesh.vertices.shape)
     surface = as_surface((vertices, mesh.normals), (vertices + 0.5, mesh.normals))
@@ -90,8 +90,8 @@ def test_the_kernel_is_its_equation(seed):
         for v, found in enumerate(attributes):
             expected = view._attributes[v].astype(float)
             if seen.pixel[k, v] > 0:
-                row, column = divmod(int(seen.pixel[k, v]), CAMERA.width + 2)
-                place = reference.project(CAMERA, surface.vertices[k, :, v].astype(float))
+                row, column = divmod(int(seen.pixel[k, v]), camera.width + 2)
+                place = reference.project(camera, surface.vertices[k, :, v].astype(float))
                 expected = expected + view._slopes._per_pixel[v] @ (np.array([column - 1, row - 1]) - place)
             np.testing.assert_allclose(found, expected, rtol=1e-4, atol=2e-3)
 

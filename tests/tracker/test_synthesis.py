@@ -26,6 +26,7 @@ from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
+from drivers.simulated.optics import OPTICS
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 from tests.tracker.scenes import as_surface, depth_image, flat, observation, plane_distance, sheet
 
@@ -181,3 +182,22 @@ def test_a_bending_sheet_is_tracked_through_a_lens(kind):
     vertex_mm, surface_mm = mean_errors(steps)
     assert vertex_mm < 1.8
     assert surface_mm < 1.4
+
+
+@pytest.mark.slow
+def test_a_sheet_before_a_fisheye_is_tracked_as_well_as_before_a_pinhole(monkeypatch):
+    """Heads that see 55° to the sides, with pixels that see as much of the sheet as those of the usual heads."""
+
+    def vertex_mm(uri: str) -> float:
+        simulation = simulate(uri)
+        tracking = Tracking(rig_of(simulation), default_plan())
+        steps = list(drive(tracking, simulation, range(0, 64, 4)))
+        assert {step.estimate.status for step in steps} == {Status.TRACKING}
+        return mean_errors(steps)[0]
+
+    pinhole = vertex_mm("simulated://sheet?seed=4")
+    for head in ("tof", "color"):
+        wide = dataclasses.replace(OPTICS[head], focal_ratio=OPTICS[head].focal_ratio / 1.9)
+        monkeypatch.setitem(OPTICS, head, wide)
+    lens = "lens_model=fisheye&lens=0.02,-0.01,0.004,-0.001"
+    assert vertex_mm(f"simulated://sheet?seed=4&{lens}&tof=334x274&color=608x456") < 1.15 * pinhole

@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.raster import field_radius
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.forward import bend_fisheye
 from calib.jit import kernel
 
 
@@ -15,6 +17,7 @@ class Projection:
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
+        self._kernel = _project_fisheye if isinstance(camera.lens, KannalaBrandt) else _project
         self._limit = field_radius(camera) ** 2
 
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -24,7 +27,7 @@ class Projection:
         """
         population, _, n = vertices.shape
         place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
-        _project(vertices, self._pose, self._matrix, self._lens, self._limit, place, inverse_z)
+        self._kernel(vertices, self._pose, self._matrix, self._lens, self._limit, place, inverse_z)
         return place, inverse_z
 
 
@@ -76,6 +79,37 @@ def _project(
             seen = z > np.float32(1e-6) and r2 < farthest
             column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx
             row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy
+            place[k, v, 0] = column if seen else np.float32(0)
+            place[k, v, 1] = row if seen else np.float32(0)
+            inverse_z[k, v] = inverse if seen else np.float32(np.nan)
+
+
+@kernel
+def _project_fisheye(
+    vertices: NDArray[np.float32],
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+) -> None:
+    """What `_project` is with the four coefficients of a fisheye."""
+    one, farthest = np.float32(1), np.float32(limit)
+    fx, fy, cx, cy = matrix
+    for k in range(vertices.shape[0]):
+        for v in range(vertices.shape[2]):
+            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
+            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
+            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
+            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
+            inverse = one / z
+            u, w = x * inverse, y * inverse
+            r2 = u * u + w * w
+            seen = z > np.float32(1e-6) and r2 < farthest
+            bent_u, bent_w = bend_fisheye(u, w, lens)
+            column = fx * bent_u + cx
+            row = fy * bent_w + cy
             place[k, v, 0] = column if seen else np.float32(0)
             place[k, v, 1] = row if seen else np.float32(0)
             inverse_z[k, v] = inverse if seen else np.float32(np.nan)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.forward import bend_fisheye
 from calib.jit import kernel
 from calib.rig import PictureNoise, Rig
 
@@ -113,6 +115,7 @@ class Relief:
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
+        self._kernel = _at_centers_fisheye if isinstance(camera.lens, KannalaBrandt) else _at_centers
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """As last looked; 0 at vertices whose surroundings were not seen."""
@@ -140,7 +143,7 @@ class Relief:
         """Value + slope · (centre of the pixel − projection of the vertex) (population, n, channels)."""
         result = np.empty((*pixel.shape, values.shape[1]), np.float32)
         where = (self._pose, self._matrix, self._lens, self._camera.width + 2)
-        _at_centers(surface.vertices, pixel, *where, values, self._per_pixel, result)
+        self._kernel(surface.vertices, pixel, *where, values, self._per_pixel, result)
         return result
 
 
@@ -188,6 +191,39 @@ def _at_centers(
                 radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
                 column = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
                 row = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
+                right = np.float32(pixel[k, v] % stride - 1) - column
+                down = np.float32(pixel[k, v] // stride - 1) - row
+            for channel in range(values.shape[1]):
+                change = slopes[v, channel, 0] * right + slopes[v, channel, 1] * down
+                result[k, v, channel] = values[v, channel] + change
+
+
+@kernel
+def _at_centers_fisheye(
+    vertices: NDArray[np.float32],
+    pixel: NDArray[np.int32],
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    stride: int,
+    values: NDArray[np.float32],
+    slopes: NDArray[np.float32],
+    result: NDArray[np.float32],
+) -> None:
+    """What `_at_centers` is with the four coefficients of a fisheye."""
+    one = np.float32(1)
+    fx, fy, cx, cy = matrix
+    for k in range(pixel.shape[0]):
+        for v in range(pixel.shape[1]):
+            right, down = np.float32(0), np.float32(0)
+            if pixel[k, v] > 0:
+                a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
+                inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
+                x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
+                y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
+                bent_x, bent_y = bend_fisheye(x, y, lens)
+                column = fx * bent_x + cx
+                row = fy * bent_y + cy
                 right = np.float32(pixel[k, v] % stride - 1) - column
                 down = np.float32(pixel[k, v] // stride - 1) - row
             for channel in range(values.shape[1]):
