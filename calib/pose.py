@@ -52,6 +52,33 @@ def to_quaternion(T_ab: Pose) -> NDArray[np.float64]:
     return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_quat()
 
 
+def from_quaternion(quaternion: ArrayLike, translation: ArrayLike) -> Pose:
+    """The pose with the rotation of a quaternion (x, y, z, w) of any length but 0, and a translation (3,) [m].
+
+    Raises:
+        ValueError: a quaternion of length 0.
+    """
+    rotation = scipy.spatial.transform.Rotation.from_quat(np.asarray(quaternion, float))
+    return from_rotation(rotation.as_matrix(), translation)
+
+
+def from_rotation(rotation: ArrayLike, translation: ArrayLike, tolerance: float = 1e-3) -> Pose:
+    """The pose with the rotation nearest to a matrix (3, 3), which devices store rounded, and a translation (3,) [m].
+
+    Raises:
+        ValueError: the matrix is farther from a rotation than `tolerance`.
+    """
+    given = np.asarray(rotation, float).reshape(3, 3)
+    T_ab = np.eye(4)
+    if np.all(np.isfinite(given)):
+        left, _, right = np.linalg.svd(given)
+        T_ab[:3, :3] = left @ right
+    T_ab[:3, 3] = np.asarray(translation, float)
+    if not np.allclose(T_ab[:3, :3], given, rtol=0, atol=tolerance) or not is_pose(T_ab):
+        raise ValueError(f"{given.ravel().tolist()} and {T_ab[:3, 3].tolist()} are no rotation and translation")
+    return T_ab
+
+
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:
     """The pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
     eye_r = np.asarray(eye, float)

@@ -1,0 +1,167 @@
+"""MKV files of the Azure Kinect: depth, infra-red and colour. PyAV takes the container apart and decodes nothing."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from drivers.azure import calibration
+from drivers.azure.calibration import CalibrationError
+from drivers.footage import FootageError
+from drivers.frame import Frame, Geometry, Kind
+
+#: Sensor, stream and kind by the title of a track.
+_TRACKS: Mapping[str, tuple[str, str, Kind]] = {
+    "DEPTH": ("depth", "depth", Kind.DEPTH),
+    "IR": ("depth", "ir", Kind.IR),
+    "COLOR": ("color", "color", Kind.COLOR),
+}
+
+
+class AzureRecording:
+    """The images of one recording; depth in millimetres along z.
+
+    Args:
+        path: of the file.
+
+    Attributes:
+        cameras: `depth` and `color`, as far as there are images of them; depth is the rig's frame.
+        total: None: only reading tells how many images there are.
+
+    Raises:
+        FootageError: it cannot be read, has no or a strange calibration, or PyAV is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.total = None
+        with _container(path) as file:
+            titles = {stream.metadata.get("title") for stream in file.streams.video} & _TRACKS.keys()
+            tags = {key: value for stream in file.streams for key, value in stream.metadata.items()} | file.metadata
+            name = tags.get("K4A_CALIBRATION_FILE", "calibration.json")
+            attached = {s.metadata.get("filename"): s.data for s in file.streams if s.type == "attachment"}
+            self._start_ns = _wall_ns(tags.get("creation_time", ""))
+            self._offset_us = int(tags.get("K4A_START_OFFSET_NS", "0")) // 1000
+            self._serial = tags.get("K4A_DEVICE_SERIAL_NUMBER", "")
+        if not titles or name not in attached:
+            raise FootageError(f"{path}: no recording of an Azure Kinect: it lacks {name if titles else 'every image'}")
+        self._color, _, color = tags.get("K4A_COLOR_MODE", "").partition("_")
+        modes = {"color": color} if "COLOR" in titles else {}
+        modes |= {"depth": tags.get("K4A_DEPTH_MODE", "PASSIVE_IR")} if titles & {"DEPTH", "IR"} else {}
+        try:
+            self.cameras: Mapping[str, Camera] = calibration.cameras(bytes(attached[name]), modes)
+        except CalibrationError as error:
+            raise FootageError(f"{path}: {error}") from error
+
+    def frames(self) -> Iterator[Frame]:
+        """Every image, numbered by its time: those of one capture have one number, and what was lost has one, too."""
+        with _container(self._path) as file:
+            for packet in file.demux():
+                track = _TRACKS.get(packet.stream.metadata.get("title", ""))
+                if track is None or packet.pts is None or not packet.size:
+                    continue
+                time_s = packet.pts * packet.time_base
+                number = round(time_s * (packet.stream.average_rate or 0))
+                yield self._frame(track, bytes(packet), round(time_s * 1_000_000), number)
+
+    def _frame(self, track: tuple[str, str, Kind], content: bytes, time_us: int, seq: int) -> Frame:
+        sensor, stream, kind = track
+        camera = self.cameras[sensor]
+        t_ns = max(self._start_ns + time_us * 1000, 0)
+        try:
+            data = color(self._color, content, camera) if kind == Kind.COLOR else words(content, camera)
+        except ValueError as error:
+            raise FootageError(f"{self._path}: {stream} at {time_us} µs: {error}") from error
+        is_depth = kind == Kind.DEPTH
+        return Frame(
+            sensor=sensor,
+            stream=stream,
+            kind=kind,
+            data=data,
+            encoding={Kind.COLOR: "bgr8", Kind.DEPTH: "16UC1"}.get(kind, "mono16"),
+            t_host_ns=t_ns,
+            t_arrival_ns=t_ns,
+            seq=seq,
+            scale=0.001 if is_depth else 1.0,
+            geometry=Geometry.Z if is_depth else Geometry.NONE,
+            invalid=0.0 if is_depth else None,
+            t_device_ticks=time_us + self._offset_us,
+            tick_hz=1e6,
+            clock_domain=f"azure:{self._serial}",
+            calib_id=camera.calib_id,
+        )
+
+
+def words(content: bytes, camera: Camera) -> NDArray[np.generic]:
+    """Depth or infra-red: 16 bits per pixel, the higher byte first.
+
+    Raises:
+        ValueError: not as many pixels as the camera has.
+    """
+    if len(content) != 2 * camera.width * camera.height:
+        raise ValueError(f"{camera.width} × {camera.height} pixels need two bytes each, there are {len(content)}")
+    return np.frombuffer(content, ">u2").astype("<u2").reshape(camera.height, camera.width)
+
+
+def color(encoding: str, content: bytes, camera: Camera) -> NDArray[np.generic]:
+    """Colours (height, width, 3), blue first.
+
+    Raises:
+        ValueError: they are not encoded so, or have another size than the camera's images.
+    """
+    decoders: Mapping[str, Callable[[bytes, Camera], Any]] = {"MJPG": _jpeg, "NV12": _nv12, "YUY2": _yuy2}
+    if encoding not in decoders:
+        raise ValueError(f"encoding {encoding!r} is none of {sorted(decoders)}")
+    try:
+        image = decoders[encoding](content, camera)
+    except cv2.error as error:
+        raise ValueError(f"no {encoding} image: {error}") from error
+    if image is None or image.shape != (camera.height, camera.width, 3):
+        raise ValueError(f"this is no {encoding} image of {camera.width} × {camera.height} pixels")
+    return image
+
+
+def _jpeg(content: bytes, camera: Camera) -> Any:
+    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR) if content else None
+
+
+def _nv12(content: bytes, camera: Camera) -> Any:
+    planes = np.frombuffer(content, np.uint8).reshape(camera.height * 3 // 2, camera.width)
+    return cv2.cvtColor(planes, cv2.COLOR_YUV2BGR_NV12)
+
+
+def _yuy2(content: bytes, camera: Camera) -> Any:
+    pairs = np.frombuffer(content, np.uint8).reshape(camera.height, camera.width, 2)
+    return cv2.cvtColor(pairs, cv2.COLOR_YUV2BGR_YUY2)
+
+
+def _wall_ns(text: str) -> int:
+    """When the recording began [ns since the Unix epoch]; 0 if it does not tell."""
+    try:
+        began = datetime.fromisoformat(text)
+    except ValueError:
+        return 0
+    began = began if began.tzinfo else began.replace(tzinfo=UTC)
+    return math.floor(began.timestamp()) * 1_000_000_000
+
+
+@contextmanager
+def _container(path: Path) -> Iterator[Any]:
+    """The open file; says which it was if something is wrong with it, and what to do."""
+    try:
+        import av  # noqa: PLC0415  an extra
+        import av.error  # noqa: PLC0415
+    except ImportError as error:
+        raise FootageError(f"{path}: MKV is read by PyAV, which the extra `import` of abs-service installs") from error
+    try:
+        with av.open(str(path)) as file:
+            yield file
+    except (OSError, ValueError, av.error.FFmpegError) as error:
+        raise FootageError(f"{path}: cannot be read as MKV: {error}") from error

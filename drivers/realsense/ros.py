@@ -1,0 +1,75 @@
+"""Messages out of a ROS 1 bag, read by `rosbags`, which needs no ROS."""
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from drivers.footage import FootageError
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message: its topic, the time since the recording began [ns], and what it holds, by ROS's names."""
+
+    topic: str
+    time_ns: int
+    content: Any
+
+
+class Bag:
+    """A ROS 1 bag.
+
+    Args:
+        path: of the file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def counts(self) -> Mapping[str, int]:
+        """Number of messages by topic.
+
+        Raises:
+            FootageError: the file cannot be read, or `rosbags` is not installed.
+        """
+        with _naming(self._path):
+            from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
+
+            with Reader(self._path) as reader:
+                return {connection.topic: connection.msgcount for connection in reader.connections}
+
+    def messages(self, topics: str) -> Iterator[Message]:
+        """The messages of the topics that a regular expression matches wholly, in the order of their times.
+
+        Raises:
+            FootageError: as `counts`, and if a message is damaged.
+        """
+        with _naming(self._path):
+            from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
+            from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
+
+            types = get_typestore(Stores.ROS1_NOETIC)
+            with Reader(self._path) as reader:
+                wanted = [connection for connection in reader.connections if re.fullmatch(topics, connection.topic)]
+                # No connection at all would mean every connection.
+                for connection, time_ns, data in reader.messages(wanted) if wanted else ():
+                    content = types.deserialize_ros1(data, connection.msgtype)
+                    yield Message(connection.topic, time_ns, content)
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Says which file it was, and what to do about it."""
+    try:
+        yield
+    except ImportError as error:
+        raise FootageError(
+            f"{path}: bags are read by rosbags, which the extra `import` of abs-service installs"
+        ) from error
+    except OSError as error:
+        raise FootageError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except Exception as error:  # what a parser raises about damaged bytes may be anything
+        raise FootageError(f"{path}: this is no ROS 1 bag, or a damaged one: {error!r}") from error

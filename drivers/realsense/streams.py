@@ -1,0 +1,81 @@
+"""What librealsense calls its streams, and what they are here."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from calib.camera import Camera
+from calib.lens import Lens
+from calib.pose import Pose
+from drivers.frame import Geometry, Kind
+
+#: Distortion models that OpenCV's k1 k2 p1 p2 k3 stand for. librealsense projects with all of them forwards; "modified"
+#: and "inverse" apply p1 and p2 to the point that k1…k3 moved already, which is a few thousandths of a pixel.
+BROWN_CONRADY = ("brown conrady", "modified brown conrady", "inverse brown conrady")
+
+
+class StreamError(ValueError):
+    """A stream that cannot be used; names it and what is wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """What a stream of the camera is here.
+
+    Attributes:
+        sensor: the head.
+        stream: its name.
+        kind: what it holds.
+        geometry: of depth, which length.
+        exposure_unit_s: length of one unit of its exposure times [s].
+    """
+
+    sensor: str
+    stream: str
+    kind: Kind
+    geometry: Geometry = Geometry.NONE
+    exposure_unit_s: float = 1e-6
+
+
+#: By the SDK's stream type and index. Stereo cameras number their imagers 1 (left) and 2 (right) and give depth as the
+#: left one sees it; those with one imager (L5xx) have infra-red 0 and confidence behind the same lens as depth.
+ROLES: Mapping[tuple[str, int], Role] = {
+    ("depth", 0): Role("depth", "depth", Kind.DEPTH, Geometry.Z),
+    ("infrared", 0): Role("depth", "ir", Kind.IR),
+    ("confidence", 0): Role("depth", "confidence", Kind.CONFIDENCE),
+    ("infrared", 1): Role("left", "ir", Kind.IR),
+    ("infrared", 2): Role("right", "ir", Kind.IR),
+    ("color", 0): Role("color", "color", Kind.COLOR, exposure_unit_s=1e-4),  # as USB video devices count
+}
+
+
+def camera(
+    name: str,
+    size: tuple[int, int],
+    matrix: tuple[float, float, float, float],
+    model: str,
+    coefficients: ArrayLike,
+    T_rs: Pose,
+) -> Camera:
+    """The camera that librealsense describes; both count pixels from the centre of the first.
+
+    Args:
+        name: of the stream, for messages.
+        size: width and height [px].
+        matrix: fx, fy, cx, cy [px].
+        model: distortion model, in lower case with blanks.
+        coefficients: five of them.
+        T_rs: pose that maps sensor coordinates to those of the depth head [m].
+
+    Raises:
+        StreamError: another distortion model, or numbers that are no camera.
+    """
+    try:
+        lens = Lens(np.asarray(coefficients, float))
+        if not lens.is_pinhole and model not in BROWN_CONRADY:
+            raise StreamError(f"{name}: distortion {model!r} is none of {', '.join(BROWN_CONRADY)}")
+        return Camera(*size, *matrix, lens, T_rs)
+    except ValueError as error:
+        raise error if isinstance(error, StreamError) else StreamError(f"{name}: {error}") from error
