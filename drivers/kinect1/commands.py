@@ -1,6 +1,7 @@
 """Commands to the camera over its control pipe: numbered requests, each with an answer that has to be asked for."""
 
 import struct
+import threading
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol
@@ -52,7 +53,7 @@ class Control(Protocol):
 
 
 class Commands:
-    """Speaks with one camera; one thread at a time.
+    """Speaks with one camera; threads take turns.
 
     Args:
         control: its control pipe.
@@ -65,6 +66,7 @@ class Commands:
         self._clock = clock
         self._sleep = sleep
         self._tag = 0
+        self._lock = threading.Lock()
 
     def send(self, opcode: Opcode, *words: int) -> bytes:
         """Sends a command of 16-bit words; returns what the answer holds behind its header.
@@ -73,9 +75,11 @@ class Commands:
             ProtocolError: no answer in time, or not one to this command.
             DeviceError: the device is gone.
         """
-        tag, self._tag = self._tag, (self._tag + 1) & 0xFFFF
-        self._control.write(_REQUEST + _HEADER.pack(len(words), opcode, tag) + struct.pack(f"<{len(words)}H", *words))
-        answer = self._wait(opcode)
+        with self._lock:
+            tag, self._tag = self._tag, (self._tag + 1) & 0xFFFF
+            header = _HEADER.pack(len(words), opcode, tag)
+            self._control.write(_REQUEST + header + struct.pack(f"<{len(words)}H", *words))
+            answer = self._wait(opcode)
         if (
             len(answer) < 8
             or answer[:2] != _ANSWER

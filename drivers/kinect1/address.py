@@ -1,0 +1,48 @@
+"""What an address `kinect1://serial?streams=depth,color` asks for."""
+
+from dataclasses import dataclass
+from urllib.parse import parse_qsl, urlsplit
+
+from drivers.device import AddressError
+from drivers.kinect1.camera import Stream
+
+
+@dataclass(frozen=True)
+class Address:
+    """A camera, and what it shall deliver.
+
+    Attributes:
+        serial: of the camera; "" for the only one that is attached.
+        streams: of it; colour and infra-red images share a pipe, so at most one of these.
+    """
+
+    serial: str = ""
+    streams: tuple[Stream, ...] = (Stream.DEPTH, Stream.COLOR)
+
+
+def parse(uri: str) -> Address:
+    """Reads an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.
+
+    Raises:
+        AddressError: an unknown key, or a value that is not allowed; says what is.
+    """
+    parts = urlsplit(uri)
+    given = parse_qsl(parts.query, keep_blank_values=True)
+    if parts.path not in {"", "/"}:
+        raise AddressError(f"{uri}: nothing may follow the serial number but ?streams=…, not {parts.path!r}")
+    if unknown := sorted({key for key, _ in given} - {"streams"}):
+        raise AddressError(f"{uri}: unknown key {unknown[0]!r}; allowed is 'streams'")
+    if len(given) > 1:
+        raise AddressError(f"{uri}: streams is given twice")
+    return Address(parts.netloc, *(_streams(uri, text) for _, text in given))
+
+
+def _streams(uri: str, text: str) -> tuple[Stream, ...]:
+    names = text.split(",")
+    known = set(names) <= set(Stream)
+    if not known or len(set(names)) < len(names) or {Stream.COLOR, Stream.IR} <= set(names):
+        raise AddressError(
+            f"{uri}: streams = {text!r} must be some of depth, color and ir with commas in between, each once; "
+            "color and ir share a pipe, so only one of the two"
+        )
+    return tuple(Stream(name) for name in names)

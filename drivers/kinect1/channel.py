@@ -1,0 +1,117 @@
+"""One stream from its packets to frames."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from drivers.capabilities import ClockInfo, StreamInfo
+from drivers.clock import DeviceClock
+from drivers.frame import Frame, Geometry, Kind, Reference
+from drivers.kinect1 import unpacking
+from drivers.kinect1.assembly import Assembler, RawImage
+from drivers.kinect1.camera import Stream
+from drivers.kinect1.packets import TICK_HZ
+from drivers.kinect1.reference_plane import DEPTH_SCALE, ReferencePlane
+from drivers.kinect1.transfer import Transfer
+
+#: The device's counter; both streams are stamped by it.
+CLOCK = ClockInfo("kinect1", TICK_HZ, bits=32)
+
+_STREAMS = {
+    Stream.DEPTH: ("depth", "depth", Kind.DEPTH, "16UC1"),
+    Stream.COLOR: ("color", "bayer", Kind.BAYER, "bayer_grbg8"),
+    Stream.IR: ("ir", "ir", Kind.IR, "mono16"),
+}
+
+
+def describe(stream: Stream) -> StreamInfo:
+    """What a stream is to the service."""
+    return StreamInfo(*_STREAMS[stream], stream.form.width, stream.form.height, stream.form.rate_hz, CLOCK)
+
+
+def camera_of(stream: Stream, plane: ReferencePlane) -> Camera:
+    """The camera of a stream. The rig's frame is that of the depth camera.
+
+    Depth is made of infra-red images of 488 rows and has 480, so it counts as another camera.
+    """
+    return plane.color_camera() if stream == Stream.COLOR else plane.depth_camera(stream.form.height)
+
+
+@dataclass(frozen=True, eq=False)
+class Stamped:
+    """A frame without its epoch, and whether the device's clock has jumped before it."""
+
+    frame: Frame
+    stepped: bool
+
+
+class Channel:
+    """Makes frames of one stream in one epoch.
+
+    Args:
+        stream: which.
+        plane: the device's calibration.
+    """
+
+    def __init__(self, stream: Stream, plane: ReferencePlane) -> None:
+        self.info = describe(stream)
+        self._stream = stream
+        self._table = plane.table()
+        self._calib_id = camera_of(stream, plane).calib_id
+        self._assembler = Assembler(stream.form)
+        self._clock = DeviceClock(CLOCK)
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """See `Assembler.dropped`."""
+        return self._assembler.dropped
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """How the clock fits, and packets that never came."""
+        return {
+            **{f"clock.{'/'.join(self.info.key)}.{name}": value for name, value in self._clock.gauges.items()},
+            f"{self.info.stream}.missing_packets": float(self._assembler.missing),
+        }
+
+    def take(self, transfer: Transfer, epoch: int) -> Iterator[Stamped]:
+        """The frames that a transfer completes."""
+        for image in self._assembler.feed(transfer.packets, transfer.lengths):
+            # What tells the time is the first packet; the last one comes a whole period later.
+            stamp = self._clock.stamp(image.ticks, transfer.arrival_ns(image.row))
+            is_depth = self._stream == Stream.DEPTH
+            yield Stamped(
+                Frame(
+                    sensor=self.info.sensor,
+                    stream=self.info.stream,
+                    kind=self.info.kind,
+                    data=self._pixels(image),
+                    encoding=self.info.encoding,
+                    t_host_ns=stamp.t_host_ns,
+                    t_arrival_ns=transfer.t_ns,
+                    seq=image.seq,
+                    epoch=epoch + stamp.stepped,
+                    scale=DEPTH_SCALE if is_depth else 1.0,
+                    geometry=Geometry.Z if is_depth else Geometry.NONE,
+                    invalid=0 if is_depth else None,
+                    t_device_ticks=image.ticks,
+                    tick_hz=TICK_HZ,
+                    clock_domain=CLOCK.domain,
+                    t_sigma_ns=stamp.t_sigma_ns,
+                    t_reference=Reference.END,
+                    calib_id=self._calib_id,
+                ),
+                stamp.stepped,
+            )
+
+    def _pixels(self, image: RawImage) -> NDArray[np.generic]:
+        form = self._stream.form
+        match self._stream:
+            case Stream.DEPTH:
+                return unpacking.depth(image.data, self._table, form.height, form.width)
+            case Stream.IR:
+                return unpacking.infrared(image.data, form.height, form.width)
+        return image.data.reshape(form.height, form.width).copy()

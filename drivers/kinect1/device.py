@@ -1,0 +1,162 @@
+"""An opened Kinect as a device: one thread reads its streams and delivers them."""
+
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, suppress
+
+from calib.camera import Camera
+from drivers.capabilities import Capabilities
+from drivers.controls import Control, ControlInfo, ControlKind, Controls
+from drivers.delivery import Delivery
+from drivers.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.kinect1.assembly import CAUSES
+from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
+from drivers.kinect1.channel import Channel, camera_of, describe
+from drivers.kinect1.commands import Commands
+from drivers.kinect1.port import Port
+
+#: The longest that the thread waits for packets before it looks whether it shall stop [s].
+_PATIENCE_S = 0.1
+
+
+class Kinect1Device:
+    """Delivers `depth/depth` (z), and `color/bayer` as the sensor measured it or `ir/ir`.
+
+    Args:
+        info: who it is.
+        streams: what to deliver.
+        port: of the camera; is closed with the device.
+        clock: CLOCK_MONOTONIC [ns].
+        sleep: waits so many seconds.
+
+    Raises:
+        DeviceError: the camera does not answer, or tells no calibration.
+    """
+
+    def __init__(
+        self,
+        info: DeviceInfo,
+        streams: tuple[Stream, ...],
+        port: Port,
+        clock: Callable[[], int],
+        sleep: Callable[[float], object],
+    ) -> None:
+        self._port = port
+        self._camera = KinectCamera(Commands(port, clock, sleep))
+        self._streams = streams
+        self._plane = self._camera.reference_plane()
+        self.info = info
+        self.controls = _controls(self._camera, streams)
+        self.capabilities = Capabilities(tuple(map(describe, streams)), self.controls.infos)
+        self.cameras: Mapping[str, Camera] = {
+            describe(stream).sensor: camera_of(stream, self._plane) for stream in streams
+        }
+        self._delivery = Delivery(self.capabilities.streams, CAUSES)
+        self._channels: Mapping[int, Channel] = {}
+        self._thread = threading.Thread()
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames` delivered, and images of all streams that were dropped, by `CAUSES`."""
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """How the clocks of the streams fit, and how many of their packets never came since the last start."""
+        return {name: value for channel in self._channels.values() for name, value in channel.gauges.items()}
+
+    def start(self, sink: Sink) -> None:
+        """Begins to deliver in a new epoch; a device that is running goes on as it is.
+
+        Raises:
+            DeviceError: the device was closed.
+        """
+        if stop := self._delivery.begin(sink, "beginning the camera's streams"):
+            arguments = (stop, self._thread)
+            self._thread = threading.Thread(target=self._run, args=arguments, name="kinect1", daemon=True)
+            self._thread.start()
+
+    def stop(self) -> None:
+        """Ends delivery; after it returns the sink is not called again."""
+        self._delivery.end("stopped")
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join()
+
+    def close(self) -> None:
+        """Stops and lets go of the camera."""
+        self._delivery.release()
+        self.stop()
+        self._port.close()
+
+    def _run(self, stop: threading.Event, before: threading.Thread) -> None:
+        if before.is_alive():
+            before.join()  # stopped from within its own sink
+        try:
+            self._stream(stop)
+        except DeviceError as error:
+            self._delivery.report(DeviceState.FAILED, str(error))
+        except Exception as error:
+            self._delivery.report(DeviceState.FAILED, f"the driver failed: {error!r}")
+            raise
+
+    def _stream(self, stop: threading.Event) -> None:
+        channels = {stream.form.endpoint: Channel(stream, self._plane) for stream in self._streams}
+        self._channels = channels
+        counted = dict.fromkeys(CAUSES, 0)
+        with ExitStack() as ending:
+            reader = ending.enter_context(self._port.reading(tuple(channels)))
+            for stream in self._streams:
+                ending.callback(self._end, stream)
+                self._camera.start(stream)
+            self._delivery.report(DeviceState.STREAMING, "the camera delivers")
+            while not stop.is_set():
+                for transfer in reader.read(_PATIENCE_S):
+                    if stop.is_set():
+                        return
+                    for stamped in channels[transfer.endpoint].take(transfer, self._delivery.epoch):
+                        if stamped.stepped:
+                            self._delivery.begin_epoch()
+                        self._delivery.frame(stamped.frame)
+                for cause in CAUSES:
+                    total = sum(channel.dropped[cause] for channel in channels.values())
+                    self._delivery.drop(cause, total - counted[cause])
+                    counted[cause] = total
+
+    def _end(self, stream: Stream) -> None:
+        with suppress(DeviceError):  # it may be gone
+            self._camera.stop(stream)
+
+
+def _controls(camera: KinectCamera, streams: tuple[Stream, ...]) -> Controls:
+    controls = [
+        Control(
+            ControlInfo("infrared_gain", ControlKind.WHOLE, minimum=1, maximum=50),
+            camera.infrared_gain,
+            lambda value: camera.set_infrared_gain(int(value)),
+        )
+    ]
+    if Stream.COLOR in streams:
+        limits = {"unit": "s", "minimum": LINE_S, "maximum": LONGEST_LINES * LINE_S}
+        controls += [
+            Control(
+                ControlInfo("exposure_s", ControlKind.NUMBER, **limits),
+                camera.exposure_s,
+                lambda value: camera.set_exposure_s(float(value)),
+            ),
+            Control(
+                ControlInfo("auto_exposure", ControlKind.SWITCH),
+                camera.auto_exposure,
+                lambda value: camera.set_auto_exposure(bool(value)),
+            ),
+            Control(
+                ControlInfo("auto_white_balance", ControlKind.SWITCH),
+                camera.auto_white_balance,
+                lambda value: camera.set_auto_white_balance(bool(value)),
+            ),
+        ]
+    return Controls(controls)

@@ -1,0 +1,48 @@
+"""From an address to an opened camera."""
+
+import time
+from collections.abc import Callable
+from contextlib import suppress
+
+from drivers.device import DeviceError
+from drivers.discovery import Found, choose
+from drivers.kinect1.address import Address
+from drivers.kinect1.attached import Backends, attached, fresh_backend
+from drivers.kinect1.device import Kinect1Device
+from drivers.kinect1.port import Port, Streaming
+from drivers.kinect1.ring import IsochronousRing
+
+
+def find(backends: Backends = fresh_backend) -> list[Found]:
+    """All cameras that are attached."""
+    return [one.found for one in attached(backends())]
+
+
+def open_camera(
+    address: Address,
+    clock: Callable[[], int],
+    backends: Backends = fresh_backend,
+    streaming: Streaming = IsochronousRing,
+) -> Kinect1Device:
+    """Opens the camera that an address means.
+
+    Args:
+        address: which, and what it shall deliver.
+        clock: CLOCK_MONOTONIC [ns].
+        backends: makes what pyusb looks at the bus with.
+        streaming: makes readers of isochronous pipes.
+
+    Raises:
+        DeviceError: none is attached, or it cannot be opened; says what to do.
+    """
+    backend = backends()
+    there_are = attached(backend)
+    chosen = choose([one.found for one in there_are], "kinect1", address.serial)
+    (device,) = [one.device for one in there_are if one.found is chosen]
+    port = Port(device, backend, streaming, clock)
+    try:
+        return Kinect1Device(chosen.info, address.streams, port, clock, time.sleep)
+    except DeviceError:
+        with suppress(DeviceError):
+            port.close()
+        raise

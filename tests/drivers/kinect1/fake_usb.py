@@ -1,0 +1,185 @@
+"""A USB without hardware or libusb: pyusb's backend over emulated cameras, and a reader of their isochronous pipes."""
+
+import array
+import errno
+import time
+from collections.abc import Callable, Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import usb.backend
+import usb.core
+
+from drivers.kinect1.transfer import MICROFRAME_NS, GoneError, Transfer
+from tests.drivers.kinect1 import descriptors
+from tests.drivers.kinect1.emulator import EmulatedKinect
+
+
+class FakeDevice:
+    """Something that is plugged in.
+
+    Attributes:
+        kinect: the camera; nobody asks that of an audio part.
+        kernel_driver: whether the kernel's driver holds it; a `stubborn` one does not let go.
+        refusal: errno with which it cannot be opened, 0 if it can.
+        now: microframes that have passed.
+        damage: what happens to packets and their lengths on their way.
+        opened, claims, readers: how many there are now.
+    """
+
+    def __init__(self, kinect: EmulatedKinect, serial: str, product: int = 0x02AE, ports: tuple = (1, 1)) -> None:
+        self.kinect = kinect
+        self.serial = serial
+        self.product = product
+        self.ports = ports
+        self.speed = 3
+        self.plugged = True
+        self.kernel_driver = self.stubborn = False
+        self.refusal = 0
+        self.claims = 0
+        self.opened = 0
+        self.settings: list[int] = []
+        self.configuration = 1
+        self.now = 0
+        self.hasty = False
+        self.readers = 0
+        self.damage: Callable[[np.ndarray, np.ndarray], None] = lambda packets, lengths: None
+
+
+#: Untyped, because pyusb declares that its methods return nothing.
+_IBackend: Any = usb.backend.IBackend
+
+
+class FakeBackend(_IBackend):
+    """pyusb's view of some devices; `wide` ones have an alternate setting, as the Kinect for Windows has."""
+
+    def __init__(self, devices: Sequence[FakeDevice], wide: bool = False) -> None:
+        super().__init__()
+        self.devices = list(devices)
+        self._interfaces = descriptors.INTERFACES if wide else descriptors.INTERFACES[-1:]
+
+    def enumerate_devices(self) -> Iterator[FakeDevice]:
+        return (device for device in self.devices if device.plugged)
+
+    def get_parent(self, dev: FakeDevice) -> None:
+        return None
+
+    def get_device_descriptor(self, dev: FakeDevice) -> Any:
+        fields = descriptors.fields("device", descriptors.device(dev.product))
+        place = {"address": 2, "bus": 1, "port_number": dev.ports[-1], "port_numbers": dev.ports, "speed": dev.speed}
+        return SimpleNamespace(**fields, **place)
+
+    def get_configuration_descriptor(self, dev: FakeDevice, config: int) -> Any:
+        if config > 0:
+            raise IndexError
+        fields = descriptors.fields("configuration", descriptors.configuration())
+        return SimpleNamespace(**fields, extra_descriptors=[])
+
+    def get_interface_descriptor(self, dev: FakeDevice, intf: int, alt: int, config: int) -> Any:
+        if intf > 0 or alt >= len(self._interfaces):
+            raise IndexError
+        fields = descriptors.fields("interface", descriptors.interface(alt, len(self._interfaces[alt])))
+        return SimpleNamespace(**fields, extra_descriptors=[])
+
+    def get_endpoint_descriptor(self, dev: FakeDevice, ep: int, intf: int, alt: int, config: int) -> Any:
+        endpoint = descriptors.endpoint(*self._interfaces[alt][ep])
+        fields = descriptors.fields("endpoint", endpoint)
+        return SimpleNamespace(**fields, bRefresh=0, bSynchAddress=0, extra_descriptors=[])
+
+    def open_device(self, dev: FakeDevice) -> FakeDevice:
+        self._check(dev)
+        if dev.refusal:
+            raise error(dev.refusal)
+        dev.opened += 1
+        return dev
+
+    def close_device(self, dev_handle: FakeDevice) -> None:
+        dev_handle.opened -= 1
+
+    def get_configuration(self, dev_handle: FakeDevice) -> int:
+        return dev_handle.configuration
+
+    def set_configuration(self, dev_handle: FakeDevice, config_value: int) -> None:
+        dev_handle.configuration = config_value
+
+    def set_interface_altsetting(self, dev_handle: FakeDevice, intf: int, altsetting: int) -> None:
+        dev_handle.settings.append(altsetting)
+
+    def claim_interface(self, dev_handle: FakeDevice, intf: int) -> None:
+        self._check(dev_handle)
+        if dev_handle.kernel_driver or dev_handle.claims:
+            raise error(errno.EBUSY)
+        dev_handle.claims += 1
+
+    def release_interface(self, dev_handle: FakeDevice, intf: int) -> None:
+        dev_handle.claims -= 1
+
+    def is_kernel_driver_active(self, dev_handle: FakeDevice, intf: int) -> bool:
+        return dev_handle.kernel_driver
+
+    def detach_kernel_driver(self, dev_handle: FakeDevice, intf: int) -> None:
+        if dev_handle.stubborn:
+            raise error(errno.EPERM)
+        dev_handle.kernel_driver = False
+
+    def ctrl_transfer(
+        self,
+        dev_handle: FakeDevice,
+        bmRequestType: int,
+        bRequest: int,
+        wValue: int,
+        wIndex: int,
+        data: Any,
+        timeout: int,
+    ) -> int:
+        self._check(dev_handle)
+        match bmRequestType, bRequest:
+            case 0x80, 6 if wValue >> 8 == 3:
+                answer = descriptors.string(dev_handle.serial)
+            case 0x40, 0:
+                dev_handle.kinect.request(bytes(data))
+                return len(data)
+            case 0xC0, 0:
+                answer = dev_handle.kinect.answer(len(data))
+            case _:
+                raise error(errno.EPIPE)
+        data[: len(answer)] = array.array("B", answer)
+        return len(answer)
+
+    def _check(self, device: FakeDevice) -> None:
+        if not device.plugged:
+            raise error(errno.ENODEV)
+
+
+def error(number: int) -> usb.core.USBError:
+    """What pyusb raises for an errno."""
+    return usb.core.USBError(errno.errorcode[number], -1, number)
+
+
+class FakeReader:
+    """The pipes of one device at the pace of its microframes, or as fast as they are read if the device is `hasty`."""
+
+    MICROFRAMES = 64
+
+    def __init__(self, device: usb.core.Device, endpoints: Sequence[int], clock: Callable[[], int]) -> None:
+        self._fake: FakeDevice = device._ctx.dev
+        self._clock = clock
+        self._endpoints = endpoints
+        self._begin_ns = clock() - self._fake.now * MICROFRAME_NS
+        self._fake.readers += 1
+
+    def read(self, timeout_s: float) -> Iterator[Transfer]:
+        fake, kinect = self._fake, self._fake.kinect
+        end_ns = self._begin_ns + (fake.now + self.MICROFRAMES) * MICROFRAME_NS
+        time.sleep(0 if fake.hasty else max(end_ns - self._clock(), 0) * 1e-9)
+        for endpoint in self._endpoints:
+            if not fake.plugged:
+                raise GoneError("the camera was unplugged")
+            packets, lengths = kinect.microframes(endpoint, fake.now, self.MICROFRAMES)
+            fake.damage(packets, lengths)
+            yield Transfer(endpoint, packets, lengths, end_ns)
+        fake.now += self.MICROFRAMES
+
+    def close(self) -> None:
+        self._fake.readers -= 1

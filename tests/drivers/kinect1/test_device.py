@@ -1,0 +1,232 @@
+"""The device on emulated USB: what it delivers, what it refuses and why, and that it leaves nothing behind."""
+
+import errno
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from drivers.device import AddressError, ControlError, DeviceError, DeviceState
+from drivers.discovery import Availability
+from drivers.frame import Geometry, Kind
+from drivers.kinect1.address import Address, parse
+from drivers.kinect1.camera import Stream
+from drivers.kinect1.device import Kinect1Device
+from drivers.kinect1.opening import find, open_camera
+from drivers.kinect1.reference_plane import ReferencePlane
+from tests.drivers.kinect1.emulator import EmulatedKinect, noise
+from tests.drivers.kinect1.fake_usb import FakeBackend, FakeDevice, FakeReader
+from tests.drivers.kinect1.listener import Listener
+from tests.drivers.kinect1.packing import unpack
+
+SERIAL = "A00363A01234040A"
+BOTH = (Stream.DEPTH, Stream.COLOR)
+
+
+@pytest.fixture
+def fake() -> FakeDevice:
+    return FakeDevice(noise(), SERIAL)
+
+
+def opened(fake: FakeDevice, streams: tuple[Stream, ...] = BOTH, **of_backend: bool) -> Kinect1Device:
+    backend = FakeBackend([fake], **of_backend)
+    return open_camera(Address("", streams), time.monotonic_ns, lambda: backend, FakeReader)
+
+
+def test_depth_in_metres_and_the_mosaic_as_it_was_measured(fake: FakeDevice) -> None:
+    fake.hasty = True
+    device, listener = opened(fake), Listener()
+    device.start(listener)
+    listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= 4)
+    device.close()
+    table = np.nan_to_num(ReferencePlane().z())
+    films = fake.kinect.films
+    for frame in listener.of("depth")[:4]:
+        raw = unpack(films["depth"].shown(frame.t_device_ticks // 2_000_000), 11)
+        assert (frame.kind, frame.geometry, frame.encoding) == (Kind.DEPTH, Geometry.Z, "16UC1")
+        np.testing.assert_allclose(
+            np.nan_to_num(frame.si()).ravel(), np.where(table < 13.1, table, 0)[raw], atol=1.1e-4
+        )
+    for frame in listener.of("bayer")[:4]:
+        assert (frame.kind, frame.encoding, frame.data.shape) == (Kind.BAYER, "bayer_grbg8", (480, 640))
+        assert frame.data.tobytes() == films["color"].shown(frame.t_device_ticks // 2_000_000)
+        assert frame.calib_id == device.cameras["color"].calib_id
+    assert device.counters["frames"] == len(listener.frames)
+
+
+def test_infrared_instead_of_color(fake: FakeDevice) -> None:
+    fake.hasty = True
+    device, listener = opened(fake, (Stream.IR,)), Listener()
+    assert {camera.height for camera in device.cameras.values()} == {488}
+    device.start(listener)
+    listener.wait(lambda: len(listener.frames) >= 2)
+    device.close()
+    first = listener.frames[0]
+    raw = unpack(fake.kinect.films["ir"].shown(first.t_device_ticks // 2_000_000), 10)
+    np.testing.assert_array_equal(first.data.ravel(), raw)
+    assert "exposure_s" not in [control.name for control in device.capabilities.controls]
+
+
+def test_stamps_are_evenly_spaced_and_count_the_first_packet(fake: FakeDevice) -> None:
+    device, listener = opened(fake, (Stream.DEPTH,)), Listener()
+    device.start(listener)
+    listener.wait(lambda: len(listener.frames) >= 10)
+    device.close()
+    stamps = np.array([frame.t_host_ns for frame in listener.frames]) * 1e-9
+    np.testing.assert_allclose(np.diff(stamps), 1 / 30, atol=5e-3)
+    delays = [frame.t_arrival_ns - frame.t_host_ns for frame in listener.frames]
+    assert 25e6 < np.median(delays) < 45e6  # the last packet comes 242 microframes after the first
+    assert device.gauges["clock.depth/depth.steps"] == 0
+
+
+def test_controls_reach_the_camera(fake: FakeDevice) -> None:
+    device = opened(fake)
+    device.controls.set("auto_exposure", False)
+    device.controls.set("exposure_s", 0.02)
+    device.controls.set("auto_white_balance", False)
+    device.controls.set("infrared_gain", 12)
+    assert fake.kinect.color_sensor == {0x09: round(0.02 / 54.21e-6), 0x106: 0x0010}
+    assert device.controls.get("infrared_gain") == 12
+    with pytest.raises(ControlError, match="from 1 to 50"):
+        device.controls.set("infrared_gain", 51)
+    device.close()
+    with pytest.raises(DeviceError, match="closed"):
+        device.controls.get("infrared_gain")
+
+
+def test_pulling_the_plug_fails_the_device_and_plugging_it_in_lets_it_be_opened_again(fake: FakeDevice) -> None:
+    device, listener = opened(fake), Listener()
+    device.start(listener)
+    listener.wait(lambda: len(listener.frames) > 0)
+    fake.plugged = False
+    assert "unplugged" in listener.wait_for(DeviceState.FAILED)
+    device.close()
+    with pytest.raises(DeviceError, match="no kinect1 device is attached"):
+        opened(fake)
+    fake.plugged = True
+    device, listener = opened(fake), Listener()
+    device.start(listener)
+    listener.wait(lambda: len(listener.frames) > 0)
+    device.close()
+    assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
+
+
+def test_closing_from_within_the_sink_lets_go_of_the_camera(fake: FakeDevice) -> None:
+    device = opened(fake)
+
+    class Impatient(Listener):
+        def on_frame(self, frame) -> None:
+            super().on_frame(frame)
+            device.close()
+
+    listener = Impatient()
+    device.start(listener)
+    listener.wait(lambda: len(listener.frames) > 0)
+    device._thread.join(10)
+    assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
+    assert len(listener.frames) == 1
+    assert fake.kinect.registers[0x06] == 0
+
+
+def test_a_kernel_driver_gives_way(fake: FakeDevice) -> None:
+    fake.kernel_driver = True
+    assert find(lambda: FakeBackend([fake]))[0].availability == Availability.READY
+    opened(fake).close()
+    assert not fake.kernel_driver
+
+
+def test_a_kernel_driver_that_does_not_let_go_is_named(fake: FakeDevice) -> None:
+    fake.kernel_driver = fake.stubborn = True
+    with pytest.raises(DeviceError, match="modprobe -r gspca_kinect"):
+        opened(fake)
+    assert fake.opened == 0
+
+
+def test_without_permission_the_message_holds_the_rule_and_where_to_put_it(fake: FakeDevice) -> None:
+    fake.refusal = errno.EACCES
+    (found,) = find(lambda: FakeBackend([fake]))
+    assert found.availability == Availability.NO_PERMISSION
+    with pytest.raises(DeviceError, match=r"/etc/udev/rules\.d/60-abs-service\.rules") as caught:
+        opened(fake)
+    assert 'ATTR{idProduct}=="02ae"' in str(caught.value)
+
+
+def test_two_programs_cannot_have_one_camera(fake: FakeDevice) -> None:
+    device = opened(fake)
+    assert find(lambda: FakeBackend([fake]))[0].availability == Availability.BUSY
+    with pytest.raises(DeviceError, match="another program"):
+        opened(fake)
+    device.close()
+    opened(fake).close()
+
+
+def test_a_slow_link_is_noticed(fake: FakeDevice) -> None:
+    fake.speed = 2
+    (found,) = find(lambda: FakeBackend([fake]))
+    assert (found.availability, found.info.link) == (Availability.FAULTY, "USB 1, 12 Mbit/s")
+
+
+def test_a_camera_without_a_number_has_that_of_the_audio_part_beside_it() -> None:
+    camera = FakeDevice(noise(), "0" * 16, product=0x02BF, ports=(1, 4, 1))
+    audio = FakeDevice(EmulatedKinect({}), "B44887234567890B", product=0x02BE, ports=(1, 4, 2))
+    elsewhere = FakeDevice(EmulatedKinect({}), "B00000000000001B", product=0x02BE, ports=(1, 5, 2))
+    (found,) = find(lambda: FakeBackend([elsewhere, camera, audio], wide=True))
+    assert found.info.uri == "kinect1://B44887234567890B"
+    assert found.info.model == "Kinect for Windows"
+    (found,) = find(lambda: FakeBackend([elsewhere, camera], wide=True))
+    assert found.info.serial == ""
+    assert camera.opened == audio.opened == elsewhere.opened == 0
+
+
+def test_the_setting_with_pipes_is_chosen(fake: FakeDevice) -> None:
+    opened(fake, wide=True).close()
+    assert fake.settings == [1]
+
+
+def test_a_configured_camera_is_not_configured_again(fake: FakeDevice) -> None:
+    fake.configuration = 0
+    opened(fake).close()
+    assert fake.configuration == 1
+
+
+def test_two_cameras_are_told_apart_by_their_numbers(fake: FakeDevice) -> None:
+    other = FakeDevice(noise(seed=2), "B00363A01234040B", ports=(2, 1))
+    backend = FakeBackend([fake, other])
+    with pytest.raises(DeviceError, match=f"kinect1://{SERIAL}, kinect1://{other.serial}"):
+        open_camera(Address(), time.monotonic_ns, lambda: backend, FakeReader)
+    device = open_camera(Address(other.serial), time.monotonic_ns, lambda: backend, FakeReader)
+    assert device.info.serial == other.serial
+    assert (fake.claims, other.claims) == (0, 1)
+    device.close()
+
+
+@pytest.mark.parametrize(
+    ("uri", "complaint"),
+    [
+        ("kinect1://?streams=depth,colour", "some of depth, color and ir"),
+        ("kinect1://?streams=color,ir", "only one of the two"),
+        ("kinect1://?streams=depth,depth", "each once"),
+        ("kinect1://?streams=", "some of"),
+        ("kinect1://?rate=30", "unknown key 'rate'"),
+        ("kinect1://?streams=ir&streams=depth", "twice"),
+        ("kinect1://A/b", "nothing may follow"),
+    ],
+)
+def test_an_address_that_is_none_says_what_is_allowed(uri: str, complaint: str) -> None:
+    with pytest.raises(AddressError, match=complaint):
+        parse(uri)
+
+
+def test_addresses() -> None:
+    assert parse("kinect1://") == Address("", BOTH)
+    assert parse(f"kinect1://{SERIAL}?streams=ir,depth") == Address(SERIAL, (Stream.IR, Stream.DEPTH))
+
+
+def test_pyusb_is_imported_only_when_it_is_needed() -> None:
+    code = "import sys, drivers.kinect1; sys.exit(any(name.split('.')[0] == 'usb' for name in sys.modules))"
+    assert (
+        subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, check=False).returncode
+        == 0
+    )
