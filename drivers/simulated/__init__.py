@@ -17,7 +17,8 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     Raises:
         AddressError: the address is not understood; names key, value and what is allowed.
     """
-    return SimulatedDevice(uri, parse(uri).build(), clock)
+    address = parse(uri)
+    return SimulatedDevice(uri, address.build(), clock, misbehaviour=address.fault)
 
 
 def discover(timeout_s: float) -> list[Found]:

@@ -9,9 +9,10 @@ from urllib.parse import parse_qsl, urlsplit
 from calib.lens import COEFFICIENTS, LensError, LensModel
 from calib.lenses import lens_of
 from drivers.device import AddressError
-from drivers.simulated import values
+from drivers.simulated import faults, values
 from drivers.simulated.bayer import ORDERS, Mosaic
 from drivers.simulated.excursion import Excursion
+from drivers.simulated.faults import Misbehaviour
 from drivers.simulated.heads import Equipment
 from drivers.simulated.optics import BEAMS, OPTICS
 from drivers.simulated.scenes import SCENES, Choices
@@ -31,6 +32,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "speed": values.number(float, 0, 5),
     "jitter_ms": values.number(float, 0, 100),
     "occluder": values.one_of("none", "hand"),
+    "fault": faults.read,
     "turn": values.number(float, 0, 3600),
     "leave": values.interval(0, 3600),
     "stiffness": values.number(float, 0.0005, 10),
@@ -84,6 +86,7 @@ class Address:
         bend: largest bend of the sheet from end to end [degrees].
         speed: factor on the speed of all motion; with 0 nothing ever moves.
         jitter_ms: standard deviation of the error of the frames' stamps [ms].
+        fault: what goes wrong and with which exposure that begins, `fault=stall@20` for example; see `faults.Fault`.
         occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
         turn: when everything to be tracked turns by 90° in a quarter of a second, and stays so [s].
         leave: from when until when it is out of view [s]; in the address `leave=3,5`.
@@ -114,6 +117,7 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
+    fault: Misbehaviour = field(default_factory=Misbehaviour)
     turn: float = math.inf
     leave: tuple[float, float] = (math.inf, math.inf)
     stiffness: float = 0.01

@@ -8,28 +8,39 @@ from calib.camera import Camera
 from drivers.capabilities import Capabilities
 from drivers.controls import Controls
 from drivers.delivery import Delivery
-from drivers.device import DeviceInfo, DeviceState, Sink
+from drivers.device import DeviceInfo, DeviceState, Sink, Truth
+from drivers.frame import Frame
+from drivers.simulated.faults import Fault, Misbehaviour, spoilt
 from drivers.simulated.simulation import Simulation
 
 #: Waits until the event is set or so many seconds have passed; tells whether it is set.
 Wait = Callable[[threading.Event, float], bool]
+
+#: A device without a fault.
+SOUND = Misbehaviour()
 
 
 class SimulatedDevice:
     """Delivers exposure after exposure in real time.
 
     An exposure that is due by more than a period before it can be begun is skipped and counted as `late`; its number is
-    skipped, too. Nothing else is ever dropped.
+    skipped, too. Nothing else is ever dropped, unless the address asks for a fault.
 
     Args:
         uri: the address that describes the simulation.
         simulation: what is seen.
         clock: CLOCK_MONOTONIC [ns].
         wait: how to pass time; tests pass their own.
+        misbehaviour: what goes wrong, and when.
     """
 
     def __init__(
-        self, uri: str, simulation: Simulation, clock: Callable[[], int], wait: Wait = threading.Event.wait
+        self,
+        uri: str,
+        simulation: Simulation,
+        clock: Callable[[], int],
+        wait: Wait = threading.Event.wait,
+        misbehaviour: Misbehaviour = SOUND,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="simulated", serial=f"seed {simulation.seed}")
         self.capabilities = Capabilities(tuple(s for head in simulation.heads.values() for s in head.streams))
@@ -38,7 +49,8 @@ class SimulatedDevice:
         self._simulation = simulation
         self._clock = clock
         self._wait = wait
-        self._delivery = Delivery(self.capabilities.streams, causes=["late"])
+        self._misbehaviour = misbehaviour
+        self._delivery = Delivery(self.capabilities.streams, causes=["late", "lost"])
         self._thread = threading.Thread()
 
     @property
@@ -48,7 +60,7 @@ class SimulatedDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and exposures skipped because it was too `late` for them."""
+        """`frames` delivered, exposures skipped because it was too `late` for them, and frames `lost` by a fault."""
         return self._delivery.counters
 
     @property
@@ -98,9 +110,24 @@ class SimulatedDevice:
             frames, truths = self._simulation.frames(k), self._simulation.truths(k)
             if self._wait(stop, max(first_ns + self._simulation.time_ns(k) - self._clock(), 0) * 1e-9):
                 return
-            for truth in truths:
-                self._delivery.truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
-            for frame in () if stop.is_set() else frames:
-                t_host_ns, t_arrival_ns = first_ns + frame.t_host_ns, self._clock()
-                self._delivery.frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=epoch))
+            match fault := self._misbehaviour.at(k):
+                case Fault.STALL:
+                    stop.wait()
+                    return
+                case Fault.UNPLUG:
+                    self._delivery.report(DeviceState.FAILED, "unplugged, as the address says")
+                    return
+                case Fault.DROP:
+                    self._delivery.drop("lost", len(frames))
+                case _:
+                    self._deliver([spoilt(frame, fault) for frame in frames], truths, first_ns, epoch)
+            if stop.is_set():
+                return
             k += 1
+
+    def _deliver(self, frames: list[Frame], truths: list[Truth], first_ns: int, epoch: int) -> None:
+        for truth in truths:
+            self._delivery.truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
+        for frame in frames:
+            t_host_ns, t_arrival_ns = first_ns + frame.t_host_ns, self._clock()
+            self._delivery.frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=epoch))

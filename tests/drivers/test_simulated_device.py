@@ -75,7 +75,7 @@ def test_exposures_arrive_when_they_are_due() -> None:
     for frame in sink.frames:
         assert frame.t_host_ns == 5_000_000_000 + round(frame.seq * 1e9 / 30)
         assert 0 <= frame.t_arrival_ns - frame.t_host_ns < 10
-    assert device.counters == {"frames": len(sink.frames), "late": 0}
+    assert device.counters == {"frames": len(sink.frames), "late": 0, "lost": 0}
     assert [truth.t_host_ns for truth in sink.truths[:3]] == [frame.t_host_ns for frame in sink.frames[:9:3]]
 
 
@@ -84,6 +84,12 @@ def test_exposures_that_are_overdue_are_skipped_and_counted() -> None:
     sequence = [truth.seq for truth in sink.truths]
     assert sequence[:4] == [0, 1, 4, 5]
     assert device.counters["late"] == 2
+
+
+def test_a_fault_that_passes_loses_what_it_says() -> None:
+    device, sink = run(f"{SMALL}&fault=drop@2", Time(), 12)
+    assert [truth.seq for truth in sink.truths][:4] == [0, 1, 3, 5]
+    assert device.counters["lost"] >= 3 * 2
 
 
 def test_nothing_arrives_after_stop_and_a_new_start_is_a_new_epoch() -> None:
@@ -169,6 +175,11 @@ def test_defaults_are_the_demonstration_rig() -> None:
         ("simulated://sheet?sensors=", r"sensors = '' must be"),
         ("simulated://sheet?sensors=tof,tof", "each once"),
         ("simulated://sheet?occluder=cat", r"occluder = 'cat' must be one of \['hand', 'none'\]"),
+        (
+            "simulated://sheet?fault=stall",
+            r"fault = 'stall' must be FAULT@EXPOSURE, for example stall@20; .* nan, stall",
+        ),
+        ("simulated://sheet?fault=fire@3", r"fault = 'fire@3' must be FAULT@EXPOSURE"),
         ("simulated://sheet?lens=round", r"lens = 'round' must be 1 to 8 numbers from -1 to 1 with commas"),
         ("simulated://sheet?lens=0,0,0,0,0,0,0,0,0", "lens = .* must be 1 to 8 numbers"),
         ("simulated://sheet?lens=", "lens = '' must be 1 to 8 numbers"),

@@ -23,7 +23,7 @@ def test_scenes_heads_and_keys_are_those_there_are() -> None:
 def test_defaults_are_those_of_the_address() -> None:
     defaults = dict(re.findall(r"^\| `(\w+)` \| `?([\w.,]+)`? \|", PAGE.partition("## Keys")[2], re.M))
     known = {key: value for key, value in defaults.items() if value != "never"}
-    assert len(known) == len(KEYS) - len(OPTICS) - 2
+    assert len(known) == len(KEYS) - len(OPTICS) - 3
     for key, value in known.items():
         expected = getattr(Address("sheet"), key)
         assert KEYS[key](value) == expected, key
