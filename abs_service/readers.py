@@ -75,7 +75,7 @@ def reader(sensor: Sensor) -> Reader:
 
 class _DepthReader:
     def __init__(self, camera: Camera):
-        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)  # radial distance per unit of z
+        self._ray_length = camera.lookup.ray_length.astype(np.float32)  # radial distance per unit of z
 
     def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]

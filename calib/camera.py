@@ -1,12 +1,13 @@
 """A calibrated camera: multi-sensor projection of eq. 10 and its inverse."""
 
+import functools
 import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import pose
+from calib import lookup, pose
 from calib.lens import Lens, LensModel
 from calib.pose import Pose
 
@@ -64,6 +65,26 @@ class Camera:
         kind = b"" if isinstance(self.lens, Lens) else self.lens.name.encode()
         return hashlib.sha256(payload + kind).hexdigest()[:16]
 
+    @functools.cached_property
+    def lookup(self) -> lookup.Lookup:
+        """Where every pixel looks; built when it is first asked for.
+
+        Raises:
+            LensError: if the lens has no inverse somewhere on the image.
+        """
+        return lookup.build((self.width, self.height), (self.fx, self.fy, self.cx, self.cy), self.lens)
+
+    @property
+    def field_radius(self) -> float:
+        """Largest x/z and y/z, as a radius, that the camera sees, with a margin of a pixel.
+
+        Beyond, the polynomial of a lens may fold back into the image, or leave the range of numbers.
+
+        Raises:
+            LensError: if the lens has no inverse somewhere on the image.
+        """
+        return self.lookup.radius * (1 + 2 / min(self.width, self.height)) + 1 / min(self.fx, self.fy)
+
     def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
         """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points at or behind the camera plane."""
         points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
@@ -93,7 +114,7 @@ class Camera:
         Raises:
             LensError: if the lens has no inverse somewhere on the image.
         """
-        return self.directions(np.stack(np.meshgrid(np.arange(self.width), np.arange(self.height)), axis=-1))
+        return self.lookup.rays
 
     def directions(self, pixels: NDArray[np.number]) -> NDArray[np.float64]:
         """Unit directions (…, 3) in sensor coordinates of the lines of sight through pixel coordinates (…, 2).
@@ -107,4 +128,4 @@ class Camera:
 
     def unproject(self, distance: NDArray[np.floating]) -> NDArray[np.float64]:
         """Rig points (height, width, 3) [m] of a radial distance image [m]; NaN stays NaN."""
-        return pose.transform(self.T_rs, self.rays() * np.asarray(distance, np.float64)[..., None])
+        return pose.transform(self.T_rs, self.lookup.rays * np.asarray(distance, np.float64)[..., None])

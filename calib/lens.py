@@ -165,16 +165,18 @@ class Lens:
         ideal = target.copy()
         if self.is_pinhole:
             return ideal.reshape(np.shape(xy))
-        found = np.zeros(len(ideal), np.bool_)
+        moving = np.arange(len(ideal))
         with np.errstate(all="ignore"):
             for _ in range(30):
-                residual = self.distort(ideal) - target
-                found = np.all(np.abs(residual) < TOLERANCE, axis=1) & self._is_before_fold(ideal)
-                if found.all():
+                residual = self.distort(ideal[moving]) - target[moving]
+                left = ~np.all(np.abs(residual) < TOLERANCE, axis=1)
+                moving, residual = moving[left], residual[left]
+                if len(moving) == 0:
                     break
-                ideal -= _solved(self.jacobian(ideal), residual)
+                ideal[moving] -= _solved(self.jacobian(ideal[moving]), residual)
                 ideal[~np.all(np.abs(ideal) < FARTHEST, axis=1)] = np.nan
-        ideal[~found] = np.nan
+            ideal[moving] = np.nan
+            ideal[~self._is_before_fold(ideal)] = np.nan
         return ideal.reshape(np.shape(xy))
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -193,8 +195,8 @@ class Lens:
         """
         before = np.ones(len(xy), np.bool_)
         for part in (0.25, 0.5, 0.75, 1.0):
-            jacobian = self.jacobian(part * xy)
-            before &= (np.linalg.det(jacobian) > 0) & (np.trace(jacobian, axis1=1, axis2=2) > 0)
+            a, b, c, d = np.moveaxis(self.jacobian(part * xy).reshape(-1, 4), -1, 0)
+            before &= (a * d > b * c) & (a + d > 0)
         return before
 
 

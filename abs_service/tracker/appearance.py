@@ -11,7 +11,6 @@ from abs_service.images import LUMA, ChannelImage, ColorImage, Image
 from abs_service.tracker.demosaicing import demosaiced
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.raster import field_radius
 from abs_service.tracker.terms.illumination import lambert
 from calib import pose
 from calib.camera import Camera
@@ -141,7 +140,7 @@ def _place(camera: Camera, points: Values) -> Values:
         aside = np.linalg.norm(local[:, :2], axis=1) / local[:, 2]
         place = camera.project(points)
         pixel = np.floor(place + 0.5)
-        seen = (aside < field_radius(camera)) & np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
+        seen = (aside < camera.field_radius) & np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=1)
     return np.where((seen & (local[:, 2] > 0))[:, None], place, np.nan)
 
 

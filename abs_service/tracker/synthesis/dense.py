@@ -97,7 +97,7 @@ class DenseView:
         self._step = step
         self._detail = detail
         self._projection = Projection(camera)
-        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)
+        self._ray_length = camera.lookup.ray_length.astype(np.float32)
         self._expected = 0.0
         self._last: tuple[Surface | None, Samples, NDArray[np.float64]] = (None, _NONE, np.zeros(0))
 

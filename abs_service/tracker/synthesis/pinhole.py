@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.raster import field_radius
 from calib.camera import Camera
 
 #: The image of the camera without distortion is at most so many times as wide and as high as the original.
@@ -44,6 +43,6 @@ def lookup(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
     place = camera.lens.distort(ideal) * (camera.fx, camera.fy) + (camera.cx, camera.cy)
     pixel = np.floor(place + 0.5)
     inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=-1)
-    inside &= np.linalg.norm(ideal, axis=-1) < field_radius(camera)  # beyond, the polynomial may fold back
+    inside &= np.linalg.norm(ideal, axis=-1) < camera.field_radius  # beyond, the polynomial may fold back
     column, row = np.where(inside[..., None], pixel, -1).astype(np.int32).transpose(2, 0, 1)
     return np.pad((row + 1) * (camera.width + 2) + column + 1, 1).astype(np.int32) * np.pad(inside, 1)

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.raster import field_radius
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.forward import bend_fisheye
@@ -18,7 +17,7 @@ class Projection:
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
         self._kernel = _project_fisheye if isinstance(camera.lens, KannalaBrandt) else _project
-        self._limit = field_radius(camera) ** 2
+        self._limit = camera.field_radius**2
 
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].

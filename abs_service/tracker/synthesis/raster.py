@@ -16,8 +16,8 @@ class Raster:
     def __init__(self, camera: Camera, faces: NDArray[np.int32]):
         self._camera = camera
         self._faces = np.ascontiguousarray(faces, np.int32)
-        self._ray_length = (1 / camera.rays()[..., 2]).astype(np.float32)
-        self._limit = field_radius(camera)
+        self._ray_length = camera.lookup.ray_length.astype(np.float32)
+        self._limit = camera.field_radius
 
     def render(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite where it is not."""
@@ -32,18 +32,6 @@ class Raster:
         _nearest(place.astype(np.float32), inverse_z.astype(np.float32), self._faces, nearness)
         with np.errstate(divide="ignore"):
             return self._ray_length / nearness
-
-
-def field_radius(camera: Camera) -> float:
-    """Largest x/z and y/z, as a radius, that the camera sees.
-
-    Beyond, the polynomial of a lens may fold back into the image, or leave the range of numbers.
-    """
-    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    rim = (columns % (camera.width - 1 or 1) == 0) | (rows % (camera.height - 1 or 1) == 0)
-    directions = camera.directions(np.stack([columns[rim], rows[rim]], axis=-1))
-    radius = np.linalg.norm(directions[:, :2], axis=1) / directions[:, 2]
-    return float(radius.max() * (1 + 2 / min(camera.width, camera.height)) + 1 / min(camera.fx, camera.fy))
 
 
 @kernel

@@ -9,7 +9,7 @@ from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
-from abs_service.tracker.synthesis.raster import Raster, field_radius
+from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sampling import sampler
 from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
 from calib.camera import Camera
@@ -89,7 +89,7 @@ class SparseView:
         self._lens = camera.lens.coefficients.astype(np.float32)
         self._sample = sampler(camera.lens)
         self._size = (camera.height, camera.width)
-        self._limit = field_radius(camera) ** 2
+        self._limit = camera.field_radius**2
 
     def look(self, predicted: Surface) -> None:
         """Hides the vertices that face away, or are behind the mesh's own surface, in the predicted mesh."""

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.raster import field_radius
 from calib import pose
 from calib.camera import Camera
 
@@ -14,7 +13,7 @@ class Shadow:
 
     def __init__(self, camera: Camera):
         self._camera = camera
-        self._limit = field_radius(camera)
+        self._limit = camera.field_radius
 
     def mask(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Pixels (height, width) that points (k, 3) [m], neighbours in another sensor's image, cover.
