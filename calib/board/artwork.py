@@ -1,0 +1,100 @@
+"""What is printed on a board: black and white shapes in the board's frame, for paper and for simulated boards alike."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.board.target import Charuco, Chessboard, Target
+
+#: Width of a marker's black frame, in cells.
+_FRAME = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Artwork:
+    """Black shapes on white.
+
+    Attributes:
+        rectangles: left, top, width, height (n, 4) [m].
+        discs: x and y of the centre, and the radius (m, 3) [m].
+    """
+
+    rectangles: NDArray[np.float64]
+    discs: NDArray[np.float64]
+
+
+def artwork(target: Target) -> Artwork:
+    """The shapes of a board in its own frame: the first corner, or the first disc's centre, is at (0, 0)."""
+    if isinstance(target, Chessboard):
+        return Artwork(_black_squares(target.columns + 1, target.rows + 1, target.square), np.zeros((0, 3)))
+    if isinstance(target, Charuco):
+        squares = _black_squares(target.columns, target.rows, target.square)
+        return Artwork(np.concatenate([squares, _markers(target)]), np.zeros((0, 3)))
+    centers = target.points()[:, :2]
+    radius = np.full((len(centers), 1), target.diameter / 2)
+    return Artwork(np.zeros((0, 4)), np.concatenate([centers, radius], axis=1))
+
+
+def _squares(columns: int, rows: int, square: float, odd: int) -> NDArray[np.float64]:
+    """Left, top, width, height of the squares whose column and row add up to an even number, or to an odd one."""
+    row, column = np.indices((rows, columns))
+    chosen = (row + column) % 2 == odd
+    edge = np.full(np.count_nonzero(chosen), square)
+    return np.stack([(column[chosen] - 1) * square, (row[chosen] - 1) * square, edge, edge], axis=1)
+
+
+def _black_squares(columns: int, rows: int, square: float) -> NDArray[np.float64]:
+    return _squares(columns, rows, square, odd=0)
+
+
+def _markers(target: Charuco) -> NDArray[np.float64]:
+    """The black cells of all markers, those side by side in a row joined, so that no gap shows between them."""
+    dictionary = target.markers()
+    cells = dictionary.markerSize + 2 * _FRAME
+    cell = target.marker / cells
+    white = _squares(target.columns, target.rows, target.square, odd=1)
+    found = []
+    for number, (left, top, edge, _) in enumerate(white):
+        black = cv2.aruco.generateImageMarker(dictionary, number, cells) < 128
+        inset = (edge - target.marker) / 2
+        for row, line in enumerate(black):
+            ends = np.flatnonzero(np.diff(np.concatenate([[0], line.astype(int), [0]])))
+            for begin, end in ends.reshape(-1, 2):
+                x, y = left + inset + begin * cell, top + inset + row * cell
+                found.append((x, y, (end - begin) * cell, cell))
+    return np.array(found)
+
+
+def raster(target: Target, density: float, samples: int = 4) -> tuple[NDArray[np.float32], tuple[float, float]]:
+    """The print as an image of how white it is, 0 to 1, with a white rim as wide as its margin.
+
+    Args:
+        target: the board.
+        density: pixels per metre.
+        samples: per pixel and axis; a pixel is the mean of what they see.
+
+    Returns:
+        The image (rows, columns), and where the centre of its first pixel is in the board's frame, (x, y) [m].
+    """
+    shapes, points = artwork(target), target.points()[:, :2]
+    rim = 2 * target.margin
+    left, top = points.min(axis=0) - rim
+    width, height = np.ptp(points, axis=0) + 2 * rim
+    fine = samples * density
+    size = samples * round(height * density), samples * round(width * density)
+    x = left + (np.arange(size[1]) + 0.5) / fine
+    y = top + (np.arange(size[0]) + 0.5) / fine
+    white = np.ones(size, np.float32)
+    for rectangle in shapes.rectangles:
+        columns = np.searchsorted(x, (rectangle[0], rectangle[0] + rectangle[2]))
+        rows = np.searchsorted(y, (rectangle[1], rectangle[1] + rectangle[3]))
+        white[slice(*rows), slice(*columns)] = 0
+    for center_x, center_y, radius in shapes.discs:
+        columns = slice(*np.searchsorted(x, (center_x - radius, center_x + radius)))
+        rows = slice(*np.searchsorted(y, (center_y - radius, center_y + radius)))
+        inside = (x[None, columns] - center_x) ** 2 + (y[rows, None] - center_y) ** 2 <= radius**2
+        white[rows, columns][inside] = 0
+    mean = white.reshape(size[0] // samples, samples, size[1] // samples, samples).mean(axis=(1, 3))
+    return mean, (left + 0.5 / density, top + 0.5 / density)

@@ -1,0 +1,222 @@
+"""The kinds of boards there are, in the frame of `calib.views`: origin in the first corner, x along the first row."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Points = NDArray[np.float64]
+
+Dictionary = Literal[
+    "4x4_50", "4x4_100", "4x4_250", "4x4_1000", "5x5_50", "5x5_100", "5x5_250", "5x5_1000", "6x6_50", "6x6_100",
+    "6x6_250", "6x6_1000", "7x7_50", "7x7_100", "7x7_250", "7x7_1000", "original",
+]  # fmt: skip
+
+#: OpenCV's sets of markers; their order is that of its numbers.
+DICTIONARIES: tuple[Dictionary, ...] = get_args(Dictionary)
+
+
+class TargetError(ValueError):
+    """Numbers that describe no board; the message begins with the attribute that is wrong."""
+
+
+@dataclass(frozen=True)
+class Chessboard:
+    """Black and white squares, black in the upper left corner; its corners are where four squares meet.
+
+    With `columns + rows` odd there is one way up. Otherwise a board that is turned by 180° looks the same, and corners
+    are counted so that x points to the right of the image: sensors that are rolled by 90° and more will disagree.
+
+    Attributes:
+        columns, rows: inner corners along x and y: one less than squares.
+        square: edge of a square [m].
+    """
+
+    columns: int
+    rows: int
+    square: float
+
+    def __post_init__(self) -> None:
+        _check_counts(self.columns, self.rows, 3)
+        _check_length("square", self.square)
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of points."""
+        return self.columns, self.rows
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring points [m]."""
+        return self.square
+
+    @property
+    def margin(self) -> float:
+        """How far the print reaches beyond the outer points [m]."""
+        return self.square
+
+    def points(self) -> Points:
+        """Corners row by row (n, 3) [m]."""
+        return _lattice(self.columns, self.rows, self.square)
+
+
+@dataclass(frozen=True)
+class Charuco:
+    """A chessboard with an ArUco marker in every white square, which is found even where only a part is seen.
+
+    It has one way up whatever its size, and the only kind that tells a mirror image. Markers are numbered row by row.
+
+    Attributes:
+        columns, rows: squares along x and y; there is a corner less each way.
+        square, marker: edges of a square and of a marker [m].
+        dictionary: OpenCV's set that the markers are taken from.
+    """
+
+    columns: int
+    rows: int
+    square: float
+    marker: float
+    dictionary: Dictionary = "5x5_250"
+
+    def __post_init__(self) -> None:
+        _check_counts(self.columns, self.rows, 3)
+        _check_length("square", self.square)
+        _check_length("marker", self.marker)
+        if self.marker >= self.square:
+            raise TargetError(f"marker: {self.marker:g} m must be less than the square of {self.square:g} m around it")
+        if self.dictionary not in DICTIONARIES:
+            raise TargetError(f"dictionary: {self.dictionary!r} is none of {', '.join(DICTIONARIES)}")
+        markers, needed = len(self.markers().bytesList), self.columns * self.rows // 2
+        if needed > markers:
+            raise TargetError(f"dictionary: {self.dictionary} has {markers} markers, this board needs {needed}")
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of points."""
+        return self.columns - 1, self.rows - 1
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring points [m]."""
+        return self.square
+
+    @property
+    def margin(self) -> float:
+        """How far the print reaches beyond the outer points [m]."""
+        return self.square
+
+    def points(self) -> Points:
+        """Corners row by row (n, 3) [m]; the row number in it is the corner's number in OpenCV."""
+        return _lattice(*self.grid, self.square)
+
+    def markers(self) -> cv2.aruco.Dictionary:
+        """OpenCV's dictionary."""
+        return cv2.aruco.getPredefinedDictionary(DICTIONARIES.index(self.dictionary))
+
+
+@dataclass(frozen=True)
+class Circles:
+    """Black discs on a regular grid.
+
+    Turned by 180° it looks the same; discs are counted so that x points to the right of the image.
+
+    Attributes:
+        columns, rows: discs along x and y.
+        spacing: distance of the centres of neighbours [m].
+        diameter: of a disc [m].
+    """
+
+    columns: int
+    rows: int
+    spacing: float
+    diameter: float
+
+    def __post_init__(self) -> None:
+        _check_discs(self.columns, self.rows, self.spacing, self.diameter, "spacing")
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of points."""
+        return self.columns, self.rows
+
+    @property
+    def margin(self) -> float:
+        """How far the print reaches beyond the outer points [m]."""
+        return self.diameter / 2
+
+    def points(self) -> Points:
+        """Centres row by row (n, 3) [m]."""
+        return _lattice(self.columns, self.rows, self.spacing)
+
+
+@dataclass(frozen=True)
+class AsymmetricCircles:
+    """Black discs in rows that are shifted against each other, every second row by `spacing`; it has one way up.
+
+    Attributes:
+        columns: discs in a row.
+        rows: an odd number.
+        spacing: distance of the rows, and half that of the discs in a row [m].
+        diameter: of a disc [m].
+    """
+
+    columns: int
+    rows: int
+    spacing: float
+    diameter: float
+
+    def __post_init__(self) -> None:
+        _check_discs(self.columns, self.rows, self.spacing, self.diameter, "spacing")
+        if self.rows % 2 == 0:
+            raise TargetError(f"rows: {self.rows} must be odd; with an even number the board has two ways up")
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Columns and rows of points."""
+        return self.columns, self.rows
+
+    @property
+    def margin(self) -> float:
+        """How far the print reaches beyond the outer points [m]."""
+        return self.diameter / 2
+
+    def points(self) -> Points:
+        """Centres row by row (n, 3) [m]."""
+        row, column = np.divmod(np.arange(self.columns * self.rows), self.columns)
+        return self.spacing * np.stack([2 * column + row % 2, row, 0 * row], axis=1, dtype=np.float64)
+
+
+Target = Chessboard | Charuco | Circles | AsymmetricCircles
+
+
+def outline(target: Target) -> Points:
+    """Corners (4, 3) [m] of the rectangle that the print fills, clockwise from the upper left."""
+    points, margin = target.points()[:, :2], target.margin
+    (left, top), (right, bottom) = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return np.array([[left, top, 0], [right, top, 0], [right, bottom, 0], [left, bottom, 0]])
+
+
+def _lattice(columns: int, rows: int, spacing: float) -> Points:
+    row, column = np.divmod(np.arange(columns * rows), columns)
+    return spacing * np.stack([column, row, 0 * row], axis=1, dtype=np.float64)
+
+
+def _check_counts(columns: int, rows: int, least: int) -> None:
+    for name, count in (("columns", columns), ("rows", rows)):
+        if not least <= count <= 100:
+            raise TargetError(f"{name}: {count} must be from {least} to 100")
+
+
+def _check_length(name: str, length: float) -> None:
+    if not 1e-4 <= length <= 10:
+        raise TargetError(f"{name}: {length:g} m must be from 0.0001 to 10 m; lengths are in metres")
+
+
+def _check_discs(columns: int, rows: int, spacing: float, diameter: float, name: str) -> None:
+    _check_counts(columns, rows, 3)
+    _check_length(name, spacing)
+    _check_length("diameter", diameter)
+    if diameter >= spacing:
+        raise TargetError(f"diameter: {diameter:g} m must be less than the {name} of {spacing:g} m")
