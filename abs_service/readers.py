@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import LUMA, BeamReading, ChannelImage, ColorImage, DepthImage, Image
-from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
@@ -60,7 +59,7 @@ def reader(sensor: Sensor) -> Reader:
     """The reader for what a sensor's noise model is about."""
     match sensor.noise:
         case DepthNoise():
-            return _DepthReader(sensor.camera)
+            return _DepthReader(sensor)
         case GaussianColor():
             return _ColorReader()
         case GaussianGrey():
@@ -74,14 +73,16 @@ def reader(sensor: Sensor) -> Reader:
 
 
 class _DepthReader:
-    def __init__(self, camera: Camera):
-        self._ray_length = camera.lookup.ray_length.astype(np.float32)  # radial distance per unit of z
+    def __init__(self, sensor: Sensor):
+        # Radial distance per unit of what the frame holds, and what is added: conversion from z, less the depth terms.
+        gain = 1 / (1 + sensor.depth_scale)
+        self._per_z = (gain * sensor.camera.lookup.ray_length).astype(np.float32)
+        self._per_radial = np.float32(gain)
+        self._offset = np.float32(-gain * sensor.depth_offset)
 
     def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]
-        distance = depth.si()
-        if depth.geometry == Geometry.Z:
-            distance = distance * self._ray_length
+        distance = depth.si() * (self._per_z if depth.geometry == Geometry.Z else self._per_radial) + self._offset
         amplitude = frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full_like(distance, np.nan)
         return DepthImage(distance, amplitude)
 

@@ -3,6 +3,8 @@
 from bisect import insort
 from collections import Counter, deque
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
 
 from drivers.frame import Frame, FrameSet
 
@@ -31,15 +33,22 @@ class Synchroniser:
         members: all streams of a set; the reference may be among them.
         tolerance_ns: largest difference between a member's and the reference's `t_host_ns` [ns].
         deadline_ns: how long after its arrival a reference frame waits for others, see `poll` [ns].
+        offsets_ns: what has to be added to `t_host_ns` of the frames of some sensors, as a calibration found [ns].
     """
 
     def __init__(
-        self, reference: Key, members: Iterable[Key], tolerance_ns: int, deadline_ns: int = 100_000_000
+        self,
+        reference: Key,
+        members: Iterable[Key],
+        tolerance_ns: int,
+        deadline_ns: int = 100_000_000,
+        offsets_ns: Mapping[str, int] = MappingProxyType({}),
     ) -> None:
         self._reference = _Stream(reference)
         self._members = {key: _Stream(key) for key in members if key != reference}
         self._tolerance_ns = tolerance_ns
         self._deadline_ns = deadline_ns
+        self._offsets_ns = offsets_ns
         self._seq = 0
         self._rejected: Counter[str] = Counter()
 
@@ -61,12 +70,9 @@ class Synchroniser:
         elif frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
             # Believing it would make every later frame of this stream stale.
             self._count(frame.key, "future")
-        elif objection := stream.objection(frame):
-            self._count(frame.key, objection)
         else:
-            stream.insert(frame)
-            if stream is not self._reference and len(stream.waiting) > DEPTH:
-                self._drop_oldest(stream, "overflow")
+            offset_ns = self._offsets_ns.get(frame.sensor, 0)
+            self._insert(stream, replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
         return self._form()
 
     def poll(self, now_ns: int) -> list[FrameSet]:
@@ -85,6 +91,14 @@ class Synchroniser:
     def flush(self) -> list[FrameSet]:
         """Returns all sets that still wait, with what there is: the end of a recording."""
         return [self._emit() for _ in range(len(self._reference.waiting))]
+
+    def _insert(self, stream: "_Stream", frame: Frame) -> None:
+        if objection := stream.objection(frame):
+            self._count(frame.key, objection)
+            return
+        stream.insert(frame)
+        if stream is not self._reference and len(stream.waiting) > DEPTH:
+            self._drop_oldest(stream, "overflow")
 
     def _form(self) -> list[FrameSet]:
         sets: list[FrameSet] = []

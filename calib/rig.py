@@ -30,6 +30,8 @@ class Sensor:
         outlier_share: share of its measurements that come from anywhere, 0…1; None if nobody knows better than the
             objective.
         range_m: distances that it can report at all, if it is a depth sensor [m]; None likewise.
+        depth_offset, depth_scale: a depth sensor measures (1 + scale) · distance + offset [1, m]; the noise model is
+            about what is left when that is taken off.
     """
 
     name: str
@@ -37,6 +39,8 @@ class Sensor:
     noise: Noise
     outlier_share: float | None = None
     range_m: float | None = None
+    depth_offset: float = 0.0
+    depth_scale: float = 0.0
 
     @property
     def head(self) -> str:

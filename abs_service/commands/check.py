@@ -85,6 +85,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         "config": source,
         "rig": rig.name,
         "endpoint": rig.bus.endpoint,
+        "calibration": None if rig.calibration is None else rig.calibration.model_dump(mode="json", exclude_none=True),
         "devices": {name: device.uri for name, device in rig.devices.items()},
         "sensors": {name: _sensor(rig, name, streams) for name in rig.sensors},
         "trackers": {name: _tracker(rig, name) for name in rig.trackers},
@@ -96,11 +97,15 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
 def text(found: dict[str, Any]) -> str:
     """The same for people."""
     lines = [f'{found["config"]} describes rig "{found["rig"]}"', ""]
+    if stored := found["calibration"]:
+        origin = stored["provenance"]
+        lines.append(f"  calibrated by {stored['file']}: {origin['verdict']}, {origin['date']}, {origin['command']}")
     lines += [f"  device   {name}: {uri}" for name, uri in found["devices"].items()]
     for name, sensor in found["sensors"].items():
         streams = ", ".join(sensor["streams"]) or "streams known once it is open"
         texture = f", texture {sensor['texture']}" if sensor["texture"] else ""
         lines.append(f"  sensor   {name}: {streams}; noise {sensor['noise'] or 'unknown, only recorded'}{texture}")
+        lines.append(f"           {'':<{len(name)}}  {_camera_text(sensor['camera'])}")
     for name, tracker in found["trackers"].items():
         what = f"{tracker['model']} from {', '.join(tracker['sensors'])}, {tracker['vertices']} vertices"
         how = f"{tracker['objective']}, {tracker['optimizer']}, paced by {tracker['reference']}"
@@ -122,9 +127,9 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
     device.close()
     found: dict[str, list[str]] = {}
     for head, sensor in rig.heads(name).items():
-        streams = [stream for stream in device.streams if stream.sensor == head]
+        streams = [stream for stream in device.capabilities.streams if stream.sensor == head]
         if not streams:
-            heads = {stream.sensor for stream in device.streams}
+            heads = {stream.sensor for stream in device.capabilities.streams}
             raise CheckError(f'sensor "{sensor}": no head "{head}", {none_of(head, heads)}')
         found[sensor] = [f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams]
     return found
@@ -143,7 +148,30 @@ def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]
 def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]]) -> dict[str, Any]:
     sensor = rig.sensors[name]
     noise, texture = (None if part is None else plugins.table(part)["type"] for part in (sensor.noise, sensor.texture))
-    return {"device": sensor.device, "streams": streams.get(name, []), "noise": noise, "texture": texture}
+    return {
+        "device": sensor.device,
+        "streams": streams.get(name, []),
+        "camera": _camera(rig, name),
+        "noise": noise,
+        "texture": texture,
+    }
+
+
+def _camera(rig: config.ServiceConfig, name: str) -> dict[str, str]:
+    """Where the two parts of a sensor's calibration come from: a calibration file, this file, or the device."""
+    camera, origin = rig.sensors[name].camera, rig.calibration
+    found: dict[str, str] = {}
+    for part, key in (("projection", "fx"), ("pose", "T_rs")):
+        stored = origin is not None and name in origin.sensors and f"camera.{key}" in origin.sensors[name].keys
+        given = getattr(camera, key) is not None
+        found[part] = origin.file if origin and stored else "configuration" if given else "device"
+    return found
+
+
+def _camera_text(camera: Mapping[str, str]) -> str:
+    words = {"configuration": "this file", "device": "the device"}
+    projection, pose = (words.get(camera[part], camera[part]) for part in ("projection", "pose"))
+    return f"camera from {projection}" if projection == pose else f"projection from {projection}, pose from {pose}"
 
 
 def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:

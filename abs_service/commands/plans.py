@@ -1,12 +1,13 @@
 """From the configuration to what a tracker is made of."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from abs_service import plugins
 from abs_service.config import ServiceConfig
 from abs_service.readers import kinds
-from abs_service.tracking import Plan
+from abs_service.synchroniser import Synchroniser
+from abs_service.tracking import Plan, streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.pixel_polynomial import PixelPolynomial
@@ -116,8 +117,19 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
             raise PlanError(f'sensor "{head}" of tracker "{tracker}" has no camera model')
         _check_size(head, model, cameras[head])
         table = config.sensors[head]
-        sensors[name] = Sensor(name, cameras[head], model, table.outlier_share, table.range_m)
+        depth = (table.depth.offset, table.depth.scale) if isinstance(model, DepthNoise) else ()
+        sensors[name] = Sensor(name, cameras[head], model, table.outlier_share, table.range_m, *depth)
     return Rig(config.name, sensors)
+
+
+def synchroniser(config: ServiceConfig, tracker: str, sensors: Iterable[Sensor]) -> Synchroniser:
+    """What makes frame sets for one tracker, from the sensors that it uses."""
+    return Synchroniser(
+        config.reference(tracker),
+        streams(sensors),
+        round(config.synchronisation.tolerance_ms * 1e6),
+        offsets_ns={name: round(table.time_offset_ms * 1e6) for name, table in config.sensors.items()},
+    )
 
 
 def _check_size(sensor: str, noise: Noise, camera: Camera) -> None:

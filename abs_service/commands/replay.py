@@ -117,8 +117,7 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
     if missing:
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
-    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
-    return rig, Synchroniser(settings.reference(name), members, tolerance_ns)
+    return rig, plans.synchroniser(settings, name, rig.sensors.values())
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:

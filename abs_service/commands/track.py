@@ -21,7 +21,6 @@ from abs_service.exits import Exit
 from abs_service.health import Health, Level
 from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker, WallClock
-from abs_service.synchroniser import Synchroniser
 from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
 from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
@@ -85,10 +84,8 @@ def _live(
     speaker: Speaker,
     health: Health,
 ) -> LiveTracker:
-    members = streams(rig.sensors.values())
-    frames = FrameSubscriber(bus, members)
-    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
-    synchroniser = Synchroniser(settings.reference(name), members, tolerance_ns)
+    frames = FrameSubscriber(bus, streams(rig.sensors.values()))
+    synchroniser = plans.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,
         NewestSets(frames, synchroniser, time.monotonic_ns),

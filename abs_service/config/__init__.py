@@ -3,8 +3,11 @@
 Only commands see these objects; everything behind them takes plain arguments.
 """
 
+from abs_service.config.calibration import CalibrationFile, CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable, PoseTable
-from abs_service.config.loading import ConfigError, load, load_default, loads, to_toml
+from abs_service.config.loading import load, load_default, loads, to_toml
+from abs_service.config.merging import load_calibration
+from abs_service.config.mistakes import ConfigError
 from abs_service.config.tables import (
     BusTable,
     DeviceTable,
@@ -19,8 +22,11 @@ from abs_service.config.tables import (
 
 __all__ = [
     "BusTable",
+    "CalibrationFile",
+    "CalibrationOrigin",
     "CameraTable",
     "ConfigError",
+    "DepthTable",
     "DeviceTable",
     "MeshTable",
     "PoseTable",
@@ -31,6 +37,7 @@ __all__ = [
     "SynchronisationTable",
     "TrackerTable",
     "load",
+    "load_calibration",
     "load_default",
     "loads",
     "to_toml",

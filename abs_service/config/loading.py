@@ -2,21 +2,18 @@
 
 import json
 import tomllib
-from collections.abc import Collection
+from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any, get_args, get_origin
 
 import tomli_w
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from abs_service.config import references
+from abs_service.config.merging import merge
+from abs_service.config.mistakes import ConfigError, allowed_at, error_of
 from abs_service.config.tables import ServiceConfig
-from abs_service.problems import Key, Problem, from_pydantic
-
-
-class ConfigError(Exception):
-    """A configuration that cannot be used; the message names the file and each mistake: key, value, what is allowed."""
+from abs_service.problems import from_pydantic
 
 
 def load(path: Path) -> ServiceConfig:
@@ -55,38 +52,19 @@ def loads(text: str, source: str, base: Path) -> ServiceConfig:
         file = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
+    file = merge(file, source, base)
     file.setdefault("record", {})  # its default directory starts from `base`, so it has to be made here
     problems = references.check(file)
     try:
         # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.
         config = ServiceConfig.model_validate_json(json.dumps(file, default=str), strict=True, context={"base": base})
     except ValidationError as error:
-        raise _config_error(source, from_pydantic(error, _allowed_at) + problems) from None
+        raise error_of(source, from_pydantic(error, partial(allowed_at, ServiceConfig)) + problems) from None
     if problems:
-        raise _config_error(source, problems)
+        raise error_of(source, problems)
     return config
 
 
 def to_toml(config: ServiceConfig) -> str:
     """The effective configuration, defaults included and paths absolute; `loads` makes an equal one from it."""
     return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
-
-
-def _config_error(source: str, problems: list[Problem]) -> ConfigError:
-    if len(problems) == 1:
-        return ConfigError(f"{source}: {problems[0]}")
-    return ConfigError("\n".join([f"{source}: {len(problems)} mistakes", *(f"  {problem}" for problem in problems)]))
-
-
-def _allowed_at(key: Key) -> Collection[str]:
-    annotation: Any = ServiceConfig
-    for part in key:
-        # A table is a field of a model or a named entry of a dictionary of models.
-        entries = get_origin(annotation) is dict
-        annotation = get_args(annotation)[1] if entries else _model(annotation).model_fields[str(part)].annotation
-    return _model(annotation).model_fields
-
-
-def _model(annotation: Any) -> type[BaseModel]:
-    choices = (annotation, *get_args(annotation))
-    return next(choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel))

@@ -3,18 +3,14 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field, FiniteFloat
 
+from abs_service.config.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable
+from abs_service.config.table import Table
 from abs_service.config.values import DeviceUri, Endpoint, Name, Plugin, RelativePath, SettingsOf, Stream
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-
-
-class Table(BaseModel):
-    """What all tables share: they are frozen and know their keys. No logic."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
 
 
 class BusTable(Table):
@@ -46,6 +42,8 @@ class SensorTable(Table):
         texture: likewise of what it sees of the surface besides: a time-of-flight camera's amplitudes, for example.
         outlier_share: share of its measurements that come from anywhere; None for the objective's own.
         range_m: distances that a depth sensor can report at all; None for the objective's own.
+        depth: systematic error of its distances.
+        time_offset_ms: what has to be added to its exposures' times to get those of the others.
     """
 
     device: str
@@ -55,6 +53,8 @@ class SensorTable(Table):
     texture: Annotated[Any, Plugin("calib.noise")] | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Positive | None = None
+    depth: DepthTable = DepthTable()
+    time_offset_ms: FiniteFloat = 0.0
 
 
 class SynchronisationTable(Table):
@@ -146,15 +146,20 @@ class RunTable(Table):
 
 
 class ServiceConfig(Table):
-    """Everything that a rig is: who it is on the wire, its devices, its sensors, its trackers and what it keeps."""
+    """Everything that a rig is: who it is on the wire, its devices, its sensors, its trackers and what it keeps.
+
+    In a file, `calibration` may name a calibration file, whose content is put into the sensors' tables; here it is what
+    is remembered of that file.
+    """
 
     version: Literal[1]
     name: Name
+    calibration: CalibrationOrigin | None = None
     bus: BusTable = BusTable()
     devices: dict[Name, DeviceTable]
     sensors: dict[Name, SensorTable]
     synchronisation: SynchronisationTable = SynchronisationTable()
-    trackers: dict[Name, TrackerTable] = {}
+    trackers: dict[Name, TrackerTable] = Field(default_factory=dict)
     record: RecordTable
     run: RunTable = RunTable()
 

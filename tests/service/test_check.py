@@ -98,3 +98,28 @@ def test_no_driver_that_could_touch_hardware_is_opened(monkeypatch, tmp_path):
     monkeypatch.setattr(check.opening, "open_device", lambda *_: pytest.fail("opened"))
     found = check.describe(config.loads(RIG, "rig.toml", tmp_path), "rig.toml")
     assert found["sensors"]["tof"]["streams"] == []
+
+
+@pytest.mark.parametrize(
+    ("camera", "said"),
+    [
+        ("", "camera from the device"),
+        ("[sensors.tof.camera]\nT_rs = {}", "projection from the device, pose from this file"),
+    ],
+)
+def test_it_is_said_where_a_camera_comes_from(checked, camera, said):
+    assert said in checked(RIG + camera)[1]
+
+
+def test_a_calibration_file_is_named_with_its_verdict(checked, tmp_path):
+    (tmp_path / "x.calibration.toml").write_text(
+        'version = 1\nname = "bench"\n[provenance]\ncommand = "abs-service calibrate rig"\ndate = "2026-11-21"\n'
+        'version = "0.1.0"\nverdict = "doubtful"\n[sensors.tof.camera]\nT_rs = {}\n'
+    )
+    given = RIG.replace("[devices.sim]", 'calibration = "x.calibration.toml"\n[devices.sim]')
+    out = checked(given)[1]
+    assert "calibrated by x.calibration.toml: doubtful, 2026-11-21, abs-service calibrate rig" in out
+    assert "projection from the device, pose from x.calibration.toml" in out
+    found = json.loads(checked(given, "--json")[1])
+    assert found["sensors"]["tof"]["camera"] == {"projection": "device", "pose": "x.calibration.toml"}
+    assert found["calibration"]["provenance"]["version"] == "0.1.0"

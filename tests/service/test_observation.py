@@ -1,5 +1,7 @@
 """Frames become what the tracker compares with: radial distances, RGB, and no silent mismatch of sizes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,18 @@ def test_z_becomes_radial():
     expected[1, 2] = np.nan
     np.testing.assert_allclose(z, expected, rtol=1e-6)
     assert image.distance[0, 0] > 1.05
+
+
+@pytest.mark.parametrize(("sensor", "geometry"), [("tof", Geometry.RADIAL), ("light", Geometry.Z)])
+def test_systematic_errors_of_distances_are_taken_off(sensor, geometry):
+    """measured = (1 + scale) · distance + offset."""
+    frames = FrameSet(3, 50, {frame.key: frame for frame in (depth(sensor, geometry), amplitude())})
+    plain = Observer(RIG).observe(frames).images[sensor]
+    terms = replace(RIG.sensors[sensor], depth_offset=0.02, depth_scale=0.01)
+    image = Observer(Rig("r", {sensor: terms})).observe(frames).images[sensor]
+    assert isinstance(plain, DepthImage)
+    assert isinstance(image, DepthImage)
+    np.testing.assert_allclose(1.01 * image.distance + 0.02, plain.distance, rtol=1e-6)
 
 
 def test_a_depth_sensor_without_amplitudes_has_none():

@@ -201,3 +201,12 @@ def test_streams_of_one_rate_are_matched_completely(jitter, random):
     assert len(sets) == len(jitter)
     assert all(not formed.missing for formed in sets)
     assert sync.counters == {}
+
+
+def test_a_sensor_whose_clock_is_off_is_paired_by_the_time_that_its_calibration_gives():
+    sync = synchroniser(COLOR, offsets_ns={"color": -30 * MS})
+    sync.add(frame(COLOR, 130))
+    sync.add(frame(COLOR, 100))  # really at 70
+    (formed,) = sync.add(frame(TOF, 100))
+    assert formed.frames[COLOR].seq == 130
+    assert formed.frames[COLOR].t_host_ns == 100 * MS

@@ -1,0 +1,128 @@
+"""The tables of a calibration file, and what a configuration remembers of the one it was made with."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, FiniteFloat
+
+from abs_service.config.camera import CameraTable
+from abs_service.config.table import Table
+from abs_service.config.values import Name, Plugin
+
+#: Keys of a sensor in a calibration file that are keys of the same sensor in a rig file.
+SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "depth", "time_offset_ms")
+
+
+class DepthTable(Table):
+    """`depth`: systematic error of a depth sensor, which is taken off before anything else is done with a distance.
+
+    measured = (1 + scale) · distance + offset, for radial distances.
+
+    Attributes:
+        offset: [m].
+        scale: dimensionless.
+    """
+
+    offset: FiniteFloat = 0.0
+    scale: Annotated[FiniteFloat, Field(gt=-1)] = 0.0
+
+
+class DataTable(Table):
+    """A file or folder that a calibration was computed from, and its SHA-256."""
+
+    name: str
+    sha256: str
+
+
+class ProvenanceTable(Table):
+    """`[provenance]`: the command that computed a calibration, when, its version, from what, and its own verdict."""
+
+    command: str
+    date: str
+    version: str
+    verdict: Literal["good", "doubtful", "bad"] = "good"
+    data: tuple[DataTable, ...] = ()
+
+
+class CovarianceTable(Table):
+    """`[covariance]`: the file beside this one with the covariances of all parameters, and its SHA-256."""
+
+    file: str
+    sha256: str
+
+
+class ResidualsTable(Table):
+    """`residuals`: root mean squares of what the calibration does not explain, and from how many views.
+
+    Attributes:
+        corners_px: of corners [px].
+        distances: of distances on boards [m].
+        views: number of images that showed the board.
+    """
+
+    corners_px: FiniteFloat | None = None
+    distances: FiniteFloat | None = None
+    views: int | None = None
+
+
+class SensorEvidence(Table):
+    """What a calibration file tells of a sensor for people and for later commands; the tracker does not use it.
+
+    Attributes:
+        factory: the device's own calibration, which the file's takes the place of.
+        sigma: standard deviation of every parameter that was determined; see `calib.solve.layout` for their names.
+        residuals: what is left.
+    """
+
+    factory: CameraTable | None = None
+    sigma: dict[str, FiniteFloat] = Field(default_factory=dict)
+    residuals: ResidualsTable = ResidualsTable()
+
+
+class CalibratedSensor(SensorEvidence):
+    """`[sensors.<name>]` of a calibration file; the other keys are those of the sensor in a rig file."""
+
+    camera: CameraTable = CameraTable()
+    noise: Annotated[Any, Plugin("calib.noise")] | None = None
+    texture: Annotated[Any, Plugin("calib.noise")] | None = None
+    outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
+    range_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    depth: DepthTable | None = None
+    time_offset_ms: FiniteFloat | None = None
+
+
+class CalibrationFile(Table):
+    """A calibration file: what was found out about the sensors of a rig, and where that comes from."""
+
+    version: Literal[1]
+    name: Name
+    provenance: ProvenanceTable
+    covariance: CovarianceTable | None = None
+    sensors: dict[Name, CalibratedSensor]
+
+
+class SensorOrigin(SensorEvidence):
+    """What a merged configuration remembers of one sensor.
+
+    Attributes:
+        keys: of `[sensors.<name>]` and its `camera` that the calibration file gave.
+    """
+
+    keys: tuple[str, ...]
+
+
+class CalibrationOrigin(Table):
+    """`[calibration]` of a merged configuration: the file whose content stands in the sensors' tables.
+
+    Attributes:
+        file: its name.
+        sha256: hash of its content.
+        provenance: as there.
+        covariance: likewise.
+        sensors: what it gave.
+    """
+
+    file: str
+    sha256: str
+    provenance: ProvenanceTable
+    covariance: CovarianceTable | None = None
+    sensors: dict[str, SensorOrigin] = Field(default_factory=dict)

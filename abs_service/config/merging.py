@@ -1,0 +1,126 @@
+"""A calibration file read, and put into the rig that names it."""
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from abs_service.config.calibration import SHARED, CalibratedSensor, CalibrationFile, CalibrationOrigin, SensorOrigin
+from abs_service.config.mistakes import ConfigError, allowed_at, error_of
+from abs_service.problems import Key, Problem, dotted, from_pydantic, none_of
+
+
+def load_calibration(path: Path) -> CalibrationFile:
+    """The calibration in a file; relative paths in it start from the file's folder.
+
+    Raises:
+        ConfigError: it cannot be read or used; names all that is wrong with it.
+    """
+    return _parse(path, _read(path))
+
+
+def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
+    """A rig file with what the calibration file says that its key `calibration` names, in the tables of its sensors.
+
+    Args:
+        rig: what the TOML file holds; returned as it is if it names no calibration file.
+        source: where it came from, for messages.
+        base: folder that the path of the calibration file starts from.
+
+    Raises:
+        ConfigError: the calibration file cannot be used, is about sensors that the rig does not have, or says what the
+            rig file says too.
+    """
+    if not isinstance(rig.get("calibration"), str):
+        return rig
+    path = base / rig["calibration"]
+    content = _read(path)
+    file = _parse(path, content)
+    sensors = rig["sensors"] if isinstance(rig.get("sensors"), dict) else {}
+    unknown = [
+        Problem(("sensors", name), f"no such sensor in {source}, {none_of(name, sensors)}")
+        for name in file.sensors
+        if name not in sensors
+    ]
+    if unknown:
+        raise error_of(str(path), unknown)
+    given = {name: _given(calibrated) for name, calibrated in file.sensors.items()}
+    tables = {name: sensors[name] if isinstance(sensors[name], dict) else {} for name in given}
+    clashes = [problem for name in given for problem in _clashes(name, tables[name], given[name], path)]
+    if clashes:
+        raise error_of(source, clashes)
+    merged = {name: _merged(tables[name], given[name]) for name in given}
+    return rig | {"sensors": sensors | merged, "calibration": _origin(path, content, file, given)}
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ConfigError(f"{path}: the calibration cannot be read: {error.strerror}") from None
+
+
+def _parse(path: Path, content: bytes) -> CalibrationFile:
+    try:
+        file = tomllib.loads(content.decode("utf-8"))
+        # JSON in strict mode is TOML's own type system, as for the rig's own file.
+        text = json.dumps(file, default=str)
+        return CalibrationFile.model_validate_json(text, strict=True, context={"base": path.resolve().parent})
+    except ValidationError as error:
+        raise error_of(str(path), from_pydantic(error, partial(allowed_at, CalibrationFile))) from None
+    except ValueError as error:  # no UTF-8, or no TOML
+        raise ConfigError(f"{path}: not TOML: {error}") from None
+
+
+def _given(calibrated: CalibratedSensor) -> dict[str, Any]:
+    """What the file says of a sensor that a rig file could say; paths absolute, no empty tables."""
+    tables = calibrated.model_dump(mode="json", exclude_none=True, include=set(SHARED))
+    return {key: value for key, value in tables.items() if value != {}}
+
+
+def _keys(given: dict[str, Any]) -> Iterator[Key]:
+    """The keys that one file may have if the other has not; a camera's are separate, all others stand as a whole."""
+    for key, value in given.items():
+        yield from ((key, part) for part in value) if key == "camera" else [(key,)]
+
+
+def _clashes(name: str, table: dict[str, Any], given: dict[str, Any], path: Path) -> Iterator[Problem]:
+    for key in _keys(given):
+        value: Any = table
+        for part in key:
+            value = value.get(part) if isinstance(value, dict) else None
+        if value is not None:
+            where = ("sensors", name, *key)
+            yield Problem(where, f"{path} has {dotted(where)} too; remove it from one of the two files", value)
+
+
+def _merged(table: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    own = table.get("camera", {})
+    # What is no table will be refused as such, together with the other mistakes of the rig file.
+    camera = {"camera": own | given.get("camera", {}) if isinstance(own, dict) else own}
+    return table | given | (camera if "camera" in table else {})
+
+
+def _origin(path: Path, content: bytes, file: CalibrationFile, given: dict[str, Any]) -> dict[str, Any]:
+    """What the merged configuration remembers of the calibration file."""
+    origin = CalibrationOrigin(
+        file=path.name,
+        sha256=hashlib.sha256(content).hexdigest(),
+        provenance=file.provenance,
+        covariance=file.covariance,
+        sensors={
+            name: SensorOrigin(
+                keys=tuple(dotted(key) for key in _keys(given[name])),
+                factory=sensor.factory,
+                sigma=sensor.sigma,
+                residuals=sensor.residuals,
+            )
+            for name, sensor in file.sensors.items()
+        },
+    )
+    return origin.model_dump(mode="json", exclude_none=True)

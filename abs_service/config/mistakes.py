@@ -1,0 +1,34 @@
+"""The one error of a configuration, with all that is wrong with it."""
+
+from collections.abc import Collection
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel
+
+from abs_service.problems import Key, Problem
+
+
+class ConfigError(Exception):
+    """A configuration that cannot be used; the message names the file and each mistake: key, value, what is allowed."""
+
+
+def error_of(source: str, problems: list[Problem]) -> ConfigError:
+    """All problems of a file as one error."""
+    if len(problems) == 1:
+        return ConfigError(f"{source}: {problems[0]}")
+    return ConfigError("\n".join([f"{source}: {len(problems)} mistakes", *(f"  {problem}" for problem in problems)]))
+
+
+def allowed_at(root: type[BaseModel], key: Key) -> Collection[str]:
+    """The keys that the table at a path may hold, in a file whose whole is a `root`."""
+    annotation: Any = root
+    for part in key:
+        # A table is a field of a model or a named entry of a dictionary of models.
+        entries = get_origin(annotation) is dict
+        annotation = get_args(annotation)[1] if entries else _model(annotation).model_fields[str(part)].annotation
+    return _model(annotation).model_fields
+
+
+def _model(annotation: Any) -> type[BaseModel]:
+    choices = (annotation, *get_args(annotation))
+    return next(choice for choice in choices if isinstance(choice, type) and issubclass(choice, BaseModel))
