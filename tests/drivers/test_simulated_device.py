@@ -57,7 +57,8 @@ class Time:
 
 def run(query: str, time: Time, frames: int) -> tuple[SimulatedDevice, Recorder]:
     uri = f"simulated://sheet?{query}"
-    device = SimulatedDevice(uri, parse(uri).build(), time.clock, time.wait)
+    address = parse(uri)
+    device = SimulatedDevice(uri, address.build(), time.clock, time.wait, address.fault)
     sink = Recorder(frames)
     device.start(sink)
     assert sink.full.wait(60)
@@ -160,7 +161,7 @@ def test_defaults_are_the_demonstration_rig() -> None:
 @pytest.mark.parametrize(
     ("uri", "complaint"),
     [
-        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'pair', 'sheet', 'strip'\]"),
+        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'pair', 'sheet', 'strip', 'wall'\]"),
         ("simulated://", r"scene '' is none of"),
         ("simulated://sheet?sead=1", r"unknown key 'sead'; allowed are \[.*'seed'"),
         ("simulated://sheet?seed=one", r"seed = 'one' must be a number from 0 to"),
