@@ -1,0 +1,40 @@
+"""The whole way from views to a solution."""
+
+from collections.abc import Callable
+
+from calib.solve import diagnoses
+from calib.solve.adjust import adjust
+from calib.solve.formulation import formulate, groups_of
+from calib.solve.solution import Solution
+from calib.solve.start import start
+from calib.solve.state import State
+from calib.solve.tasks import Task
+
+
+def calibrate(task: Task, note: Callable[[str], None] = lambda _: None) -> Solution:
+    """Solves a task.
+
+    Args:
+        task: sensors and what they saw.
+        note: told in words how it goes.
+
+    Raises:
+        ViewsError, MixedUpError, SquareSizeError: the usual mistakes; see `diagnoses`.
+        NotConnectedError, ContradictionError: sensors that do not belong together; see `chains`.
+        UndeterminedError: parameters that the views leave open, by name.
+        NotSolvedError: no minimum.
+    """
+    diagnoses.require_views(task)
+    diagnoses.require_own_names(task)
+    usable, state = start(task, note)
+    if diagnoses.suspect_square_size(usable, state):
+        note("distances do not fit the board's size: solving with their scales free to be sure")
+        diagnoses.require_square_size(_solve(diagnoses.with_free_scales(usable), state, note).parameters)
+    return _solve(usable, state, note)
+
+
+def _solve(task: Task, start: State, note: Callable[[str], None]) -> Solution:
+    formulation = formulate(task)
+    groups = groups_of(task)
+    note(f"all together: {formulation.layout.size} parameters of {len(groups)} groups of views")
+    return Solution(task, adjust(formulation, start, len(groups), note))

@@ -1,0 +1,32 @@
+"""Where in an image a calibration is supported by corners; elsewhere its lens is extrapolated."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from calib.solve.solution import Solution
+
+
+def supported(solution: Solution, sensor: str, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which pixels (n, 2) lie in the convex hull of all corners that the sensor saw; all if its intrinsics are kept."""
+    if not solution.adjustment.layout.freedoms[sensor].intrinsics:
+        camera = solution.cameras[sensor]
+        with np.errstate(invalid="ignore"):
+            return np.all((pixels >= -0.5) & (pixels <= (camera.width - 0.5, camera.height - 0.5)), axis=1)
+    hull = _hull(solution, sensor)
+    sides = [cv2.pointPolygonTest(hull, (u, v), False) for u, v in np.nan_to_num(pixels, nan=-1e9).tolist()]
+    return np.array(sides) >= 0
+
+
+def coverage(solution: Solution, sensor: str) -> float:
+    """Share of the image that the hull of the corners covers; 1 if nothing of it had to be found."""
+    if not solution.adjustment.layout.freedoms[sensor].intrinsics:
+        return 1.0
+    camera: Camera = solution.cameras[sensor]
+    return float(cv2.contourArea(_hull(solution, sensor))) / (camera.width * camera.height)
+
+
+def _hull(solution: Solution, sensor: str) -> NDArray[np.float32]:
+    corners = [view.pixels for view in solution.task.corners if view.sensor == sensor]
+    return np.asarray(cv2.convexHull(np.concatenate(corners).astype(np.float32)), np.float32)

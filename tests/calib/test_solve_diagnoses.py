@@ -1,0 +1,156 @@
+"""What goes wrong when people calibrate, and whether they are told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from calib.solve import chains
+from calib.solve.calibrate import calibrate
+from calib.solve.chains import ContradictionError, NotConnectedError
+from calib.solve.determined import UndeterminedError, require_determined
+from calib.solve.diagnoses import MixedUpError, SquareSizeError, ViewsError
+from calib.solve.tasks import SensorTask, Task, TaskError
+from calib.views import CornerView, PlaneView
+from tests.calib import board_views
+from tests.calib.board_views import Head
+
+SHOTS = 12
+
+
+def kept(heads: dict[str, Head]) -> dict[str, SensorTask]:
+    """Factory intrinsics of all heads, kept."""
+    return {
+        name: SensorTask(head.camera.width, head.camera.height, factory=(head.camera,), keeps_intrinsics=True)
+        for name, head in heads.items()
+    }
+
+
+def scene(count: int = SHOTS) -> tuple[dict[str, Head], Task]:
+    generator = np.random.default_rng(21)
+    heads = board_views.three_heads()
+    seen = board_views.look(heads, board_views.random_boards(count, generator), generator)
+    return heads, Task(kept(heads), seen.corners, seen.planes, "tof")
+
+
+def of(view: CornerView | PlaneView, *names: str) -> bool:
+    return view.sensor in names
+
+
+@pytest.mark.slow
+def test_squares_of_another_size_are_noticed_by_depth_sensors() -> None:
+    _, task = scene()
+    shrunk = [replace(view, points_b=view.points_b / 0.93) for view in task.corners]  # said to be larger than they are
+    with pytest.raises(SquareSizeError, match="ruler") as caught:
+        calibrate(replace(task, corners=shrunk))
+    assert caught.value.scale == pytest.approx(0.93, abs=0.005)
+
+
+@pytest.mark.slow
+def test_an_offset_of_distances_is_not_taken_for_a_wrong_size() -> None:
+    _, task = scene()
+    late = [replace(view, distances=view.distances + 0.03) for view in task.planes]
+    sensors = {name: replace(each, depth_terms=("depth_offset",)) for name, each in task.sensors.items()}
+    sensors["color"] = replace(sensors["color"], depth_terms=())
+    solution = calibrate(replace(task, planes=late, sensors=sensors))
+    assert solution.state.sensors["tof"].depth_offset == pytest.approx(0.03, abs=0.003)
+
+
+def test_too_few_views_are_counted() -> None:
+    _, task = scene(2)
+    with pytest.raises(ViewsError, match=r"tof: 2 views of the board; at least 3"):
+        calibrate(task)
+
+
+def test_sensors_that_share_no_shot_are_named() -> None:
+    _, task = scene()
+    apart = [view for view in task.corners if of(view, "tof", "light") == (view.shot < SHOTS // 2)]
+    planes = [view for view in task.planes if view.shot < SHOTS // 2]
+    with pytest.raises(NotConnectedError, match=r"color: no shot shows the board"):
+        calibrate(replace(task, corners=apart, planes=planes))
+
+
+def test_images_of_different_moments_contradict_each_other() -> None:
+    _, task = scene()
+    shifted = [replace(view, shot=(view.shot + 5) % SHOTS) if of(view, "color") else view for view in task.corners]
+    with pytest.raises(ContradictionError, match="not of the same moments"):
+        calibrate(replace(task, corners=shifted))
+
+
+def test_names_exchanged_between_cameras_of_one_size_are_noticed() -> None:
+    generator = np.random.default_rng(2)
+    left = board_views.three_heads()["light"]
+    right = replace(left, camera=replace(left.camera, fx=470.0, fy=470.0))
+    seen = board_views.look({"left": left, "right": right}, board_views.random_boards(8, generator), generator)
+    task = Task(kept({"left": right, "right": left}), seen.corners, (), "left")
+    with pytest.raises(MixedUpError, match="left and right are mixed up"):
+        calibrate(task)
+
+
+def test_corners_outside_the_image_tell_whose_they_might_be() -> None:
+    _, task = scene()
+    renamed = {"tof": "color", "color": "tof", "light": "light"}
+    swapped = [replace(view, sensor=renamed[view.sensor]) for view in task.corners]
+    with pytest.raises(MixedUpError, match="they would fit"):
+        calibrate(replace(task, corners=swapped))
+
+
+def test_kept_intrinsics_of_another_mode_are_noticed() -> None:
+    heads, task = scene()
+    wrong = replace(heads["color"].camera, fx=1400.0, fy=1400.0)
+    sensors = {**task.sensors, "color": replace(task.sensors["color"], factory=(wrong,))}
+    with pytest.raises(MixedUpError, match="color: with the given intrinsics"):
+        calibrate(replace(task, sensors=sensors))
+
+
+def test_what_the_views_leave_open_is_named() -> None:
+
+    curvature = np.diag([1.0, 4.0, 9.0])
+    curvature[0, 1] = curvature[1, 0] = 2.0
+    with pytest.raises(UndeterminedError, match=r"a\.fx, b\.z") as caught:
+        require_determined(curvature, ("a.fx", "b.z", "c.x"))
+    assert caught.value.names == ["a.fx", "b.z"]
+    with pytest.raises(UndeterminedError, match=r"c\.x"):
+        require_determined(np.diag([1.0, 1.0, 0.0]), ("a.fx", "b.z", "c.x"))
+
+
+def test_a_clock_cannot_be_found_from_boards_that_stand_still() -> None:
+    _, task = scene()
+    sensors = {**task.sensors, "color": replace(task.sensors["color"], runs_free=True)}
+    with pytest.raises(UndeterminedError, match=r"color\.time_offset"):
+        calibrate(replace(task, sensors=sensors))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"reference": "nobody"}, "must be one of"),
+        ({"corners": ()}, "no view shows any corner"),
+        ({"sensors": {"tof": SensorTask(320, 240)}}, "no sensors of this calibration"),
+    ],
+)
+def test_a_task_that_makes_no_sense_is_refused(changes: dict[str, object], message: str) -> None:
+    _, task = scene(3)
+    with pytest.raises(TaskError, match=message):
+        replace(task, **changes)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_sensor_needs_a_calibration_to_keep_and_depth_terms_that_exist() -> None:
+    with pytest.raises(TaskError, match="calibration to keep"):
+        SensorTask(320, 240, keeps_intrinsics=True)
+    with pytest.raises(TaskError, match="depth terms must be of depth_offset, depth_scale, not bend"):
+        SensorTask(320, 240, depth_terms=("bend",))
+
+
+def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
+    from calib.solve.sightings import sightings
+
+    heads, task = scene()
+    seen = {
+        name: {view.shot: sightings(heads[name].camera, view) for view in task.corners if view.sensor == name}
+        for name in ("tof", "color")
+    }
+    flipped = {shot: found[::-1] for shot, found in seen["tof"].items()}
+    np.testing.assert_allclose(
+        chains.between({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
+    )
