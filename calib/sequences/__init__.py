@@ -1,0 +1,1 @@
+"""What the frames of a static sequence tell of a depth sensor's noise, before any model of it."""
