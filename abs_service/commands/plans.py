@@ -10,6 +10,7 @@ from abs_service.synchroniser import Synchroniser
 from abs_service.tracking import Plan, streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
+from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
 from calib.rig import Noise, PictureNoise, Rig, Sensor
@@ -133,7 +134,10 @@ def synchroniser(config: ServiceConfig, tracker: str, sensors: Iterable[Sensor])
 
 
 def _check_size(sensor: str, noise: Noise, camera: Camera) -> None:
-    if isinstance(noise, (PixelPolynomial, RegionPolynomial)) and noise.shape != (camera.height, camera.width):
+    if isinstance(noise, (PerPixel, PixelPolynomial, RegionPolynomial)) and noise.shape != (
+        camera.height,
+        camera.width,
+    ):
         height, width = noise.shape
         raise PlanError(
             f"sensors.{sensor}.noise.file: its maps are for {width} × {height} pixels, "

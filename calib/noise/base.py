@@ -31,6 +31,12 @@ class NoiseError(ValueError):
     """Parameters that describe no noise model; names the key and what is allowed."""
 
 
+def pixels_where(mask: NDArray[np.bool_]) -> Pixels:
+    """Rows and columns of the pixels at which an image (height, width) is true."""
+    rows, columns = np.nonzero(mask)
+    return rows, columns
+
+
 @runtime_checkable
 class DepthNoise(Protocol):
     """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a.

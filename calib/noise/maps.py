@@ -23,17 +23,36 @@ def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
     Raises:
         NoiseError: it cannot be read or lacks one, or the domain is none.
     """
-    try:
-        with file.open("rb") as stream, NpzFile(stream) as archive:
-            arrays = dict(archive)
-    except (OSError, ValueError, BadZipFile) as error:
-        raise NoiseError(f"file = {str(file)!r} cannot be read as .npz: {error}") from error
-    if missing := (required | {"distances", "amplitudes"}) - set(arrays):
-        raise NoiseError(f"file = {str(file)!r} lacks the array(s) {sorted(missing)}")
+    found = arrays(file, required | {"distances", "amplitudes"})
     for key in ("distances", "amplitudes"):
-        if arrays[key].shape != (2,) or not arrays[key][0] < arrays[key][1]:
-            raise NoiseError(f"{key} in {str(file)!r} must be [lowest, highest], not {arrays[key].tolist()}")
-    least = arrays.setdefault("least_sigma", np.array(_LEAST_SIGMA))
+        check_domain(file, found, key)
+    least = found.setdefault("least_sigma", np.array(_LEAST_SIGMA))
     if least.shape != () or not least > 0:
         raise NoiseError(f"least_sigma in {str(file)!r} must be a number above 0, not {least.tolist()}")
-    return arrays
+    return found
+
+
+def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
+    """The arrays of a file.
+
+    Raises:
+        NoiseError: it cannot be read or lacks one that is required.
+    """
+    try:
+        with file.open("rb") as stream, NpzFile(stream) as archive:
+            found = dict(archive)
+    except (OSError, ValueError, BadZipFile) as error:
+        raise NoiseError(f"file = {str(file)!r} cannot be read as .npz: {error}") from error
+    if missing := required - set(found):
+        raise NoiseError(f"file = {str(file)!r} lacks the array(s) {sorted(missing)}")
+    return found
+
+
+def check_domain(file: Path, found: dict[str, NDArray[np.float64]], key: str) -> None:
+    """Complains unless an array of a file is a lowest and a higher highest value.
+
+    Raises:
+        NoiseError: names the file and the key.
+    """
+    if found[key].shape != (2,) or not found[key][0] < found[key][1]:
+        raise NoiseError(f"{key} in {str(file)!r} must be [lowest, highest], not {found[key].tolist()}")

@@ -6,6 +6,7 @@ nonsense.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.fitting import MAD_TO_SIGMA, RANGE_M
-from calib.noise.polynomial import Polynomials
+from calib.noise.polynomial import Polynomials, Span
 from calib.noise.samples import Samples
 
 #: Rounds of expectation and maximisation; where there are tens of samples a pixel, twice as many move no offset by more
@@ -28,6 +29,22 @@ _EQUAL_M = 1e-6
 _FEW = 4
 
 
+class Repeats(NamedTuple):
+    """How many measurements a sample is the mean of, and how they scatter; sequences of a thing at rest have many.
+
+    Attributes:
+        times: of them, (n,) or (1,).
+        variance: mean square of their differences from the sample [m²], likewise.
+    """
+
+    times: NDArray[np.floating]
+    variance: NDArray[np.floating]
+
+
+#: Every sample is one measurement.
+ONCE = Repeats(np.ones(1), np.zeros(1))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
     """Residuals from the parent, by group.
@@ -37,6 +54,7 @@ class _Groups:
         basis: columns (n, k) in which the groups' own mean offsets are linear.
         of: group (n,) of every sample.
         number: of groups.
+        repeats: of the samples.
     """
 
     residual: NDArray[np.float64]
@@ -44,6 +62,7 @@ class _Groups:
     basis: NDArray[np.floating]
     of: NDArray[np.int64]
     number: int
+    repeats: Repeats
 
     def sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums (groups,) of values (n,)."""
@@ -78,9 +97,8 @@ def refine(
     deviation = parent.deviation(samples.true, samples.amplitude, at)
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
-    basis = polyvander((np.clip(samples.true, near, far) - middle) / half, degree)
-    groups = _Groups(residual, deviation, basis, place.astype(np.int64), len(parent_of))
-    offsets, factors = _estimate(groups)
+    basis = basis_of(samples.true, parent.distances, degree)
+    offsets, factors = own(residual, deviation, basis, place, len(parent_of))
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
@@ -90,11 +108,37 @@ def refine(
     return Polynomials(parent.sigma[..., parent_of] * factors, mu, parent.distances, parent.amplitudes, least)
 
 
-def _estimate(groups: _Groups) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Own offsets (groups, k) and factors (groups,), by expectation and maximisation."""
+def basis_of(x: NDArray[np.floating], distances: Span, degree: int) -> NDArray[np.floating]:
+    """Powers (n, degree + 1) of distances (n,), moved and scaled so that the domain is −1 to 1; beyond, its edge."""
+    near, far = distances
+    return polyvander((2 * np.clip(x, near, far) - near - far) / (far - near), degree)
+
+
+def own(
+    residual: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    basis: NDArray[np.floating],
+    place: NDArray[np.integer],
+    places: int,
+    repeats: Repeats = ONCE,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How places differ from what they are part of, by expectation and maximisation.
+
+    Args:
+        residual: of the samples from the parent's mean (n,) [m].
+        deviation: that the parent says they have (n,) [m].
+        basis: columns (n, k) in which a place's own mean offset is linear.
+        place: of every sample (n,).
+        places: number of them.
+        repeats: measurements that every sample stands for.
+
+    Returns:
+        Own mean offsets (places, k), in the columns, and factors on the deviation (places,).
+    """
+    groups = _Groups(residual, deviation, basis, place.astype(np.int64), places, repeats)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
     offsets[:, 0] = groups.medians(groups.residual)
-    rest = np.abs(groups.residual - offsets[groups.of, 0]) / groups.deviation
+    rest = np.sqrt(np.square(groups.residual - offsets[groups.of, 0]) + repeats.variance) / groups.deviation
     factors = np.full(groups.number, max(float(np.median(rest)) * MAD_TO_SIGMA, 1e-3))
     prior = np.eye(offsets.shape[1]) * (np.var(offsets[:, 0]) + _EQUAL_M**2)
     share = 0.02
@@ -108,12 +152,12 @@ def _estimate(groups: _Groups) -> tuple[NDArray[np.float64], NDArray[np.float64]
 def _inliers(
     groups: _Groups, offsets: NDArray[np.float64], factors: NDArray[np.float64], share: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Probability (n,) that a sample is no outlier, and the outliers' share."""
+    """Measurements (n,) of every sample that are no outliers, and the outliers' share."""
     sigma = factors[groups.of] * groups.deviation
-    z = (groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])) / sigma
-    inlier = (1 - share) * np.exp(-0.5 * z**2 - LOG_SQRT_2PI) / sigma
+    rest = groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])
+    inlier = (1 - share) * np.exp(-0.5 * (rest**2 + groups.repeats.variance) / sigma**2 - LOG_SQRT_2PI) / sigma
     weight = inlier / (inlier + share / RANGE_M)
-    return weight, float(np.clip(1 - weight.mean(), 1e-6, 0.5))
+    return groups.repeats.times * weight, float(np.clip(1 - weight.mean(), 1e-6, 0.5))
 
 
 def _offsets(
@@ -142,7 +186,7 @@ def _factors(
 ) -> NDArray[np.float64]:
     """Factors (groups,) on the deviation: variances shrunk towards their common one (Smyth, SAGMB 3, 2004)."""
     rest = groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])
-    squares = groups.sum(weight * (rest / groups.deviation) ** 2)
+    squares = groups.sum(weight * (rest**2 + groups.repeats.variance) / groups.deviation**2)
     freedom = np.maximum(groups.sum(weight) - used, 0)
     common, confidence = _common_variance(squares, freedom)
     return np.sqrt((confidence * common + squares) / (confidence + freedom))

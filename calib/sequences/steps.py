@@ -1,6 +1,7 @@
 """The steps that distances come in: those of a sensor's digits, and those of its disparity, which grow as x²."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,6 @@ _BINS, _FEW = 12, 30
 
 #: A step that is at least as many digits is one of the disparity, if it grows as one.
 _DIGITS = 3
-
-#: Share of the pixels whose step is a whole number of digits, if there are digits; and how far from whole it may be.
-_MOST, _WHOLE = 0.9, 0.1
 
 #: How far growth may differ between distances, relative to its median, if it is that of a disparity.
 _ALIKE = 0.35
@@ -38,7 +36,7 @@ class Steps:
         return np.maximum(self.digit, self.growth * np.square(np.asarray(x, np.float64)))
 
 
-def recognize(lengths: NDArray[np.floating]) -> Steps:
+def recognize(lengths: NDArray[np.floating], digit: float) -> Steps:
     """The steps of a sequence, from the smallest gap between the values that each pixel takes.
 
     A disparity of whole numbers makes steps ∝ x², which are then rounded to digits: downwards as often as upwards, but
@@ -46,21 +44,19 @@ def recognize(lengths: NDArray[np.floating]) -> Steps:
 
     Args:
         lengths: what the sensor delivers (n, height, width) [m], z or radial; NaN without return.
+        digit: smallest difference that the sensor's numbers can have [m]; 0 if they are no whole numbers.
     """
     x, step = _gaps(lengths)
     if len(x) < _FEW:
-        return Steps()
+        return Steps(digit)
     edges = np.geomspace(x.min(), x.max() * (1 + 1e-6), _BINS + 1)
-    bins = [inside for low, high in zip(edges, edges[1:]) if (inside := (x >= low) & (x < high)).sum() >= _FEW]
+    bins = [inside for low, high in pairwise(edges) if (inside := (x >= low) & (x < high)).sum() >= _FEW]
     if not bins:
-        return Steps()
+        return Steps(digit)
     # Some pixels never take two neighbouring values, so the lower quartile counts.
     typical = np.array([np.quantile(step[inside], 0.25) for inside in bins])
-    digit = float(np.quantile(step, 0.01))
-    if np.mean(np.abs(step / digit - np.rint(step / digit)) < _WHOLE) < _MOST:
-        return Steps()
     growth = np.array([(t + digit / 2) / np.median(x[inside]) ** 2 for t, inside in zip(typical, bins)])
-    growth = growth[typical > (_DIGITS - 0.5) * digit]
+    growth = growth[typical > (_DIGITS - 0.5) * max(digit, _NOTHING_M)]
     alike = len(growth) > 0 and np.all(np.abs(growth / np.median(growth) - 1) < _ALIKE)
     return Steps(digit, float(np.median(growth)) if alike else 0.0)
 

@@ -1,6 +1,7 @@
 """Which parts of a sequence are static: where what changes is no more than noise."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ def segments(n: int) -> list[slice]:
     if n < LEAST_FRAMES:
         raise NoiseError(f"{n} frames are too few to tell noise from motion; record at least {LEAST_FRAMES}")
     edges = np.linspace(0, n, max(1, round(n / SEGMENT)) + 1).astype(int)
-    return [slice(first, last) for first, last in zip(edges, edges[1:])]
+    return [slice(first, last) for first, last in pairwise(edges)]
 
 
 def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: NDArray[np.floating]) -> Segment:
@@ -76,30 +77,42 @@ def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: 
         amplitude: likewise; NaN without.
         step: of the distances (height, width) [m].
     """
-    centre = _median(distance)
-    kept = np.isfinite(distance)
-    for _ in range(2):  # the second time without what the first left out
-        fast = _fast(np.where(kept, distance, np.nan))
-        limit = np.maximum(_CUT * np.sqrt(fast), 1.5 * step)
-        kept = np.abs(distance - centre) <= limit
+    centre = median(distance)
+    fast = _fast(distance)
+    kept = _near(distance, centre, fast, step)
+    fast = _fast(np.where(kept, distance, np.nan))  # without the outliers, among which there may be more
+    kept = _near(distance, centre, fast, step)
     mean, variance, count = _moments(distance, kept)
     seen = np.isfinite(distance).sum(axis=0)
     enough = seen >= _RETURNS * len(distance)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(variance > step**2, variance / fast, 1.0)
     usual = max(1.0, float(np.quantile(ratio[enough], 0.25))) if enough.any() else 1.0
-    changes = enough & (~(ratio < usual * (1 + _RATIO / np.sqrt(len(distance)))) | (count < _INLIERS * seen))
+    steady = np.less(ratio, usual * (1 + _RATIO / np.sqrt(len(distance))))
+    changes = enough & (np.logical_not(steady) | (count < _INLIERS * seen))
     moving = ndimage.binary_opening(changes, np.ones((2, 2))) | (changes & (variance > (2 * step) ** 2))
-    still = enough & ~ndimage.binary_dilation(moving, iterations=_AROUND) & ~changes & ~_rims(centre, fast)
+    near_moving = np.asarray(ndimage.binary_dilation(moving, iterations=_AROUND), np.bool_)
+    still = enough & ~near_moving & ~changes & ~_rims(centre, fast)
     still &= ~_flickers(np.sqrt(variance), enough, step)
     return Segment(mean, variance, still, moving, count, _moments(amplitude, kept & np.isfinite(amplitude))[0])
 
 
-def _median(values: NDArray[np.floating]) -> NDArray[np.float64]:
+def median(values: NDArray[np.floating]) -> NDArray[np.float64]:
     """Median (height, width) over the frames without NaN; NaN where all are. NumPy's is many times slower."""
     ordered = np.sort(values, axis=0)
     middle = (np.isfinite(ordered).sum(axis=0) - 1).clip(0) // 2
     return np.take_along_axis(ordered, middle[None], axis=0)[0].astype(np.float64)
+
+
+def _near(
+    distance: NDArray[np.floating],
+    centre: NDArray[np.float64],
+    variance: NDArray[np.float64],
+    step: NDArray[np.floating],
+) -> NDArray[np.bool_]:
+    """Which distances (n, height, width) are no outliers."""
+    with np.errstate(invalid="ignore"):
+        return np.abs(distance - centre) <= np.maximum(_CUT * np.sqrt(variance), 1.5 * step)
 
 
 def _fast(distance: NDArray[np.floating]) -> NDArray[np.float64]:

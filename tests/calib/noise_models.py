@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from calib.noise.base import DepthNoise
 from calib.noise.constant import Constant
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial, blocks
 from calib.noise.structured_light import StructuredLight
@@ -52,11 +53,19 @@ def varied(seed: int = 3) -> tuple[PixelPolynomial, RegionPolynomial]:
     )
 
 
+def own_of_pixels(seed: int = 4) -> PerPixel:
+    """The law `TOF`, with pixels that differ."""
+    generator = np.random.default_rng(seed)
+    offset = 3e-3 * generator.standard_normal((2, HEIGHT, WIDTH))
+    return PerPixel(TOF, offset, generator.uniform(0.7, 1.5, (HEIGHT, WIDTH)), np.array(DISTANCES))
+
+
 MODELS: dict[str, DepthNoise] = {
     "constant": Constant(4e-3, -0.02),
     "gaussian_polynomial": GLOBAL,
     "region_polynomial": varied()[1],
     "pixel_polynomial": varied()[0],
+    "per_pixel": own_of_pixels(),
     "structured_light": StructuredLight(floor=5e-4),
     "tof_amplitude": TOF,
 }

@@ -19,6 +19,7 @@ TABLES = {
 DEPTH = [
     "constant",
     "gaussian_polynomial",
+    "per_pixel",
     "pixel_polynomial",
     "region_polynomial",
     "structured_light",

@@ -1,0 +1,121 @@
+"""A static sequence: what each pixel measured on average and how it scattered, where nothing moved."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.noise.base import NoiseError
+from calib.noise.samples import Samples, from_images
+from calib.sequences import stillness
+from calib.sequences.steps import Steps, recognize
+from calib.sequences.stillness import Segment
+
+#: A segment whose mean is farther from the others' than so many deviations shows the pixel something else.
+_ELSEWHERE = 3.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Static:
+    """One sequence, reduced; images are (height, width).
+
+    Attributes:
+        name: of the sequence, for people.
+        frames: number of its frames.
+        distance, amplitude: some of the frames (k, height, width) [m]; NaN where a pixel was not still then.
+        mean: distance of each pixel on average [m]; NaN where it was never still.
+        variance: of its distances around that [m²].
+        count: of the distances that tell it.
+        brightness: amplitude of each pixel on average; NaN without.
+        rays: unit directions (height, width, 3).
+        steps: that the distances come in.
+        moving: share of the pixels with returns in which something moved at some time.
+    """
+
+    name: str
+    frames: int
+    distance: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+    mean: NDArray[np.float64]
+    variance: NDArray[np.float64]
+    count: NDArray[np.int64]
+    brightness: NDArray[np.float64]
+    rays: NDArray[np.float64]
+    steps: Steps
+    moving: float
+
+    @property
+    def still(self) -> NDArray[np.bool_]:
+        """Pixels that were still at least during one segment."""
+        return np.isfinite(self.mean)
+
+    def samples(self, reference: NDArray[np.floating], kept: slice = slice(None)) -> Samples:
+        """The measurements of some kept frames, against real distances (height, width) [m]; NaN where unknown."""
+        samples = from_images(self.distance[kept], reference, self.amplitude[kept])
+        return samples.take(np.isfinite(samples.measured) & np.isfinite(samples.true))
+
+
+def reduce(
+    name: str,
+    lengths: NDArray[np.floating],
+    amplitude: NDArray[np.floating],
+    rays: NDArray[np.floating],
+    along: NDArray[np.floating],
+    digit: float,
+    keep: int,
+) -> Static:
+    """Finds what is static in a sequence, and what it says.
+
+    Args:
+        name: of the sequence, for people.
+        lengths: what the sensor delivers (n, height, width) [m]; NaN without return.
+        amplitude: likewise; NaN without.
+        rays: unit directions (height, width, 3).
+        along: radial distance per unit of `lengths` (height, width).
+        digit: smallest difference that the sensor's numbers can have [m]; 0 if they are no whole numbers.
+        keep: number of frames to keep as samples, evenly spread; at least 2.
+
+    Raises:
+        NoiseError: too few frames, or nothing is static.
+    """
+    slices = stillness.segments(len(lengths))
+    steps = recognize(lengths, digit)
+    step = steps.at(np.nan_to_num(lengths[len(lengths) // 2]))
+    distance = (lengths * along).astype(np.float32)
+    found = [stillness.look(distance[part], amplitude[part], step) for part in slices]
+    still = _agreeing(found)
+    if not still.any():
+        raise NoiseError(f"{name}: nothing in it is static")
+    counts = np.array([part.count for part in found]) * still
+    total = np.where(counts.sum(axis=0), counts.sum(axis=0), np.nan)
+    mean, brightness = (np.where(still, [getattr(part, field) for part in found], 0) for field in ("mean", "amplitude"))
+    freedom = np.where(still, counts - 1, 0).sum(axis=0).clip(1)
+    variance = (np.where(still, [part.variance for part in found], 0) * (counts - 1).clip(0)).sum(axis=0) / freedom
+    kept = np.unique(np.linspace(0, len(lengths) - 1, max(2, min(keep, len(lengths)))).astype(int))
+    shown = np.repeat(still, [part.stop - part.start for part in slices], axis=0)[kept]
+    seen = np.any([np.isfinite(part.mean) for part in found], axis=0)
+    moving = np.any([part.moving for part in found], axis=0)
+    return Static(
+        name,
+        len(lengths),
+        np.where(shown, distance[kept], np.nan).astype(np.float32),
+        np.where(shown, amplitude[kept], np.nan).astype(np.float32),
+        (mean * counts).sum(axis=0) / total,
+        variance,
+        counts.sum(axis=0),
+        (brightness * counts).sum(axis=0) / total,
+        np.asarray(rays, np.float64),
+        steps,
+        float(moving.sum() / seen.sum()),
+    )
+
+
+def _agreeing(found: list[Segment]) -> NDArray[np.bool_]:
+    """Which segments (n, height, width) are still and show each pixel the same."""
+    still = np.array([part.still for part in found])
+    means = np.where(still, [part.mean for part in found], np.nan)
+    usual = stillness.median(means)
+    deviation = np.sqrt(stillness.median(np.where(still, [part.variance for part in found], np.nan)))
+    with np.errstate(invalid="ignore"):
+        off = np.abs(means - usual) - np.maximum(_ELSEWHERE * deviation, 1e-4)
+    return still & ((off <= 0) | (len(found) == 1))
