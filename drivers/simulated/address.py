@@ -15,6 +15,7 @@ from drivers.simulated.excursion import Excursion
 from drivers.simulated.faults import Misbehaviour
 from drivers.simulated.heads import Equipment
 from drivers.simulated.optics import BEAMS, OPTICS
+from drivers.simulated.printed import TARGETS
 from drivers.simulated.scenes import SCENES, Choices
 from drivers.simulated.simulation import Simulation
 
@@ -42,6 +43,8 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "distance": values.number(float, 0.1, 10),
     "reflectivity": values.number(float, 0.01, 1),
     "tilt": values.number(float, -70, 70),
+    "board": values.one_of(*TARGETS),
+    "hold": values.number(float, 0, 3600),
     "lens_model": values.one_of("brown_conrady", "fisheye"),
     "order": values.one_of(*ORDERS),
     "blur": values.number(float, 0, 10),
@@ -62,6 +65,8 @@ SCENES_OF: Mapping[str, frozenset[str]] = {
     "distance": frozenset({"wall"}),
     "reflectivity": frozenset({"wall"}),
     "tilt": frozenset({"wall"}),
+    "board": frozenset({"target"}),
+    "hold": frozenset({"target"}),
     "speed": MOVING,
     "occluder": MOVING,
     "leave": MOVING,
@@ -95,6 +100,8 @@ class Address:
         distance: of the bare wall, along the rig's z axis [m].
         reflectivity: of the bare wall, the same for all light.
         tilt: of the bare wall, about the rig's y axis [degrees].
+        board: what is printed on the calibration board, one of `printed.TARGETS`.
+        hold: how long it is still in each pose [s].
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
         lens: distortion of all heads; `lens=-0.2,0.05` is a barrel's k1 and k2.
         lens_model: what `lens` are coefficients of: `brown_conrady`, or `fisheye` with up to four.
@@ -125,6 +132,8 @@ class Address:
     distance: float = 1.0
     reflectivity: float = 0.5
     tilt: float = 0.0
+    board: str = "chessboard"
+    hold: float = 1.0
     texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
     lens_model: str = "brown_conrady"
@@ -151,6 +160,8 @@ class Address:
             distance=self.distance,
             reflectivity=self.reflectivity,
             tilt=math.radians(self.tilt),
+            printed=self.board,
+            hold_s=self.hold,
         )
         equipment = Equipment(
             sizes=self.sizes,

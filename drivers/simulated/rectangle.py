@@ -1,6 +1,7 @@
 """A rectangle that bends onto a cylinder and moves."""
 
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +10,21 @@ from calib import pose
 from calib.pose import Pose
 from drivers.simulated.body import Appearance
 from drivers.simulated.excursion import Excursion
-from drivers.simulated.motion import Motion, Placement
+from drivers.simulated.motion import Placement
 from drivers.simulated.raycast import cast, shadowed, soften_edges
 from drivers.simulated.surface import surface_points
 from drivers.simulated.texture import Texture
 
 #: The rectangle is found in images by a grid of this many points per side.
 _OUTLINE_POINTS = 13
+
+
+class Moves(Protocol):
+    """What says where a rectangle is, such as `drivers.simulated.motion.Motion`."""
+
+    def at(self, t: float) -> Placement:
+        """The placement at time `t` [s] after the start."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +40,7 @@ class Rectangle:
 
     width: float
     height: float
-    motion: Motion
+    motion: Moves
     texture: Texture
     excursion: Excursion = field(default_factory=Excursion)
 

@@ -9,7 +9,9 @@ from calib import pose
 from drivers.simulated.body import Surface
 from drivers.simulated.excursion import Excursion
 from drivers.simulated.hand import Hand
+from drivers.simulated.handling import Handling
 from drivers.simulated.motion import Motion
+from drivers.simulated.printed import TARGETS, paper, printed
 from drivers.simulated.rectangle import Rectangle
 from drivers.simulated.scene import REST_Z, Scene
 from drivers.simulated.strip import Strip
@@ -33,6 +35,8 @@ class Choices:
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
         distance, reflectivity, tilt: of the bare wall [m], [rad].
+        printed: what is printed on the calibration board, one of `TARGETS`.
+        hold_s: how long it is still in each pose [s].
     """
 
     seed: int = 1
@@ -46,6 +50,8 @@ class Choices:
     distance: float = 1.0
     reflectivity: float = 0.5
     tilt: float = 0.0
+    printed: str = "chessboard"
+    hold_s: float = 1.0
 
 
 def sheet(choices: Choices) -> Scene:
@@ -122,6 +128,14 @@ def wall(choices: Choices) -> Scene:
     return Scene((), Texture(np.full((2, 2, 4), choices.reflectivity, np.float32), 1.0), T_rw=T_rw)
 
 
+def target(choices: Choices) -> Scene:
+    """A calibration board, `choices.printed`, that is held still in one pose after another."""
+    board_ = TARGETS[choices.printed]
+    width, height = paper(board_)
+    handling = Handling(choices.seed, width, height, choices.hold_s, choices.speed)
+    return _scene(choices, Rectangle(width, height, handling, printed(board_), choices.excursion))
+
+
 #: The scenes by the name that an address calls them.
 SCENES: Mapping[str, Callable[[Choices], Scene]] = {
     "sheet": sheet,
@@ -129,6 +143,7 @@ SCENES: Mapping[str, Callable[[Choices], Scene]] = {
     "strip": strip,
     "pair": pair,
     "wall": wall,
+    "target": target,
 }
 
 
