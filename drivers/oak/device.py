@@ -1,0 +1,156 @@
+"""An OAK as a device: takes images out of queues, each in a thread of ours, and delivers them."""
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from calib.camera import Camera
+from drivers.capabilities import Capabilities, StreamInfo
+from drivers.delivery import Delivery
+from drivers.device import DeviceError, DeviceState, Sink
+from drivers.oak.connection import CLOCK, Connection, HostTimes
+from drivers.oak.eeprom import EepromError
+from drivers.oak.heads import cameras
+from drivers.oak.messages import QueueClosed
+from drivers.oak.picture import Picture, PictureError, frame, pixels
+from drivers.oak.roles import Role
+
+#: How long the first image of a stream may take, exposure settling included [s].
+FIRST_S = 10.0
+#: How often a thread looks whether it shall stop [s].
+_LOOK_S = 0.1
+
+
+class OakDevice:
+    """Delivers what a pipeline yields, as long as it is started; the pipeline runs from opening to closing.
+
+    Args:
+        connection: the running pipeline; closed if this fails.
+        clock: CLOCK_MONOTONIC [ns].
+        first_s: how long the first image of a stream may take [s].
+
+    Raises:
+        DeviceError: a stream delivers nothing, or nothing usable.
+    """
+
+    def __init__(self, connection: Connection, clock: Callable[[], int], first_s: float = FIRST_S) -> None:
+        self._connection = connection
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._open = True
+        self._flowing = 0  # streams that have not ended
+        self._threads: list[threading.Thread] = []
+        self._clocks: dict[Role, HostTimes] = {}
+        self.info = connection.info
+        self.controls = connection.controls
+        try:
+            first = {role: self._first(role, first_s) for role in connection.queues}
+            self.cameras: Mapping[str, Camera] = cameras(first, connection.poses)
+            streams = tuple(_stream(role, picture, connection.rate_hz) for role, picture in first.items())
+        except (PictureError, EepromError, QueueClosed) as error:
+            self._release()
+            raise DeviceError(f"{self.info.uri}: {error}") from error
+        except DeviceError:
+            self._release()
+            raise
+        self.capabilities = Capabilities(streams, connection.controls.infos, connection.sync_roles)
+        self._delivery = Delivery(streams, causes=["undecodable"])
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames` delivered, and messages that were no image of their stream: `undecodable`."""
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """What the device measures of itself, and how its clock runs, stream by stream."""
+        clocks = {
+            f"clock.{role.sensor}/{role.stream}.{name}": value
+            for role, clock in list(self._clocks.items())
+            for name, value in clock.gauges.items()
+        }
+        return clocks | dict(self._connection.gauges()) if self._open else clocks
+
+    def start(self, sink: Sink) -> None:
+        """See `drivers.device.Device.start`."""
+        stop = self._delivery.begin(sink, "the pipeline runs already")
+        if stop is None:
+            return
+        self._clocks = {role: self._connection.host_times() for role in self._connection.queues}
+        self._threads = [
+            threading.Thread(target=self._pump, args=(role, stop), name=f"oak {role.sensor}/{role.stream}", daemon=True)
+            for role in self._connection.queues
+        ]
+        self._flowing = len(self._threads)
+        self._delivery.report(DeviceState.STREAMING, "images follow")
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> None:
+        """See `drivers.device.Device.stop`."""
+        self._delivery.end("stopped")
+        for thread in self._threads:
+            if thread.is_alive() and thread is not threading.current_thread():
+                thread.join()
+
+    def close(self) -> None:
+        """See `drivers.device.Device.close`."""
+        self._delivery.release()
+        self.stop()
+        self._release()
+
+    def _release(self) -> None:
+        with self._lock:
+            was_open, self._open = self._open, False
+        if was_open:
+            self._connection.close()
+
+    def _first(self, role: Role, timeout_s: float) -> Picture:
+        picture = self._connection.queues[role].get(timeout_s)
+        if picture is None:
+            raise DeviceError(f"{self.info.uri}: {role.sensor}/{role.stream} delivers nothing for {timeout_s:g} s")
+        return picture
+
+    def _pump(self, role: Role, stop: threading.Event) -> None:
+        """Delivers one stream until it is told to stop, or until nothing can come any more."""
+        queue = self._connection.queues[role]
+        try:
+            queue.clear()
+            while not stop.is_set():
+                picture = queue.get(_LOOK_S)
+                if picture is not None and not stop.is_set():
+                    self._deliver(role, picture)
+        except QueueClosed as error:
+            with self._lock:
+                self._flowing -= 1
+                is_last = self._flowing == 0
+            if is_last:
+                over = self._connection.ended
+                state = DeviceState.CLOSED if over else DeviceState.FAILED
+                self._delivery.report(state, over or f"the device is gone: {error}")
+
+    def _deliver(self, role: Role, picture: Picture) -> None:
+        t_arrival_ns = self._clock()
+        try:
+            filters = self._connection.filters.get(role, ())
+            made = frame(picture, role, self.cameras[role.sensor].calib_id, filters)
+        except PictureError:
+            self._delivery.drop("undecodable")
+            return
+        came_ns = self._connection.stamp(picture, t_arrival_ns) - picture.half_exposure_ns
+        stamp = self._clocks[role].stamp(made.t_device_ticks, came_ns)
+        if stamp.stepped:
+            self._delivery.begin_epoch()
+        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
+        self._delivery.frame(replace(made, **times, epoch=self._delivery.epoch))
+
+
+def _stream(role: Role, picture: Picture, rate_hz: float) -> StreamInfo:
+    encoding, image = pixels(picture, role.kind)
+    height, width = image.shape[:2]
+    return StreamInfo(role.sensor, role.stream, role.kind, encoding, width, height, rate_hz, CLOCK)

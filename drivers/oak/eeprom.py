@@ -1,0 +1,110 @@
+"""Where the cameras of an OAK are: its factory calibration as JSON, or what images say of themselves.
+
+The device keeps a pose for each camera that maps its coordinates to those of another one, in centimetres. Source:
+depthai-core 3.12, CalibrationHandler (MIT), against which this is tested.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from calib import pose
+from calib.pose import Pose
+
+#: Metres per depthai's numbered length units: metre, centimetre (the usual one), millimetre, inch, foot.
+UNITS_M = (1.0, 0.01, 0.001, 0.0254, 0.3048)
+
+#: The socket that stands for none.
+NOWHERE = -1
+
+
+class EepromError(ValueError):
+    """A calibration that cannot be used; says what is wrong."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """The pose that maps coordinates of a camera to those of the camera at socket `to` [m]."""
+
+    to: int
+    T_to_camera: Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Poses:
+    """The cameras of one device.
+
+    Attributes:
+        links: by socket.
+        rectifications: by socket, the rotation of a stereo camera's coordinates to its rectified ones.
+    """
+
+    links: Mapping[int, Link] = field(default_factory=dict)
+    rectifications: Mapping[int, Pose] = field(default_factory=dict)
+
+    def between(self, reference: int, socket: int) -> Pose:
+        """The pose that maps coordinates of the camera at `socket` to those of the one at `reference` [m].
+
+        Raises:
+            EepromError: nothing connects them.
+        """
+        root, T_root_camera = self._to_root(socket)
+        root_of_reference, T_root_reference = self._to_root(reference)
+        if root != root_of_reference:
+            raise EepromError(f"nothing is known of where camera {socket} is relative to camera {reference}")
+        return pose.inverse(T_root_reference) @ T_root_camera
+
+    def rectified(self, socket: int) -> Pose:
+        """The pose that maps coordinates of a stereo camera to those of its rectified image.
+
+        Raises:
+            EepromError: the camera is not part of the stereo pair.
+        """
+        if socket not in self.rectifications:
+            raise EepromError(f"camera {socket} is none of the stereo pair {sorted(self.rectifications)}")
+        return self.rectifications[socket]
+
+    def _to_root(self, socket: int) -> tuple[int, Pose]:
+        T, seen = pose.identity(), {socket}
+        while socket in self.links and self.links[socket].to != NOWHERE:
+            link = self.links[socket]
+            if link.to in seen:
+                raise EepromError(f"the poses of cameras {sorted(seen)} go round in a circle")
+            T, socket = link.T_to_camera @ T, link.to
+            seen.add(socket)
+        return socket, T
+
+
+def parse(content: str | bytes) -> Poses:
+    """The poses in a calibration, as `CalibrationHandler.eepromToJson` and its file have it.
+
+    Raises:
+        EepromError: it is no such JSON, or its numbers are no poses.
+    """
+    try:
+        eeprom = json.loads(content)
+        links = {int(socket): _link(camera["extrinsics"]) for socket, camera in eeprom["cameraData"]}
+        stereo = eeprom.get("stereoRectificationData") or {}
+        rotations = {
+            int(stereo[f"{side.lower()}CameraSocket"]): pose.from_rotation(
+                stereo[f"rectifiedRotation{side}"], (0, 0, 0)
+            )
+            for side in ("Left", "Right")
+            if stereo.get(f"rectifiedRotation{side}")
+        }
+        return Poses(links, rotations)
+    except KeyError as error:
+        raise EepromError(f"the calibration lacks {error}") from error
+    except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
+        raise EepromError(f"the calibration is not understood: {error}") from error
+
+
+def _link(extrinsics: Mapping[str, Any]) -> Link:
+    rotation, t = extrinsics["rotationMatrix"], extrinsics["translation"]
+    if not rotation:
+        return Link(NOWHERE, pose.identity())
+    translation = UNITS_M[int(extrinsics.get("lengthUnit", 1))] * np.array([t["x"], t["y"], t["z"]], float)
+    return Link(int(extrinsics["toCameraSocket"]), pose.from_rotation(rotation, translation))

@@ -1,0 +1,76 @@
+"""depthai itself: loaded late, told to keep quiet on the network, and its errors in our words.
+
+Until it is told otherwise it looks a server of its maker up when a pipeline starts, and broadcasts on every network
+interface to find devices. It reads what it is told from the environment when it is loaded or when it searches.
+"""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from drivers.device import DeviceError, SdkMissingError
+
+#: Time to look for a device [ms]; depthai's own is ten seconds.
+SEARCH_MS = 1500
+
+_ENVIRONMENT = {"DEPTHAI_TELEMETRY": "0", "DEPTHAI_LEVEL": "error"}
+
+
+def load(network: bool = False, search_ms: int = SEARCH_MS) -> Any:
+    """The module `depthai`.
+
+    Args:
+        network: whether devices on the network may be looked for; what the user's environment says goes first.
+        search_ms: time to look for a device [ms].
+
+    Raises:
+        SdkMissingError: it is not installed.
+    """
+    for name, value in _ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
+    os.environ["DEPTHAI_SEARCH_TIMEOUT"] = str(search_ms)
+    if _USERS_PROTOCOL is None:
+        os.environ["DEPTHAI_PROTOCOL"] = "any" if network else "usb"
+    try:
+        import depthai  # noqa: PLC0415  an extra, and half a second
+    except ImportError as error:
+        raise SdkMissingError("depthai", "oak") from error
+    return depthai
+
+
+_USERS_PROTOCOL = os.environ.get("DEPTHAI_PROTOCOL")
+
+
+@contextmanager
+def naming(uri: str) -> Iterator[None]:
+    """Turns what depthai raises, plain `RuntimeError`s mostly, into errors that name the device and what to do.
+
+    Raises:
+        DeviceError: whatever depthai said.
+    """
+    try:
+        yield
+    except DeviceError:
+        raise
+    except Exception as error:
+        raise DeviceError(f"{uri}: {_advice(str(error))}") from error
+
+
+def _advice(message: str) -> str:
+    lower = message.lower()
+    if "no available devices" in lower or "cannot find any device" in lower or "retrieve all connected" in lower:
+        return "no such device is attached; is it plugged in, with enough power?"
+    if "permission" in lower:
+        return f"{message}; {UDEV_REMEDY}"
+    if "x_link" in lower or "already" in lower or "booted" in lower:
+        return f"the device does not answer or another program uses it ({message})"
+    return message
+
+
+#: What makes a device accessible to everyone at the machine.
+UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
+UDEV_REMEDY = (
+    f"echo '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/80-movidius.rules"
+    " && sudo udevadm control --reload-rules && sudo udevadm trigger"
+)

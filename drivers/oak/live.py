@@ -1,0 +1,108 @@
+"""An attached OAK: found, opened, and running what an address asks for."""
+
+import json
+from typing import Any
+
+from drivers.capabilities import SyncRole
+from drivers.clock import DeviceClock
+from drivers.device import DeviceError, DeviceInfo, SdkMissingError
+from drivers.discovery import Availability, Found, choose
+from drivers.oak import eeprom, library
+from drivers.oak.address import Address
+from drivers.oak.connection import CLOCK, Connection, synchronised
+from drivers.oak.controls import make
+from drivers.oak.eeprom import EepromError
+from drivers.oak.messages import OutputQueue
+from drivers.oak.pipelines import build
+
+#: Newest images that wait; the pump takes them at once.
+_QUEUE = 4
+_LINKS = {"SUPER_PLUS": "USB 3, 10 Gbit/s", "SUPER": "USB 3, 5 Gbit/s", "HIGH": "USB 2, 480 Mbit/s"}
+
+
+def discover(timeout_s: float) -> list[Found]:
+    """What depthai finds; never raises."""
+    try:
+        dai = library.load(search_ms=max(round(timeout_s * 1000), 1))
+    except SdkMissingError as error:
+        return [Found(DeviceInfo("oak://", "OAK", ""), Availability.SDK_MISSING, error.reason, error.remedy)]
+    try:
+        return [_found(dai, info) for info in dai.Device.getAllConnectedDevices()]
+    except RuntimeError:  # without USB and without network there is nothing to search
+        return []
+
+
+def connect(address: Address) -> Connection:
+    """Opens the device and starts its pipeline.
+
+    Raises:
+        SdkMissingError: depthai is not installed.
+        DeviceError: there is no such device, or it lacks what is asked for.
+    """
+    dai = library.load(address.network)
+    # Without a name, the only device; with one, depthai finds it by itself, on the network as well.
+    name = address.name or choose(discover(library.SEARCH_MS / 1000), "oak", "").info.serial
+    with library.naming(address.uri):
+        device = dai.Device(dai.DeviceInfo(name))
+    try:
+        with library.naming(address.uri):
+            return _run(dai, device, address)
+    except DeviceError:
+        device.close()
+        raise
+
+
+def _run(dai: Any, device: Any, address: Address) -> Connection:
+    # A device that went away is opened anew by its keeper; depthai's own attempts would leave the queues silent.
+    device.setMaxReconnectionAttempts(0)
+    if address.sync != "free":
+        done, reason = device.setExternalFrameSyncRole(getattr(dai.ExternalFrameSyncRole, address.sync.upper()))
+        if not done:
+            raise DeviceError(f"{address.uri}: sync = {address.sync}: {reason}")
+    try:
+        poses = eeprom.parse(json.dumps(device.readCalibration().eepromToJson()))
+    except EepromError as error:
+        raise DeviceError(f"{address.uri}: {error}") from error
+    pipeline = dai.Pipeline(device)
+    outputs = build(dai, device, pipeline, address)
+    queues = {
+        role: OutputQueue(output.createOutputQueue(maxSize=_QUEUE, blocking=False))
+        for role, output in outputs.streams.items()
+    }
+    controls = make(dai, device, outputs, address)
+    pipeline.start()
+
+    def close() -> None:
+        pipeline.stop()
+        device.close()
+
+    return Connection(
+        info=_info(device),
+        queues=queues,
+        poses=poses,
+        rate_hz=address.fps,
+        close=close,
+        host_times=lambda: DeviceClock(CLOCK),
+        filters=outputs.filters,
+        stamp=synchronised,
+        controls=controls,
+        sync_roles=(SyncRole.FREE, SyncRole.MASTER, SyncRole.SLAVE),
+        gauges=lambda: {"temperature_c": float(device.getChipTemperature().average)},
+    )
+
+
+def _info(device: Any) -> DeviceInfo:
+    serial = device.getDeviceId()
+    link = _LINKS.get(device.getUsbSpeed().name, "") if device.getDeviceInfo().protocol.name == "X_LINK_USB_VSC" else ""
+    return DeviceInfo(f"oak://{serial}", str(device.getProductName() or device.getDeviceName()), serial, link=link)
+
+
+def _found(dai: Any, info: Any) -> Found:
+    serial = info.deviceId
+    link = "network" if info.protocol == dai.XLinkProtocol.X_LINK_TCP_IP else "USB"
+    who = DeviceInfo(f"oak://{serial}", "OAK", serial, link=link)
+    if info.status == dai.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS:
+        return Found(who, Availability.NO_PERMISSION, "this user may not open it", library.UDEV_REMEDY)
+    if info.state == dai.XLinkDeviceState.X_LINK_BOOTED:
+        return Found(who, Availability.BUSY, "another program uses it", "end that program")
+    return Found(who)
