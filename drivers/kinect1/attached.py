@@ -1,7 +1,7 @@
 """Which cameras are attached, who they are, and whether they can be opened."""
 
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +32,18 @@ class Attached:
     device: usb.core.Device
 
 
+_LibUSB: Any = libusb._LibUSB  # noqa: SLF001
+
+
+class _Libusb(_LibUSB):
+    """A libusb that outlives the devices which it has found, for they are released into it."""
+
+    def enumerate_devices(self) -> Iterator[Any]:
+        for device in super().enumerate_devices():
+            device.libusb = self
+            yield device
+
+
 def fresh_backend() -> Any:
     """A libusb of its own for each caller: it looks at the bus anew, even where no hot-plug events arrive (containers).
 
@@ -40,7 +52,7 @@ def fresh_backend() -> Any:
     """
     if libusb.get_backend(find_library=libusb_package.find_library) is None:
         raise RuntimeError("no libusb-1.0 can be loaded")
-    return libusb._LibUSB(libusb._lib)  # noqa: SLF001
+    return _Libusb(libusb._lib)  # noqa: SLF001
 
 
 def attached(backend: Any) -> list[Attached]:

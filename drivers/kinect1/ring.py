@@ -19,8 +19,9 @@ from drivers.device import DeviceError
 from drivers.kinect1.packets import PACKET_BYTES
 from drivers.kinect1.transfer import GoneError, Transfer
 
-#: Transfers in flight per pipe, and microframes in each: 64 ms in which the host may be busy with something else.
-TRANSFERS, MICROFRAMES = 8, 64
+#: Transfers in flight per pipe, and microframes in each: 128 ms in which the host may be busy with something else. Both
+#: pipes take 4 MB of the 16 MB that Linux grants to usbfs by default.
+TRANSFERS, MICROFRAMES = 16, 64
 
 #: Transfers in a row that the host may report as failed before it is given up: a second of them.
 PATIENCE = 125

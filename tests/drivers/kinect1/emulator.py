@@ -2,17 +2,20 @@
 
 import struct
 from collections.abc import Callable, Mapping
+from functools import cache
 
 import numpy as np
 
-from drivers.kinect1.packets import COLOR, DEPTH, INFRARED
+from drivers.kinect1.packets import COLOR, DEPTH, INFRARED, PacketFormat
 from tests.drivers.kinect1.film import Film
 from tests.drivers.kinect1.packing import pack
 
 #: Baselines, distance and pixel of the emulated calibration [cm], and its shift.
 PLANE_CM, SHIFT = (7.5, 2.3, 120.0, 0.1042), 200
 
-#: Which registers begin a stream with which value, and in which pipe it then comes.
+FORMS = {"depth": DEPTH, "color": COLOR, "ir": INFRARED}
+
+# Which registers begin a stream with which value, and in which pipe it then comes.
 _SWITCHES = {"depth": (0x06, 2, 0x82), "color": (0x05, 1, 0x81), "ir": (0x05, 3, 0x81)}
 
 
@@ -82,11 +85,13 @@ class EmulatedKinect:
         raise AssertionError(f"the camera knows no command {opcode:#x} {words}")
 
 
-def noise(images: int = 3, seed: int = 1, lost: float = 0.0) -> EmulatedKinect:
+def noise(images: int = 3, seed: int = 1) -> EmulatedKinect:
     """A camera whose pixels are random: no image can be taken for a part of another."""
+    return EmulatedKinect({name: Film(form, _random(form, images, seed)) for name, form in FORMS.items()})
+
+
+@cache
+def _random(form: PacketFormat, images: int, seed: int) -> list[bytes]:
     generator = np.random.default_rng(seed)
-    depth = [pack(generator.integers(300, 1060, (480, 640)), 11) for _ in range(images)]
-    color = [generator.bytes(COLOR.image_bytes) for _ in range(images)]
-    infrared = [generator.bytes(INFRARED.image_bytes) for _ in range(images)]
-    forms = {"depth": (DEPTH, depth), "color": (COLOR, color), "ir": (INFRARED, infrared)}
-    return EmulatedKinect({name: Film(form, shown, lost) for name, (form, shown) in forms.items()})
+    pixels = [generator.integers(0, 1 << form.bits, (form.height, form.width)) for _ in range(images)]
+    return [pack(image, form.bits) for image in pixels]

@@ -24,7 +24,8 @@ class FakeDevice:
         kernel_driver: whether the kernel's driver holds it; a `stubborn` one does not let go.
         refusal: errno with which it cannot be opened, 0 if it can.
         now: microframes that have passed.
-        damage: what happens to packets and their lengths on their way.
+        pace: how fast they do; real time is 1, and `math.inf` as fast as they are read.
+        damage: what happens to packets and their lengths on their way, from their first microframe on.
         opened, claims, readers: how many there are now.
     """
 
@@ -42,9 +43,9 @@ class FakeDevice:
         self.settings: list[int] = []
         self.configuration = 1
         self.now = 0
-        self.hasty = False
+        self.pace = 1.0
         self.readers = 0
-        self.damage: Callable[[np.ndarray, np.ndarray], None] = lambda packets, lengths: None
+        self.damage: Callable[[int, np.ndarray, np.ndarray], None] = lambda first, packets, lengths: None
 
 
 #: Untyped, because pyusb declares that its methods return nothing.
@@ -158,7 +159,7 @@ def error(number: int) -> usb.core.USBError:
 
 
 class FakeReader:
-    """The pipes of one device at the pace of its microframes, or as fast as they are read if the device is `hasty`."""
+    """The pipes of one device at the pace of its microframes."""
 
     MICROFRAMES = 64
 
@@ -166,19 +167,19 @@ class FakeReader:
         self._fake: FakeDevice = device._ctx.dev
         self._clock = clock
         self._endpoints = endpoints
-        self._begin_ns = clock() - self._fake.now * MICROFRAME_NS
+        self._begin, self._begin_ns = self._fake.now, clock()
         self._fake.readers += 1
 
     def read(self, timeout_s: float) -> Iterator[Transfer]:
         fake, kinect = self._fake, self._fake.kinect
-        end_ns = self._begin_ns + (fake.now + self.MICROFRAMES) * MICROFRAME_NS
-        time.sleep(0 if fake.hasty else max(end_ns - self._clock(), 0) * 1e-9)
+        passed_ns = (fake.now + self.MICROFRAMES - self._begin) * MICROFRAME_NS
+        time.sleep(max(passed_ns / fake.pace - (self._clock() - self._begin_ns), 0) * 1e-9)
         for endpoint in self._endpoints:
             if not fake.plugged:
                 raise GoneError("the camera was unplugged")
             packets, lengths = kinect.microframes(endpoint, fake.now, self.MICROFRAMES)
-            fake.damage(packets, lengths)
-            yield Transfer(endpoint, packets, lengths, end_ns)
+            fake.damage(fake.now, packets, lengths)
+            yield Transfer(endpoint, packets, lengths, self._begin_ns + passed_ns)
         fake.now += self.MICROFRAMES
 
     def close(self) -> None:

@@ -19,17 +19,20 @@ class Film:
     Args:
         form: how images are cut.
         images: packed images.
-        lost: share of the packets that never arrive; which ones depends on the microframe only.
-        seed: chooses them.
+        lost: share of the packets that never arrive, see `lose`.
     """
 
-    def __init__(self, form: PacketFormat, images: Sequence[bytes], lost: float = 0.0, seed: int = 1) -> None:
+    def __init__(self, form: PacketFormat, images: Sequence[bytes], lost: float = 0.0) -> None:
         self.form = form
         self.images = images
         self._packets = np.stack([_cut(form, image) for image in images])
         self._lengths = np.full(form.packets, HEADER_BYTES + form.payload, np.uint32)
         self._lengths[-1] = HEADER_BYTES + form.image_bytes - (form.packets - 1) * form.payload
-        self._lost = np.random.default_rng(seed).random(80021) < lost
+        self.lose(lost)
+
+    def lose(self, share: float) -> None:
+        """From now on so many packets never arrive; which ones depends on the microframe only."""
+        self._lost = np.random.default_rng(1).random(80021) < share
 
     def microframes(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """What `count` microframes from the first on carry: packets (count, PACKET_BYTES), and how long each is."""

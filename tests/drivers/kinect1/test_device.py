@@ -1,9 +1,11 @@
 """The device on emulated USB: what it delivers, what it refuses and why, and that it leaves nothing behind."""
 
 import errno
+import math
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ import pytest
 from drivers.device import AddressError, ControlError, DeviceError, DeviceState
 from drivers.discovery import Availability
 from drivers.frame import Geometry, Kind
+from drivers.kinect1 import udev
 from drivers.kinect1.address import Address, parse
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
@@ -36,7 +39,7 @@ def opened(fake: FakeDevice, streams: tuple[Stream, ...] = BOTH, **of_backend: b
 
 
 def test_depth_in_metres_and_the_mosaic_as_it_was_measured(fake: FakeDevice) -> None:
-    fake.hasty = True
+    fake.pace = math.inf
     device, listener = opened(fake), Listener()
     device.start(listener)
     listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= 4)
@@ -57,7 +60,7 @@ def test_depth_in_metres_and_the_mosaic_as_it_was_measured(fake: FakeDevice) -> 
 
 
 def test_infrared_instead_of_color(fake: FakeDevice) -> None:
-    fake.hasty = True
+    fake.pace = math.inf
     device, listener = opened(fake, (Stream.IR,)), Listener()
     assert {camera.height for camera in device.cameras.values()} == {488}
     device.start(listener)
@@ -230,3 +233,8 @@ def test_pyusb_is_imported_only_when_it_is_needed() -> None:
         subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, check=False).returncode
         == 0
     )
+
+
+def test_the_rules_that_are_shipped_are_those_that_the_message_prints() -> None:
+    shipped = (Path(__file__).parents[3] / "docker" / Path(udev.PATH).name).read_text(encoding="utf-8")
+    assert udev.RULES in shipped

@@ -1,0 +1,114 @@
+"""The server process of a testbed: emulated cameras behind umockdev's sockets.
+
+Says "ready"; then it takes a command a line and answers each:
+
+  unplug N, plug N     the camera leaves and comes back
+  driver N NAME        a kernel driver takes the camera; "driver N stubborn" one that does not let go
+  lose SHARE           of the packets from now on
+  cpu                  seconds of processor time that the server has used so far
+  late                 microframes in which no transfer was waiting for a packet, for all cameras
+"""
+
+import argparse
+import contextlib
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from drivers.kinect1.packets import COLOR, DEPTH
+from tests.drivers.kinect1.emulator import EmulatedKinect, noise
+from tests.drivers.kinect1.film import Film
+from tests.drivers.kinect1.testbed import NAMES, NUMBERS, SERIALS
+from tests.drivers.kinect1.usbfs import Connection, Socketed
+
+
+class Bus:
+    """The cameras of a testbed.
+
+    Args:
+        root: umockdev's folder.
+        kinects: what is attached.
+        patient: see `Connection`.
+    """
+
+    def __init__(self, root: Path, kinects: list[EmulatedKinect], patient: bool) -> None:
+        self._root = root
+        self.devices = [Socketed(kinect, serial) for kinect, serial in zip(kinects, SERIALS)]
+        for number, device in zip(NUMBERS, self.devices):
+            path = root / "ioctl" / "dev" / "bus" / "usb" / "001" / number
+            path.parent.mkdir(parents=True, exist_ok=True)
+            listener = socket.socket(socket.AF_UNIX)
+            listener.bind(str(path))
+            listener.listen()
+            threading.Thread(target=self._accept, args=(listener, device, patient), daemon=True).start()
+
+    def plug(self, index: int, plugged: bool) -> None:
+        """Attaches a camera or takes it away."""
+        entry = self._root / "sys" / "bus" / "usb" / "devices" / NAMES[index]
+        aside = self._root / f"unplugged-{index}"
+        (entry if not plugged else aside).rename(aside if not plugged else entry)
+        self.devices[index].plugged = plugged
+
+    def hold(self, index: int, driver: str) -> None:
+        """Lets a kernel driver take a camera."""
+        self.devices[index].driver = "gspca_kinect"
+        self.devices[index].stubborn = driver == "stubborn"
+
+    def lose(self, share: float) -> None:
+        """Loses packets from now on."""
+        for device in self.devices:
+            for film in device.kinect.films.values():
+                film.lose(share)
+
+    @staticmethod
+    def _accept(listener: socket.socket, device: Socketed, patient: bool) -> None:
+        while True:
+            stream, _ = listener.accept()
+            threading.Thread(target=Connection(stream, device, patient).serve, daemon=True).start()
+
+
+def load(path: Path) -> EmulatedKinect:
+    """A camera that shows the film in a file, made by `tests.drivers.kinect1.studio`."""
+    with np.load(path) as film:
+        depth, color = ([image.tobytes() for image in film[name]] for name in ("depth", "color"))
+        return EmulatedKinect({"depth": Film(DEPTH, depth), "color": Film(COLOR, color)})
+
+
+def main() -> None:
+    """Serves until standard input ends."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("root", type=Path)
+    parser.add_argument("--films", type=Path, nargs="*", help="of each camera; noise if there is none")
+    parser.add_argument("--cameras", type=int, default=1)
+    parser.add_argument("--patient", action="store_true", help="wait while nobody takes the packets")
+    arguments = parser.parse_args()
+    with contextlib.suppress(PermissionError):
+        os.nice(-15)  # what it stands for, a kernel, waits for nobody
+    if arguments.films:
+        kinects = [load(path) for path in arguments.films]
+    else:
+        kinects = [noise(seed=index + 1) for index in range(arguments.cameras)]
+    bus = Bus(arguments.root, kinects, arguments.patient)
+    commands: Mapping[str, Callable[..., object]] = {
+        "unplug": lambda index: bus.plug(int(index), False),
+        "plug": lambda index: bus.plug(int(index), True),
+        "driver": lambda index, name: bus.hold(int(index), name),
+        "lose": lambda share: bus.lose(float(share)),
+        "late": lambda: str(sum(device.late for device in bus.devices)),
+        "cpu": lambda: f"{time.process_time():.3f}",
+    }
+    print("ready", flush=True)
+    for line in sys.stdin:
+        name, *words = line.split()
+        print(commands[name](*words) or "done", flush=True)
+    os._exit(0)  # connections may still be open
+
+
+if __name__ == "__main__":
+    main()
