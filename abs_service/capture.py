@@ -1,21 +1,21 @@
-"""Keeps a device delivering: opens it, starts it, and does both again when it fails."""
+"""Keeps a device delivering: opens it, starts it, and does both again when it fails or falls silent.
+
+No driver reconnects by itself: this is the one place that decides when to try again, with whom, and in which epoch.
+"""
 
 import logging
 import threading
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 from abs_service.health import Health, Level
-from drivers.device import Device, DeviceError, DeviceState, FinalError, Sink, Truth
-from drivers.frame import Frame
+from abs_service.watch import Watch
+from drivers.device import Device, DeviceError, DeviceState, FinalError, Sink
 
 _log = logging.getLogger(__name__)
 
 #: Pause before a failed device is opened again: doubles with each failure in a row, up to the longest [s].
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0
-#: A device that says it streams and delivers nothing for this long is opened again [ns].
-SILENCE_NS = 5_000_000_000
 
 _LEVELS = {
     DeviceState.CLOSED: Level.OK,
@@ -32,8 +32,10 @@ class DeviceKeeper:
 
     Args:
         name: name of the device in the configuration.
-        open_device: opens it.
-        on_open: told of each opened device before it starts; what it raises becomes `refusal` and ends the keeper.
+        uri: its address. Once it was open, only the device of the same serial number will do.
+        open_device: opens the device at an address.
+        on_open: told of each opened device before it starts. A `DeviceError` that is not final is a failure like any
+            other; everything else that it raises becomes `refusal` and ends the keeper.
         sink: where the frames go, under the names of the rig.
         heads: names in the rig of the device's heads; frames of others are not wanted.
         health: of the component.
@@ -47,7 +49,8 @@ class DeviceKeeper:
     def __init__(
         self,
         name: str,
-        open_device: Callable[[], Device],
+        uri: str,
+        open_device: Callable[[str], Device],
         on_open: Callable[[Device], None],
         sink: Sink,
         heads: Mapping[str, str],
@@ -55,6 +58,8 @@ class DeviceKeeper:
         clock: Callable[[], int],
     ) -> None:
         self._name = name
+        self._uri = uri
+        self._serial = ""
         self._open_device = open_device
         self._on_open = on_open
         self._sink = sink
@@ -101,12 +106,16 @@ class DeviceKeeper:
     def _serve_once(self) -> tuple[bool, str]:
         """Serves the device until it fails or shall stop; returns whether it delivered anything, and why it ended."""
         self._say(DeviceState.OPENING, "")
-        device = self._open_device()
+        device = self._open_device(self._uri)
+        streams = device.capabilities.streams if device.capabilities.regular else ()
         # Grows with every opening, also across restarts of this process, and leaves the device ten epochs a second.
-        watch = _Watch(self._sink, self._heads, self._clock, first_epoch=self._clock() // 100_000_000)
+        watch = Watch(self._sink, self._heads, streams, self._clock, first_epoch=self._clock() // 100_000_000)
         try:
+            self._recognise(device)
             try:
                 self._on_open(device)
+            except DeviceError:
+                raise
             except Exception as error:
                 self.refusal = error
                 return False, str(error)
@@ -116,15 +125,23 @@ class DeviceKeeper:
             device.close()
             self._earlier.update(device.counters)
             self._earlier["unwanted"] += watch.unwanted
-        return watch.latest_ns > 0, reason
+        return watch.delivered, reason
 
-    def _watch(self, device: Device, watch: "_Watch") -> str:
+    def _recognise(self, device: Device) -> None:
+        """Remembers who the device is: from now on no other will do, whatever the configuration leaves open."""
+        info = device.info
+        if self._serial not in {"", info.serial}:
+            raise DeviceError(f"{self._uri} is device {info.serial} now; {self._serial} is awaited, plug that one in")
+        if info.serial:
+            self._uri, self._serial = info.uri, info.serial
+
+    def _watch(self, device: Device, watch: Watch) -> str:
         shown = (DeviceState.OPENING, "")
         while not self._stop.wait(0.1):
-            counters = Counter({"unwanted": watch.unwanted, **device.counters})
-            counters.update(self._earlier)
-            self._health.count_up_to(counters, f"device.{self._name}.")
-            state, reason = watch.state
+            self._measure(device, watch)
+            state, reason = watch.silence()
+            if state != shown[0]:
+                self._health.count(f"device.{self._name}.stalls", int(state == DeviceState.STALLED))
             if (state, reason) != shown:
                 shown = (state, reason)
                 self._say(state, reason)
@@ -133,43 +150,19 @@ class DeviceKeeper:
             if state == DeviceState.CLOSED:
                 self.finished = True
                 return reason
-            silent_ns = self._clock() - watch.latest_ns
-            if state == DeviceState.STREAMING and watch.latest_ns and silent_ns > SILENCE_NS:
-                return f"delivers nothing for {silent_ns / 1e9:.1f} s"
         return "stopped"
+
+    def _measure(self, device: Device, watch: Watch) -> None:
+        counters = Counter({"unwanted": watch.unwanted, **device.counters})
+        counters.update(self._earlier)
+        self._health.count_up_to(counters, f"device.{self._name}.")
+        for name, value in device.gauges.items():
+            self._health.gauge(f"device.{self._name}.{name}", value)
+        for condition, message in watch.take_warnings().items():
+            text = f"{self._name}: {message}" if message else ""
+            self._health.report(f"device {self._name} {condition}", Level.WARNING if message else Level.OK, text)
 
     def _say(self, state: DeviceState, reason: str) -> None:
         self._health.label(f"device.{self._name}", state.value)
         level = _LEVELS[state]
         self._health.report(f"device {self._name}", level, f"{self._name}: {reason}" if level > Level.OK else "")
-
-
-class _Watch:
-    """A sink that speaks the names of the rig and notes when something last came."""
-
-    def __init__(self, sink: Sink, heads: Mapping[str, str], clock: Callable[[], int], first_epoch: int) -> None:
-        self._sink = sink
-        self._heads = heads
-        self._clock = clock
-        self._first_epoch = first_epoch
-        self.latest_ns = 0
-        self.unwanted = 0
-        self.state = (DeviceState.OPENING, "")
-
-    def on_frame(self, frame: Frame) -> None:
-        self.latest_ns = self._clock()
-        sensor = self._heads.get(frame.sensor)
-        if sensor is None:
-            self.unwanted += 1
-            return
-        self._sink.on_frame(replace(frame, sensor=sensor, epoch=self._first_epoch + frame.epoch))
-
-    def on_truth(self, truth: Truth) -> None:
-        self._sink.on_truth(truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        self.state = (state, reason)
-        self._sink.on_state(state, reason)
-
-    def on_warning(self, condition: str, message: str) -> None:
-        self._sink.on_warning(condition, message)

@@ -61,8 +61,10 @@ class Capabilities:
         streams: what it delivers.
         controls: what can be set while it is open.
         sync_roles: parts that it can take among other devices; the one it takes is its control `sync_role`.
+        regular: whether its streams keep coming at their rates, so that silence is a fault; not so in a recording.
     """
 
     streams: tuple[StreamInfo, ...]
     controls: tuple[ControlInfo, ...] = ()
     sync_roles: tuple[SyncRole, ...] = (SyncRole.FREE,)
+    regular: bool = True

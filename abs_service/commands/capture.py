@@ -10,7 +10,6 @@ import argparse
 import threading
 import time
 from collections.abc import Callable, Mapping
-from functools import partial
 
 from abs_service import announcements, config, keys, plugins
 from abs_service.bus.contract import Bus, Publisher
@@ -22,7 +21,8 @@ from abs_service.exits import Exit
 from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib.camera import Camera
-from drivers.device import Device
+from drivers.controls import Value
+from drivers.device import ControlError, Device
 from drivers.opening import open_device
 
 #: Time that the devices have to close [s].
@@ -31,6 +31,10 @@ CLOSE_S = 1.0
 
 class HeadError(Exception):
     """A configuration that names a head which its device does not have."""
+
+
+class SettingError(Exception):
+    """A configuration that sets a control which its device does not have, or to what it does not take."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,7 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
         bus.answer(keys.SCHEMA, announcements.SCHEMA_MESSAGE, announcements.schema)
         crier = Crier(bus, speaker, rig)
         publishers = {name: FramePublisher(bus, speaker, name) for name in rig.devices}
-        keepers = [_keeper(name, rig, crier, publishers[name], health) for name in rig.devices]
+        source = str(arguments.config or "demo.toml")
+        keepers = [_keeper(name, rig, source, crier, publishers[name], health) for name in rig.devices]
         for keeper in keepers:
             keeper.start()
         _watch(stop, keepers, lambda: _tick(crier, publishers, health, clock))
@@ -67,17 +72,41 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _keeper(
-    name: str, rig: config.ServiceConfig, crier: "Crier", publisher: FramePublisher, health: Health
+    name: str, rig: config.ServiceConfig, source: str, crier: "Crier", publisher: FramePublisher, health: Health
 ) -> DeviceKeeper:
+    def on_open(device: Device) -> None:
+        set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
+        crier.add_device(name, device)
+
     return DeviceKeeper(
         name,
-        partial(open_device, rig.devices[name].uri, time.monotonic_ns),
-        partial(crier.add_device, name),
+        rig.devices[name].uri,
+        lambda uri: open_device(uri, time.monotonic_ns),
+        on_open,
         publisher,
         rig.heads(name),
         health,
         time.monotonic_ns,
     )
+
+
+def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> None:
+    """Sets controls of an opened device.
+
+    Args:
+        device: the device.
+        controls: values by name.
+        where: file and table that they stand in, for messages.
+
+    Raises:
+        SettingError: an unknown control or a value that it does not take; names file, key, value and what is allowed.
+        DeviceError: the device does not answer.
+    """
+    for name, value in controls.items():
+        try:
+            device.controls.set(name, value)
+        except ControlError as error:
+            raise SettingError(f"{where}.{error}") from None
 
 
 def _watch(stop: threading.Event, keepers: list[DeviceKeeper], tick: Callable[[], None]) -> None:

@@ -65,6 +65,8 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
     for name in rig.devices:
         with _noting(f"devices.{name}.uri", problems):
             streams |= _streams(rig, name)
+        with _noting(f"devices.{name}.controls", problems):
+            _check_controls(rig, name)
     for name, sensor in rig.sensors.items():
         with _noting(f"sensors.{name}.noise", problems):
             if sensor.noise is not None:
@@ -133,6 +135,20 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
             raise CheckError(f'sensor "{sensor}": no head "{head}", {none_of(head, heads)}')
         found[sensor] = [f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams]
     return found
+
+
+def _check_controls(rig: config.ServiceConfig, name: str) -> None:
+    """Refuses controls that a device which can be opened without touching hardware does not take."""
+    device_table = rig.devices[name]
+    if not device_table.controls or device_table.uri.partition(":")[0] not in HARMLESS:
+        return
+    device = opening.open_device(device_table.uri, time.monotonic_ns)
+    device.close()
+    infos = {info.name: info for info in device.controls.infos}
+    for control, value in device_table.controls.items():
+        if control not in infos:
+            raise CheckError(f"{control}: no such control, {none_of(control, infos)}")
+        infos[control].checked(value)
 
 
 def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]) -> None:

@@ -71,7 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
         display.close(session.view())
     refused = supervisor.refused()
     if refused is not None:
-        raise ChildError(refused.reason.rpartition("abs-service: error: ")[2])
+        # The child has read a file of ours that nobody else knows.
+        reason = refused.reason.rpartition("abs-service: error: ")[2]
+        raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
     return supervisor.verdict() or Exit.OK
 
 

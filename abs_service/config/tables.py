@@ -26,9 +26,15 @@ class BusTable(Table):
 
 
 class DeviceTable(Table):
-    """`[devices.<name>]`: one thing that delivers images; the URI names its driver and which device."""
+    """`[devices.<name>]`: one thing that delivers images.
+
+    Attributes:
+        uri: names its driver and which device.
+        controls: what is set whenever it is opened; `abs-service devices --controls URI` lists what there is.
+    """
 
     uri: DeviceUri
+    controls: dict[str, bool | int | float | str] = Field(default_factory=dict)
 
 
 class SensorTable(Table):

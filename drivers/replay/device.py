@@ -47,7 +47,7 @@ class ReplayDevice:
         delay_s: float = 0.0,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="replay", serial=recording.path.name)
-        self.capabilities = Capabilities(_streams(recording, speed))
+        self.capabilities = Capabilities(_streams(recording, speed), regular=False)
         self.cameras: Mapping[str, Camera] = recording.cameras
         self.controls = Controls()
         self._recording = recording

@@ -14,19 +14,19 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
 
-from abs_service import announcements, capture, config, keys
+from abs_service import announcements, capture, config, keys, watch
 from abs_service.capture import DeviceKeeper
 from abs_service.commands import capture as command
-from abs_service.commands.capture import Crier, HeadError
+from abs_service.commands.capture import Crier, HeadError, SettingError
 from abs_service.envelope import MESSAGES
 from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from drivers.capabilities import Capabilities
+from drivers.capabilities import Capabilities, StreamInfo
 from drivers.codec import CodecError
-from drivers.controls import Controls
+from drivers.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.device import AddressError, DeviceError, DeviceInfo, DeviceState
 from drivers.frame import Frame, Kind
 from drivers.sensor_model import decode_camera
@@ -38,13 +38,13 @@ CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0
 class FakeDevice:
     """Does what it is told."""
 
-    info = DeviceInfo("fake://", "fake", "1")
-    capabilities = Capabilities(())
+    capabilities = Capabilities((StreamInfo("head", "image", Kind.COLOR, "mono8", 4, 3, 30.0),))
     controls = Controls()
     gauges: dict[str, float] = {}  # noqa: RUF012
     state = DeviceState.CLOSED
 
-    def __init__(self, heads=("head", "other"), start=lambda sink: None):
+    def __init__(self, heads=("head", "other"), start=lambda sink: None, serial="1"):
+        self.info = DeviceInfo(f"fake://{serial}", "fake", serial)
         self.cameras = dict.fromkeys(heads, CAMERA)
         self.counters = {"frames": 1}
         self.start = start
@@ -81,7 +81,13 @@ def frame(sensor="head", seq=0):
 
 
 @pytest.fixture
-def keep(monkeypatch):
+def asked():
+    """The addresses that keepers have opened."""
+    return []
+
+
+@pytest.fixture
+def keep(monkeypatch, asked):
     """Starts a keeper on devices that are made one after the other; closed after the test."""
     monkeypatch.setattr(capture, "FIRST_PAUSE_S", 0.1)
     keepers = []
@@ -91,10 +97,13 @@ def keep(monkeypatch):
         collector, bus = Collector(), LoopbackBus()
         health = Health(bus, "capture", Speaker("demo", WallClock()))
 
-        def open_device():
+        def open_device(uri):
+            asked.append(uri)
             return next(makers)()
 
-        keeper = DeviceKeeper("sim", open_device, on_open, collector, {"head": "tof"}, health, WallClock().monotonic)
+        keeper = DeviceKeeper(
+            "sim", "fake://", open_device, on_open, collector, {"head": "tof"}, health, WallClock().monotonic
+        )
         keepers.append(keeper)
         keeper.start()
         return keeper, collector, health
@@ -166,10 +175,72 @@ def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_a_device_that_falls_silent_is_opened_again(keep, monkeypatch):
-    monkeypatch.setattr(capture, "SILENCE_NS", 1_000_000)
-    _, collector, _ = keep(working, working)
-    assert collector.frames.get(timeout=5).epoch < collector.frames.get(timeout=5).epoch
+def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monkeypatch):
+    monkeypatch.setattr(watch, "STALL_NS", 200_000_000)
+    monkeypatch.setattr(watch, "SILENCE_NS", 600_000_000)
+    _, collector, health = keep(working, working)
+    first = collector.frames.get(timeout=5)
+    assert eventually(lambda: health._labels["device.sim"] == "stalled")
+    assert health._conditions["device sim"][0] == Level.WARNING
+    assert "head/image delivers nothing for" in health._conditions["device sim"][1]
+    assert collector.frames.get(timeout=5).epoch > first.epoch
+    assert health._counters["device.sim.stalls"] >= 1
+
+
+def test_only_the_same_device_will_do_after_a_reconnect(keep, asked):
+    def other():
+        return FakeDevice(start=working().start, serial="2")
+
+    _, collector, health = keep(failing("unplugged"), other, working)
+    collector.frames.get(timeout=5)
+    assert eventually(lambda: "is device 2 now; 1 is awaited" in health._conditions["device sim"][1])
+    assert collector.frames.get(timeout=5)
+    assert asked == ["fake://", "fake://1", "fake://1"], "by its serial number, though the address has none"
+
+
+def test_warnings_and_gauges_of_a_device_are_in_the_health(keep):
+    device = working()
+    device.gauges = {"temperature_c": 41.5}
+    device.start = lambda sink: (
+        sink.on_state(DeviceState.STREAMING, ""),
+        sink.on_frame(frame()),
+        sink.on_warning("usb speed", "USB 2 only; use a blue port"),
+        sinks.append(sink),
+    )
+    sinks = []
+    _, _, health = keep(lambda: device)
+    assert eventually(lambda: health.level == Level.WARNING)
+    assert health._conditions["device sim usb speed"][1] == "sim: USB 2 only; use a blue port"
+    assert health._gauges["device.sim.temperature_c"] == 41.5
+    sinks[0].on_warning("usb speed", "")
+    assert eventually(lambda: health.level == Level.OK)
+
+
+def test_a_control_is_set_at_every_opening_and_a_wrong_one_is_explained():
+    held = {}
+    info = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 1e-5, 0.03)
+    device = FakeDevice()
+    device.controls = Controls([Control(info, lambda: 0.0, lambda value: held.update(exposure_s=value))])
+    command.set_controls(device, {"exposure_s": 0.01}, "rig.toml: devices.cam.controls")
+    assert held == {"exposure_s": 0.01}
+    expected = r"^rig\.toml: devices\.cam\.controls\.exposure_s = 5: must be a number from 1e-05 to 0\.03 s$"
+    with pytest.raises(SettingError, match=expected):
+        command.set_controls(device, {"exposure_s": 5}, "rig.toml: devices.cam.controls")
+    with pytest.raises(SettingError, match=r"controls\.gain: the device has no such control, it has: exposure_s"):
+        command.set_controls(device, {"gain": 5}, "rig.toml: devices.cam.controls")
+
+
+def test_a_device_that_does_not_answer_when_it_is_set_is_tried_again(keep):
+    calls = []
+
+    def on_open(device):
+        calls.append(device)
+        if len(calls) == 1:
+            raise DeviceError("does not answer")
+
+    keeper, collector, _ = keep(working, working, on_open=on_open)
+    assert collector.frames.get(timeout=5)
+    assert keeper.refusal is None
 
 
 def test_frames_of_heads_that_nobody_configured_are_counted_and_left_out(keep):

@@ -71,6 +71,11 @@ def test_a_mistake_for_scripts(checked):
         ("seed=1&", "sede=1&", "devices.sim.uri: simulated://sheet?sede=1&sensors=tof: unknown key 'sede'"),
         ("sensors=tof", "sensors=color", 'devices.sim.uri: sensor "tof": no head "tof", allowed: color'),
         ("sheet?seed=1&sensors=tof", "sheet?seed=x", "seed = 'x' must be a number"),
+        (
+            "[sensors",
+            "[devices.sim.controls]\ngain = 2\n[sensors",
+            "devices.sim.controls: gain: no such control, allowed: none",
+        ),
         ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "none.mcap"),
         ('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }', "trackers.sheet.region: file = "),
         (
