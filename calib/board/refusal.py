@@ -27,3 +27,7 @@ class CutOffError(BoardError):
 
 class BlurredError(BoardError):
     """Edges are spread over so many pixels that corners are where the blur puts them."""
+
+
+class MovedError(BoardError):
+    """The board moved between this image and the one before, so that sensors do not see it in the same place."""
