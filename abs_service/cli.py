@@ -24,6 +24,7 @@ COMMANDS = {
     "run": "track live: devices, trackers and recorder, supervised, with a table of how they are",
     "replay": "track a recording again, frame by frame",
     "check": "say what a configuration describes, or what is wrong with it",
+    "devices": "what is attached, and what to do about what cannot be used",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
     "import": "turn a folder of images into a recording",
     "recover": "repair recordings that were cut short",

@@ -30,7 +30,7 @@ class DeviceTable(Table):
 
     Attributes:
         uri: names its driver and which device.
-        controls: what is set whenever it is opened; `abs-service devices --controls URI` lists what there is.
+        controls: what is set whenever it is opened; `abs-service devices URI` lists what there is.
     """
 
     uri: DeviceUri
