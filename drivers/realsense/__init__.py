@@ -1,7 +1,8 @@
 """Intel RealSense: cameras of the D4xx and L5xx kind, and their recordings as ROS 1 bags."""
 
 from drivers.realsense.bag import RealsenseBag
+from drivers.realsense.opening import discover, open_device
 
-__all__ = ["open_recording"]
+__all__ = ["discover", "open_device", "open_recording"]
 
 open_recording = RealsenseBag

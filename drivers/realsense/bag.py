@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from drivers.footage import FootageError
-from drivers.frame import ENCODINGS, Frame, Kind, Reference
+from drivers.frame import Frame, Kind, Reference
+from drivers.realsense.picture import unpadded
 from drivers.realsense.ros import Bag
 from drivers.realsense.streams import ROLES, Role, StreamError, camera
 
@@ -154,14 +155,8 @@ def pixels(kind: Kind, image: Any) -> tuple[str, NDArray[np.generic]]:
     allowed = _ENCODINGS[kind]
     if image.encoding not in allowed or image.is_bigendian:
         raise StreamError(f"{kind} must be encoded as one of {sorted(allowed)}, little-endian, not {image.encoding!r}")
-    dtype, channels = ENCODINGS[allowed[image.encoding]]
-    row = image.width * channels * dtype.itemsize
-    if not 0 < row <= image.step or image.height < 1 or len(image.data) < image.step * image.height:
-        size = f"{image.width} × {image.height} × {channels}"
-        raise StreamError(f"{size} in rows of {image.step} bytes need more than {len(image.data)} bytes")
-    rows = np.asarray(image.data, np.uint8)[: image.step * image.height].reshape(image.height, image.step)[:, :row]
-    data = np.ascontiguousarray(rows).view(dtype)
-    return allowed[image.encoding], data if channels == 1 else data.reshape(image.height, image.width, channels)
+    encoding = allowed[image.encoding]
+    return encoding, unpadded(image.data, encoding, image.width, image.height, image.step)
 
 
 def _role(topic: str) -> Role | None:

@@ -1,0 +1,206 @@
+"""A RealSense as a device, on librealsense's sensors and callbacks.
+
+librealsense calls back from threads of its own. The callbacks only put frames into an inbox and take no other lock: a
+Python exception must not reach the SDK, and whoever stops a sensor waits for its callbacks.
+"""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from calib.camera import Camera
+from drivers.capabilities import Capabilities, ClockInfo, StreamInfo, SyncRole
+from drivers.clock import DeviceClock
+from drivers.delivery import Delivery
+from drivers.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.realsense import controls
+from drivers.realsense.inbox import Inbox
+from drivers.realsense.library import naming
+from drivers.realsense.picture import TICK_HZ, Picture, frame, from_frame
+from drivers.realsense.profiles import Stream, cameras
+from drivers.realsense.streams import Role, StreamError
+
+_log = logging.getLogger(__name__)
+
+#: How often the thread looks whether it shall stop [s].
+_LOOK_S = 0.1
+#: When nothing has come for so long, it asks whether the camera is still there [s].
+_SILENT_S = 1.0
+#: The cameras' counter of microseconds has 32 bits. Stamps that have more, of the host's clock, come through unchanged.
+CLOCK = ClockInfo("realsense hardware clock", TICK_HZ, 32)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Used:
+    """A sensor of the camera, and its streams that are used."""
+
+    sensor: Any
+    streams: Sequence[Stream]
+
+
+class RealsenseDevice:
+    """Delivers the streams of a camera, of a recording, or of a software device.
+
+    Args:
+        rs: pyrealsense2.
+        camera: `rs.device`; playing recordings and software devices are such.
+        info: who it is.
+        used: its sensors with the streams that are used.
+        clock: CLOCK_MONOTONIC [ns].
+
+    Raises:
+        DeviceError: its calibration is not understood.
+    """
+
+    def __init__(self, rs: Any, camera: Any, info: DeviceInfo, used: Sequence[Used], clock: Callable[[], int]) -> None:
+        self.info = info
+        self._rs = rs
+        self._camera = camera
+        self._used = used
+        self._clock = clock
+        self._lock = threading.RLock()
+        self._running: list[Any] = []
+        self._thread = threading.Thread()
+        self._clocks: dict[Role, DeviceClock] = {}
+        self._inbox: Inbox[tuple[Role, Any, int]] = Inbox()
+        streams = [stream for one in used for stream in one.streams]
+        try:
+            self.cameras: Mapping[str, Camera] = cameras(streams)
+        except ValueError as error:
+            raise DeviceError(f"{info.uri}: {error}") from error
+        with naming(info.uri):
+            sensors = {number: (one.sensor, one.streams[0].role) for number, one in enumerate(used)}
+            self.controls = controls.make(rs, info.uri, sensors)
+            roles = tuple(SyncRole) if controls.can_sync(rs, sensors) else (SyncRole.FREE,)
+        infos = tuple(_info(stream) for stream in streams)
+        self.capabilities = Capabilities(infos, self.controls.infos, roles)
+        self._delivery = Delivery(infos, causes=["overrun", "undecodable"])
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames` delivered; `overrun`: newer ones came before they were taken; `undecodable` ones."""
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """How the camera's clock runs, stream by stream."""
+        return {
+            f"clock.{role.sensor}/{role.stream}.{name}": value
+            for role, clock in list(self._clocks.items())
+            for name, value in clock.gauges.items()
+        }
+
+    def start(self, sink: Sink) -> None:
+        """See `drivers.device.Device.start`."""
+        with self._lock:
+            stop = self._delivery.begin(sink, "opening the camera's sensors")
+            if stop is None:
+                return
+            self._halt()  # what ended by itself still holds its sensors
+            self._inbox = Inbox(4 * sum(len(one.streams) for one in self._used))
+            self._clocks = {stream.role: DeviceClock(CLOCK) for one in self._used for stream in one.streams}
+            try:
+                with naming(self.info.uri):
+                    self._open_sensors(self._inbox)
+            except DeviceError as error:
+                self._halt()
+                self._delivery.report(DeviceState.FAILED, str(error))
+                raise
+            self._thread = threading.Thread(target=self._pump, args=(stop, self._inbox), name="realsense", daemon=True)
+            self._delivery.report(DeviceState.STREAMING, "images follow")
+            self._thread.start()
+
+    def stop(self) -> None:
+        """See `drivers.device.Device.stop`."""
+        self._delivery.end("stopped")
+        with self._lock:
+            self._halt()
+            thread = self._thread
+        if thread.is_alive() and thread is not threading.current_thread():
+            thread.join()
+
+    def close(self) -> None:
+        """See `drivers.device.Device.close`."""
+        self._delivery.release()
+        self.stop()
+
+    def end(self, reason: str) -> None:
+        """Says that nothing will come any more; made for callbacks."""
+        self._inbox.end(reason)
+
+    def _open_sensors(self, inbox: Inbox[tuple[Role, Any, int]]) -> None:
+        for one in self._used:
+            roles = {stream.profile.unique_id(): stream.role for stream in one.streams}
+            one.sensor.open([stream.profile for stream in one.streams])
+            self._running.append(one.sensor)
+            one.sensor.start(self._callback(roles, inbox))
+
+    def _callback(self, roles: Mapping[int, Role], inbox: Inbox[tuple[Role, Any, int]]) -> Callable[[Any], None]:
+        def take(image: Any) -> None:
+            try:
+                role = roles.get(image.get_profile().unique_id())
+                if role is not None:
+                    image.keep()
+                    inbox.put((role, image, self._clock()))
+            except Exception:  # whatever it is, it must not reach the SDK
+                _log.exception("%s: a frame was lost", self.info.uri)
+
+        return take
+
+    def _halt(self) -> None:
+        """Stops and closes the sensors that run."""
+        while self._running:
+            sensor = self._running.pop()
+            for action in (sensor.stop, sensor.close):
+                try:
+                    action()
+                except RuntimeError:  # a sensor that was not started, or a camera that is gone
+                    continue
+
+    def _pump(self, stop: threading.Event, inbox: Inbox[tuple[Role, Any, int]]) -> None:
+        latest = time.monotonic()
+        while not stop.is_set():
+            item = inbox.take(_LOOK_S)
+            self._delivery.drop("overrun", inbox.dropped())
+            if item is not None:
+                latest = time.monotonic()
+                self._deliver(*item)
+            elif inbox.ended():
+                self._delivery.report(DeviceState.CLOSED, inbox.ended())
+                return
+            elif time.monotonic() - latest > _SILENT_S and not self._is_connected():
+                self._delivery.report(DeviceState.FAILED, "the camera is gone")
+                return
+
+    def _is_connected(self) -> bool:
+        try:
+            return bool(self._camera.is_connected())
+        except RuntimeError:
+            return False
+
+    def _deliver(self, role: Role, image: Any, t_arrival_ns: int) -> None:
+        try:
+            picture: Picture = from_frame(self._rs, image)
+            made = frame(picture, role, self.cameras[role.sensor].calib_id)
+        except (StreamError, RuntimeError):
+            self._delivery.drop("undecodable")
+            return
+        stamp = self._clocks[role].stamp(picture.ticks, t_arrival_ns)
+        if stamp.stepped:
+            self._delivery.begin_epoch()
+        times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
+        self._delivery.frame(replace(made, **times, epoch=self._delivery.epoch))
+
+
+def _info(stream: Stream) -> StreamInfo:
+    role, profile = stream.role, stream.profile
+    size = profile.width(), profile.height()
+    return StreamInfo(role.sensor, role.stream, role.kind, stream.encoding, *size, float(profile.fps()), CLOCK)

@@ -1,0 +1,107 @@
+"""From an address to a device: attached cameras, and recordings that librealsense plays."""
+
+from collections.abc import Callable
+from typing import Any
+
+from drivers.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
+from drivers.discovery import Availability, Found, choose
+from drivers.realsense import library
+from drivers.realsense.address import Address, parse
+from drivers.realsense.device import RealsenseDevice, Used
+from drivers.realsense.profiles import of_sensor, wanted
+
+
+def discover(timeout_s: float) -> list[Found]:
+    """The attached cameras; never raises."""
+    try:
+        rs = library.load()
+    except SdkMissingError as error:
+        return [
+            Found(DeviceInfo("realsense://", "RealSense", ""), Availability.SDK_MISSING, error.reason, error.remedy)
+        ]
+    return [_found(rs, camera) for camera in rs.context().query_devices()]
+
+
+def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
+    """Opens `realsense://SERIAL`, or `realsense://?recording=FILE.db3`, which librealsense plays.
+
+    Raises:
+        AddressError: the address is not understood, or the file cannot be played.
+        SdkMissingError: pyrealsense2 is not installed.
+        DeviceError: there is no such camera, or it lacks what is asked for.
+    """
+    address = parse(uri)
+    rs = library.load()
+    if address.recording is not None:
+        return _play(rs, address, str(address.recording), clock)
+    serial = choose(discover(1.0), "realsense", address.serial).info.serial
+    with library.naming(uri):
+        camera = next(one for one in rs.context().query_devices() if _text(rs, one, "serial_number") == serial)
+        for sensor in camera.query_sensors():
+            # Otherwise librealsense makes host times itself, by a fit that nobody can see.
+            if sensor.supports(rs.option.global_time_enabled):
+                sensor.set_option(rs.option.global_time_enabled, 0.0)
+        offers = [(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
+        chosen = set(map(id, wanted([stream for _, streams in offers for stream in streams], address)))
+    used = [Used(sensor, [stream for stream in streams if id(stream) in chosen]) for sensor, streams in offers]
+    return _device(rs, camera, about(rs, camera), used, clock)
+
+
+def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) -> RealsenseDevice:
+    """A device of an `rs.device` that offers exactly what it shall deliver: a software device, or one that plays.
+
+    Raises:
+        DeviceError: it offers nothing that is understood.
+    """
+    with library.naming(info.uri):
+        used = [Used(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
+    return _device(rs, camera, info, used, clock)
+
+
+def about(rs: Any, camera: Any) -> DeviceInfo:
+    """Who a camera is."""
+    serial = _text(rs, camera, "serial_number")
+    usb = _text(rs, camera, "usb_type_descriptor")
+    link = f"USB {usb}" if usb else ""
+    return DeviceInfo(
+        f"realsense://{serial}", _text(rs, camera, "name"), serial, _text(rs, camera, "firmware_version"), link
+    )
+
+
+def _play(rs: Any, address: Address, path: str, clock: Callable[[], int]) -> RealsenseDevice:
+    try:
+        playback = rs.playback(rs.context().load_device(path))
+    except RuntimeError as error:
+        raise AddressError(f"{address.uri}: {path} cannot be played: {error}") from error
+    info = DeviceInfo(address.uri, _text(rs, playback, "name"), _text(rs, playback, "serial_number"))
+    device = of_device(rs, playback, info, clock)
+
+    def changed(status: Any) -> None:
+        if status == rs.playback_status.stopped:
+            device.end("the recording has ended")
+
+    playback.set_status_changed_callback(changed)
+    return device
+
+
+def _device(rs: Any, camera: Any, info: DeviceInfo, used: list[Used], clock: Callable[[], int]) -> RealsenseDevice:
+    with_streams = [one for one in used if one.streams]
+    if not with_streams:
+        raise DeviceError(f"{info.uri}: it has no stream of depth, infra-red, confidence or colour")
+    return RealsenseDevice(rs, camera, info, with_streams, clock)
+
+
+def _found(rs: Any, camera: Any) -> Found:
+    try:
+        info = about(rs, camera)
+        camera.query_sensors()
+    except RuntimeError as error:
+        who = DeviceInfo("realsense://", "RealSense", "")
+        remedy = "install librealsense's udev rules (99-realsense-libusb.rules) and plug the camera in again"
+        return Found(who, Availability.NO_PERMISSION, f"it cannot be read: {error}", remedy)
+    return Found(info)
+
+
+def _text(rs: Any, camera: Any, key: str) -> str:
+    info = getattr(rs.camera_info, key)
+    return camera.get_info(info) if camera.supports(info) else ""
