@@ -1,9 +1,13 @@
-"""Forward distortion of single points, for kernels that project many: `distort` in single precision."""
+"""Forward distortion in single precision: of single points, for kernels that project many, and of images of them."""
+
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.fisheye import KannalaBrandt
 from calib.jit import kernel
+from calib.lens import LensModel
 
 #: Below this radius, in normalised coordinates, a fisheye does not bend in single precision.
 _ON_AXIS = 1e-4
@@ -40,3 +44,43 @@ def straighten_fisheye(
     around = radius / bent
     outward = ((one + radius * radius) / slope - around) * (x * right + y * down) / (radius * radius)
     return right * around + x * outward, down * around + y * outward
+
+
+def projector(lens: LensModel) -> Callable[..., None]:
+    """The kernel that takes ideal coordinates (h, w, 2) to pixels, in place; then come matrix and coefficients."""
+    if isinstance(lens, KannalaBrandt):
+        return _to_pixels_fisheye
+    return _to_pixels_pinhole if lens.is_pinhole else _to_pixels
+
+
+@kernel
+def _to_pixels_pinhole(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
+    fx, fy, cx, cy = matrix
+    for r in range(place.shape[0]):
+        for c in range(place.shape[1]):
+            place[r, c, 0] = fx * place[r, c, 0] + cx
+            place[r, c, 1] = fy * place[r, c, 1] + cy
+
+
+@kernel
+def _to_pixels(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
+    one, two = np.float32(1), np.float32(2)
+    fx, fy, cx, cy = matrix
+    k1, k2, p1, p2, k3, k4, k5, k6 = lens
+    for r in range(place.shape[0]):
+        for c in range(place.shape[1]):
+            x, y = place[r, c, 0], place[r, c, 1]
+            r2 = x * x + y * y
+            radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
+            place[r, c, 0] = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
+            place[r, c, 1] = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
+
+
+@kernel
+def _to_pixels_fisheye(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
+    fx, fy, cx, cy = matrix
+    for r in range(place.shape[0]):
+        for c in range(place.shape[1]):
+            x, y = bend_fisheye(place[r, c, 0], place[r, c, 1], lens)
+            place[r, c, 0] = fx * x + cx
+            place[r, c, 1] = fy * y + cy

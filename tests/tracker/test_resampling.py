@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.synthesis import undistorted, warped
-from abs_service.tracker.synthesis.pinhole import MOST_GROWTH, lookup, pinhole_of
-from abs_service.tracker.synthesis.reprojection import LARGEST_STEP_M, Reprojection
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Rig, Sensor
+from calib.warp.pinhole import MOST_GROWTH, pinhole_of, resampling
 from tests.tracker.scenes import CAMERA, depth_image, observation, plane_distance, sheet
 
 NORMAL = np.array([-0.2, 0.1, 1.0])
@@ -34,7 +33,7 @@ def indices(camera: Camera, table: np.ndarray) -> np.ndarray:
 def test_every_pixel_without_distortion_shows_the_nearest_line_of_sight(coefficients):
     camera = dataclasses.replace(CAMERA, lens=Lens(np.array(coefficients)))
     pinhole = pinhole_of(camera)
-    table = lookup(pinhole, camera)
+    table = resampling(pinhole, camera)
     assert not np.any([table[0], table[-1]])
     assert not np.any([table[:, 0], table[:, -1]])
     row, column = np.nonzero(table)
@@ -51,7 +50,7 @@ def test_every_pixel_without_distortion_shows_the_nearest_line_of_sight(coeffici
 def test_without_distortion_nothing_is_resampled():
     camera = dataclasses.replace(CAMERA, lens=Lens())
     assert pinhole_of(camera).calib_id == camera.calib_id
-    table = lookup(camera, camera)
+    table = resampling(camera, camera)
     assert np.array_equal(table[1:-1, 1:-1], np.arange(50 * 66).reshape(50, 66)[1:-1, 1:-1])
 
 
@@ -59,7 +58,7 @@ def test_a_wide_lens_loses_its_rim_rather_than_growing_without_bounds():
     fish = Camera(96, 72, 25.0, 25.0, 47.5, 35.5, Lens(np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.6])))
     pinhole = pinhole_of(fish)
     assert pinhole.width <= MOST_GROWTH * 96 + 2
-    assert np.count_nonzero(lookup(pinhole, fish)) > 0.5 * 96 * 72
+    assert np.count_nonzero(resampling(pinhole, fish)) > 0.5 * 96 * 72
 
 
 def test_undistorted_measurements_are_those_of_the_nearest_pixels():
@@ -80,60 +79,6 @@ def test_undistorted_measurements_are_those_of_the_nearest_pixels():
     colors = np.moveaxis(np.indices((72, 96, 1))[:, :, :, 0], 0, -1).astype(np.float32)
     image = synthesis.image("tof", colors)
     assert np.array_equal(np.isfinite(image[..., 0]), known[1:-1, 1:-1])
-
-
-def target(shift: float) -> Camera:
-    """A camera without distortion beside CAMERA."""
-    return Camera(80, 60, 140.0, 140.0, 39.5, 29.5, T_rs=pose.look_at([0.05 + shift, 0.02, 0.0], [0.0, 0.0, 1.0]))
-
-
-@settings(max_examples=20)
-@given(st.floats(-0.15, 0.15), lenses)
-def test_a_plane_warped_is_the_plane(shift, coefficients):
-    source, other = dataclasses.replace(CAMERA, lens=Lens(np.array(coefficients))), target(shift)
-    index, distance = Reprojection(source, other).warp(plane_distance(source, NORMAL, 1.0).astype(np.float32))
-    expected = plane_distance(other, NORMAL, 1.0)
-    points = other.unproject(expected)
-    place = source.project(points)
-    inside = np.all((place > 0.1) & (place < np.array([source.width, source.height]) - 1.1), axis=-1)
-    assert np.count_nonzero(inside) > 1000
-    assert np.all(index[inside] > 0)
-    found = index > 0
-    np.testing.assert_allclose(distance[found], expected[found], atol=2e-5)
-    assert np.isnan(distance[~found]).all()
-    # The measurement is one of the four around the place, and the nearest but for what distortion bends.
-    error = np.abs(indices(source, index[inside]) - place[inside]).max(axis=1)
-    assert np.quantile(error, 0.95) < 0.75
-    assert error.max() < 1.1
-
-
-def test_what_is_nearer_hides_what_is_behind_it_and_nothing_is_stretched_between():
-    distance = np.full((48, 64), 1.3, np.float32)
-    distance[16:32, 24:40] = 0.8
-    source = Camera(64, 48, 150.0, 150.0, 31.5, 23.5)
-    other = dataclasses.replace(source, T_rs=pose.from_rotation_vector([0, 0, 0], [0.1, 0, 0]))
-    _, warped_distance = Reprojection(source, other).warp(distance)
-    points = other.unproject(warped_distance)
-    near = np.abs(np.linalg.norm(points, axis=-1) - 0.8) < 1e-3
-    far = np.abs(np.linalg.norm(points, axis=-1) - 1.3) < 1e-3
-    assert np.array_equal(near | far, np.isfinite(warped_distance))
-    middle = warped_distance[24]
-    assert near[24].any()
-    assert np.isnan(middle[near[24].nonzero()[0][-1] + 1])  # the shadow that the other camera sees into
-    assert distance.max() - distance.min() > LARGEST_STEP_M
-    assert not np.any(warped_distance[24, near[24]] > 1.0)
-
-
-def test_missing_returns_stay_missing():
-    distance = plane_distance(CAMERA, NORMAL, 1.0).astype(np.float32)
-    distance[10:20, 20:30] = np.nan
-    index, warped_distance = Reprojection(CAMERA, pinhole_of(CAMERA)).warp(distance)
-    shown = indices(CAMERA, index[index > 0])
-    assert not np.any(np.all((shown >= (20, 10)) & (shown < (30, 20)), axis=-1))
-    assert np.count_nonzero(np.isnan(warped_distance)) >= 100
-    nothing, none = Reprojection(CAMERA, target(0.0)).warp(np.full_like(distance, np.nan))
-    assert not nothing.any()
-    assert np.isnan(none).all()
 
 
 def warped_rig() -> Rig:

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import View
-from abs_service.tracker.synthesis.pinhole import lookup, pinhole_of
 from abs_service.tracker.synthesis.sparse import SparseView
 from calib.camera import Camera
 from calib.rig import Rig
+from calib.warp.pinhole import pinhole_of, resampling
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Undistorted:
     def __init__(self, rig: Rig, mesh: Mesh):
         self.canvas = mesh
         self._pinholes: dict[str, Camera] = {name: pinhole_of(sensor.camera) for name, sensor in rig.sensors.items()}
-        self._tables = {name: lookup(self._pinholes[name], sensor.camera) for name, sensor in rig.sensors.items()}
+        self._tables = {name: resampling(self._pinholes[name], sensor.camera) for name, sensor in rig.sensors.items()}
 
     def observe(self, observation: Observation) -> None:
         """Nothing depends on the images: the tables are those of the lenses."""

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,16 +10,15 @@ from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
-from abs_service.tracker.synthesis.pinhole import pinhole_of
-from abs_service.tracker.synthesis.reprojection import Reprojection
 from abs_service.tracker.synthesis.sparse import SparseView
-from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise, without_offset
 from calib.rig import Rig
-
-#: A colour pixel shows what is nearest to its camera; a point farther away by more than this is hidden from it [m].
-HIDING_M = 0.02
+from calib.warp.errors import WarpError
+from calib.warp.mesh import MeshWarp
+from calib.warp.mesh import Warped as WarpedDepth
+from calib.warp.pictures import PictureLookup
+from calib.warp.pinhole import pinhole_of
 
 
 @dataclass(frozen=True)
@@ -60,23 +58,24 @@ class Warped:
         self._rig = rig
         self._reference = reference
         self._camera = pinhole_of(rig.sensors[reference].camera)
-        self._rays = self._camera.rays()
         self._projection = _Projection(self._camera, mesh)
         self._warps = {
-            name: Reprojection(sensor.camera, self._camera)
+            name: MeshWarp(sensor.camera, self._camera)
             for name, sensor in rig.sensors.items()
             if isinstance(sensor.noise, DepthNoise)
         }
-        self._points = np.full((*self._rays.shape[:2], 3), np.nan)
+        self._pictures = {name: PictureLookup(self._camera, rig.sensors[name].camera) for name in rig.sensors}
+        self._distance = np.full((self._camera.height, self._camera.width), np.nan, np.float32)
 
     def observe(self, observation: Observation) -> None:
-        """Finds the points that the common view's pixels show, from the reference sensor's distances."""
+        """Takes the common view's distances from the reference sensor."""
         image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
-        self._points = np.full_like(self._points, np.nan)
+        self._distance = np.full_like(self._distance, np.nan)
         if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
             measured = without_offset(sensor.noise, image.distance, image.amplitude)
-            _, distance = self._warps[self._reference].warp(measured)
-            self._points = pose.transform(self._camera.T_rs, self._rays * distance[..., None])
+            warped = self._warp(self._reference, measured)
+            if warped is not None:
+                self._distance = warped.distance
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """The vertices with attributes (n, channels) through the common camera."""
@@ -89,39 +88,26 @@ class Warped:
         the new one, which is right to the cosine of the angle between them.
         """
         inner = texture[1:-1, 1:-1]
-        measured = np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan))
-        index, distance = self._warps[sensor].warp(measured)
-        warped = texture.reshape(-1, texture.shape[2])[np.pad(index, 1)]
-        warped[1:-1, 1:-1, 0] = np.where(index > 0, distance, 0)
-        return warped
+        result = np.zeros((self._camera.height + 2, self._camera.width + 2, texture.shape[2]), np.float32)
+        warped = self._warp(sensor, np.where(inner[..., 3] > 0, inner[..., 0], np.float32(np.nan)))
+        if warped is not None:
+            result[1:-1, 1:-1] = warped.nearest(inner, missing=0)
+            result[1:-1, 1:-1, 0] = np.nan_to_num(warped.distance)
+        return result
 
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
         """An image (height, width, channels) in the common view; NaN where no distance tells what it shows."""
-        camera = self._rig.sensors[sensor].camera
-        pixel, seen = _visible(camera, self._points, self._camera.fx)
-        warped = np.full((*self._rays.shape[:2], image.shape[2]), np.nan, np.float32)
-        warped[seen] = image[pixel[seen, 1], pixel[seen, 0]]
-        return warped
+        try:
+            return self._pictures[sensor].look(self._distance).nearest(image)
+        except WarpError:  # nothing is known of what it shows, and that costs what an unseen object costs
+            return np.full((*self._distance.shape, image.shape[2]), np.nan, np.float32)
 
-
-def _visible(
-    camera: Camera, points: NDArray[np.float64], focal: float
-) -> tuple[NDArray[np.integer], NDArray[np.bool_]]:
-    """Pixel (height, width, 2) = (column, row) of rig points in a camera, and which of them it sees.
-
-    What hides a point is found by a z-buffer whose cells are as wide as the gaps between the points.
-    """
-    known = np.isfinite(points[..., 0])
-    pixel = np.floor(camera.project(points) + 0.5)
-    with np.errstate(invalid="ignore"):
-        known &= np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=-1)
-    pixel = np.where(known[..., None], pixel, 0).astype(int)
-    distance = np.where(known, camera.distance(points), np.inf).astype(np.float32)
-    cell = int(np.ceil(camera.fx / focal)) + 1
-    nearest = np.full((camera.height // cell + 1, camera.width // cell + 1), np.inf, np.float32)
-    np.minimum.at(nearest, (pixel[..., 1] // cell, pixel[..., 0] // cell), distance)
-    nearest = np.asarray(cv2.erode(nearest, np.ones((3, 3), np.uint8)), np.float32)
-    return pixel, known & (distance < nearest[pixel[..., 1] // cell, pixel[..., 0] // cell] + HIDING_M)
+    def _warp(self, sensor: str, distance: NDArray[np.floating]) -> WarpedDepth | None:
+        """A depth sensor's distances in the common view; None if none of them is in it, as when the object is away."""
+        try:
+            return self._warps[sensor].warp(distance)
+        except WarpError:
+            return None
 
 
 class _Projection:

@@ -19,10 +19,7 @@ def pinhole_of(camera: Camera) -> Camera:
     """
     if camera.lens.is_pinhole:
         return camera
-    columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    rim = (columns % (camera.width - 1 or 1) == 0) | (rows % (camera.height - 1 or 1) == 0)
-    directions = camera.directions(np.stack([columns[rim], rows[rim]], axis=-1))
-    ideal = directions[:, :2] / directions[:, 2:] * (camera.fx, camera.fy)
+    ideal = camera.lookup.ideal.reshape(-1, 2) * (camera.fx, camera.fy)
     half = np.array([camera.width, camera.height]) * MOST_GROWTH / 2
     low, high = np.maximum(ideal.min(axis=0), -half), np.minimum(ideal.max(axis=0), half)
     center = np.array([camera.cx, camera.cy])
@@ -31,15 +28,14 @@ def pinhole_of(camera: Camera) -> Camera:
     return Camera(width, height, camera.fx, camera.fy, *axis.tolist(), T_rs=camera.T_rs)
 
 
-def lookup(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
+def resampling(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
     """For every pixel of a pinhole with the same centre, the nearest one of the camera: the backward distortion.
 
     Returns:
         Indices (height + 2, width + 2) into the camera's flattened image with a border of one pixel, 0 where the camera
         sees nothing; the result has a border as well.
     """
-    directions = pinhole.directions(np.stack(np.meshgrid(np.arange(pinhole.width), np.arange(pinhole.height)), axis=-1))
-    ideal = directions[..., :2] / directions[..., 2:]
+    ideal = pinhole.lookup.ideal
     place = camera.lens.distort(ideal) * (camera.fx, camera.fy) + (camera.cx, camera.cy)
     pixel = np.floor(place + 0.5)
     inside = np.all((pixel >= 0) & (pixel < (camera.width, camera.height)), axis=-1)

@@ -1,0 +1,198 @@
+"""A depth image as a surface: the triangles between its neighbouring pixels, by a z-buffer.
+
+Four neighbours span two triangles, three of them one. Corner k of the quadrilateral at pixel (r, c) is pixel
+(r + k // 2, c + k % 2); a triangle is named by the corner m that it lacks, and the number of a face is
+4 (r columns + c) + m.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.jit import kernel
+
+#: A pixel on the line between two triangles must not fall between them.
+_EDGE = -1e-4
+
+
+@kernel
+def cover(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    largest_step: float,
+    top: int,
+    bottom: int,
+    nearness: NDArray[np.float32],
+    face: NDArray[np.int32],
+) -> None:
+    """Fills rows `top` to `bottom` − 1 of `nearness` (1/z) and `face` with the nearest faces of an unbroken surface.
+
+    Both triangles of a quadrilateral, beside the diagonal from corner 0 to corner 3, are filled in one go.
+    """
+    zero, one, edge, slack, step = (
+        np.float32(0),
+        np.float32(1),
+        np.float32(_EDGE),
+        np.float32(1e-3),
+        np.float32(largest_step),
+    )
+    columns, width, lowest, highest = place.shape[1], nearness.shape[1], np.float32(top), np.float32(bottom - 1)
+    rightmost = np.float32(width - 1)
+    for r in range(place.shape[0] - 1):
+        for c in range(columns - 1):
+            x0, y0, n0, d0 = place[r, c, 0], place[r, c, 1], inverse_z[r, c], distance[r, c]
+            n1, n2, n3 = inverse_z[r, c + 1] - n0, inverse_z[r + 1, c] - n0, inverse_z[r + 1, c + 1] - n0
+            d1, d2, d3 = distance[r, c + 1], distance[r + 1, c], distance[r + 1, c + 1]
+            if not max(d0, d1, d2, d3) - min(d0, d1, d2, d3) <= step or np.isnan(n1 + n2 + n3):
+                _fill_rest(place, inverse_z, distance, step, r, c, top, bottom, nearness, face)
+                continue
+            x1, y1 = place[r, c + 1, 0] - x0, place[r, c + 1, 1] - y0
+            x2, y2 = place[r + 1, c, 0] - x0, place[r + 1, c, 1] - y0
+            x3, y3 = place[r + 1, c + 1, 0] - x0, place[r + 1, c + 1, 1] - y0
+            low, high = y0 + min(y1, y2, y3, zero) - slack, y0 + max(y1, y2, y3, zero) + slack
+            left, right = x0 + min(x1, x2, x3, zero) - slack, x0 + max(x1, x2, x3, zero) + slack
+            first_row, last_row = int(np.ceil(max(low, lowest))), int(np.floor(min(high, highest)))
+            first_column, last_column = int(np.ceil(max(left, zero))), int(np.floor(min(right, rightmost)))
+            if first_row > last_row or first_column > last_column:
+                continue
+            first, second = x1 * y3 - y1 * x3, x2 * y3 - y2 * x3
+            if not first * second < zero:  # folded, or a triangle without area
+                _fill(place, inverse_z, r, c, 1, top, bottom, nearness, face)
+                _fill(place, inverse_z, r, c, 2, top, bottom, nearness, face)
+                continue
+            per_first, per_second = one / first, one / second
+            for row in range(first_row, last_row + 1):
+                y = np.float32(row) - y0
+                for column in range(first_column, last_column + 1):
+                    x = np.float32(column) - x0
+                    side = x * y3 - y * x3
+                    above = side * per_first >= zero
+                    xb, yb, nb, per_area = (x1, y1, n1, per_first) if above else (x2, y2, n2, per_second)
+                    at_b, at_d = side * per_area, (xb * y - yb * x) * per_area
+                    near = n0 + at_b * nb + at_d * n3
+                    if at_d >= edge and one - at_b - at_d >= edge and near > nearness[row, column]:
+                        nearness[row, column] = near
+                        face[row, column] = 4 * (r * columns + c) + (2 if above else 1)
+
+
+@kernel
+def _fill_rest(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    step: np.float32,
+    r: int,
+    c: int,
+    top: int,
+    bottom: int,
+    nearness: NDArray[np.float32],
+    face: NDArray[np.int32],
+) -> None:
+    """The only triangle of a quadrilateral with one gap, if its surface is unbroken."""
+    missing = lone_gap(inverse_z[r, c], inverse_z[r, c + 1], inverse_z[r + 1, c], inverse_z[r + 1, c + 1])
+    if missing >= 0 and height_of_step(distance, r, c) <= step:
+        _fill(place, inverse_z, r, c, missing, top, bottom, nearness, face)
+
+
+@kernel
+def lone_gap(n0: np.float32, n1: np.float32, n2: np.float32, n3: np.float32) -> int:
+    """Which of four values is NaN, if only one is; else −1."""
+    if np.isnan(n0):
+        return -1 if np.isnan(n1 + n2 + n3) else 0
+    if np.isnan(n1):
+        return -1 if np.isnan(n2 + n3) else 1
+    if np.isnan(n2):
+        return -1 if np.isnan(n3) else 2
+    return 3
+
+
+@kernel
+def height_of_step(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
+    """Largest difference of the distances of a quadrilateral's corners, as far as they are known [m]."""
+    near, far = np.float32(np.inf), np.float32(-np.inf)
+    for k in range(4):
+        d = distance[r + k // 2, c + k % 2]
+        near, far = d if d < near else near, d if d > far else far
+    return far - near
+
+
+@kernel
+def _fill(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    r: int,
+    c: int,
+    missing: int,
+    top: int,
+    bottom: int,
+    nearness: NDArray[np.float32],
+    face: NDArray[np.int32],
+) -> None:
+    """One triangle into the z-buffer."""
+    i, j, k = corners(missing)
+    ar, ac, br, bc, cr, cc = r + i // 2, c + i % 2, r + j // 2, c + j % 2, r + k // 2, c + k % 2
+    ax, ay = place[ar, ac, 0], place[ar, ac, 1]
+    bx, by = place[br, bc, 0] - ax, place[br, bc, 1] - ay
+    cx, cy = place[cr, cc, 0] - ax, place[cr, cc, 1] - ay
+    area = bx * cy - by * cx
+    first_row = max(int(np.ceil(ay + min(by, cy, np.float32(0)) - np.float32(1e-3))), top)
+    last_row = min(int(np.floor(ay + max(by, cy, np.float32(0)) + np.float32(1e-3))), bottom - 1)
+    first_column = max(int(np.ceil(ax + min(bx, cx, np.float32(0)) - np.float32(1e-3))), 0)
+    last_column = min(int(np.floor(ax + max(bx, cx, np.float32(0)) + np.float32(1e-3))), nearness.shape[1] - 1)
+    if first_row > last_row or first_column > last_column or area == 0:
+        return
+    edge, inverse = np.float32(_EDGE), np.float32(1) / area
+    near_a = inverse_z[ar, ac]
+    near_b, near_c = inverse_z[br, bc] - near_a, inverse_z[cr, cc] - near_a
+    number = 4 * (r * place.shape[1] + c) + missing
+    for row in range(first_row, last_row + 1):
+        y = np.float32(row) - ay
+        for column in range(first_column, last_column + 1):
+            x = np.float32(column) - ax
+            at_b, at_c = (x * cy - y * cx) * inverse, (bx * y - by * x) * inverse
+            if at_b >= edge and at_c >= edge and np.float32(1) - at_b - at_c >= edge:
+                near = near_a + at_b * near_b + at_c * near_c
+                if near > nearness[row, column]:
+                    nearness[row, column] = near
+                    face[row, column] = number
+
+
+@kernel
+def tear(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    largest_step: float,
+    torn: NDArray[np.bool_],
+) -> None:
+    """Marks the pixels behind broken surfaces: between what is nearer and what is farther the source sees nothing."""
+    height, width = torn.shape
+    for r in range(place.shape[0] - 1):
+        for c in range(place.shape[1] - 1):
+            if not height_of_step(distance, r, c) > largest_step:
+                continue
+            n0, n1, n2, n3 = inverse_z[r, c], inverse_z[r, c + 1], inverse_z[r + 1, c], inverse_z[r + 1, c + 1]
+            gap = lone_gap(n0, n1, n2, n3)
+            for missing in range(4):
+                if missing == gap or (not np.isnan(n0 + n1 + n2 + n3) and 1 <= missing <= 2):
+                    i, j, k = corners(missing)
+                    ax, ay = place[r + i // 2, c + i % 2, 0], place[r + i // 2, c + i % 2, 1]
+                    bx, by = place[r + j // 2, c + j % 2, 0] - ax, place[r + j // 2, c + j % 2, 1] - ay
+                    cx, cy = place[r + k // 2, c + k % 2, 0] - ax, place[r + k // 2, c + k % 2, 1] - ay
+                    area = bx * cy - by * cx
+                    for row in range(
+                        max(int(np.ceil(ay + min(by, cy, 0))), 0), min(int(ay + max(by, cy, 0)), height - 1) + 1
+                    ):
+                        for column in range(
+                            max(int(np.ceil(ax + min(bx, cx, 0))), 0), min(int(ax + max(bx, cx, 0)), width - 1) + 1
+                        ):
+                            x, y = column - ax, row - ay
+                            at_b, at_c = (x * cy - y * cx) / area, (bx * y - by * x) / area
+                            if at_b >= 0 and at_c >= 0 and at_b + at_c <= 1:
+                                torn[row, column] = True
+
+
+@kernel
+def corners(missing: int) -> tuple[int, int, int]:
+    """The three corners of the triangle that lacks one."""
+    return 1 if missing == 0 else 0, 2 if missing < 2 else 1, 2 if missing == 3 else 3
