@@ -41,6 +41,7 @@ def seen(recording: Recording) -> Seen:
     return see_all(CHESSBOARD.target, RecordingShots(recording, every_s=0.1), recording.cameras)
 
 
+@pytest.mark.slow
 def test_a_recording_shows_corners_and_planes_where_they_truly_are(recording: Recording, seen: Seen) -> None:
     simulation = CHESSBOARD.simulation
     assert {view.sensor for view in seen.corners} == {"tof", "color"}
@@ -58,6 +59,7 @@ def test_a_recording_shows_corners_and_planes_where_they_truly_are(recording: Re
         assert 0.6 < np.sqrt(np.mean(np.square(error / view.sigmas))) < 1.6
 
 
+@pytest.mark.slow
 def test_a_board_that_moves_is_refused_and_one_that_is_held_is_not(seen: Seen) -> None:
     refused = {shot for (shot, sensor), why in seen.refused.items() if isinstance(why, refusal.MovedError)}
     held = {view.shot for view in seen.corners if view.sensor == "color"}

@@ -1,0 +1,91 @@
+"""Sets of views: what is refused, what is missing in words, and what a further view adds."""
+
+import numpy as np
+import pytest
+
+from calib import pose
+from calib.board import coverage
+from calib.board.stance import stance
+from calib.board.target import Chessboard
+from calib.views import CornerView
+from tests.calib.boards import VGA, centered
+
+BOARD = Chessboard(9, 6, 0.03)
+SIZES = {"color": (640, 480)}
+
+
+def view(rotation=(0.0, 0.0, 0.0), distance=0.7, shift=(0.0, 0.0), shot=0, sensor="color") -> CornerView:
+    T_sb = centered(BOARD, rotation, distance)
+    T_sb[:2, 3] += shift
+    points = BOARD.points()
+    return CornerView(sensor, shot, 0.0, points, VGA.project(pose.transform(T_sb, points)))
+
+
+def many() -> list[CornerView]:
+    """Tilted all ways, near and far, into all corners."""
+    tilts = [(0.5, 0, 0), (-0.5, 0, 0), (0, 0.5, 0), (0, -0.5, 0)]
+    shifted = [
+        view(distance=0.7, shift=(0.2 * (x - 1), 0.15 * (y - 1)), shot=n) for n, (x, y) in enumerate(np.ndindex(3, 3))
+    ]
+    return shifted + [view(tilt, 0.45, shot=9 + n) for n, tilt in enumerate(tilts)]
+
+
+def test_three_views_are_too_few() -> None:
+    with pytest.raises(coverage.TooFewViewsError, match=r"color: 3 views of the board, but .* 4 at the very least"):
+        coverage.check(many()[:3])
+
+
+def test_views_that_are_all_alike_are_refused() -> None:
+    alike = [view((0.1 + 0.01 * n, 0.1, 0.0), 0.7 + 0.01 * n, shot=n) for n in range(12)]
+    with pytest.raises(coverage.ViewsAlikeError, match="color: all 12 views show the board in nearly the same pose"):
+        coverage.check(alike)
+
+
+def test_views_of_many_poses_are_enough() -> None:
+    coverage.check(many())
+    assert coverage.wishes(many(), SIZES) == []
+
+
+@pytest.mark.parametrize(
+    ("rotation", "way"),
+    [((0.0, 0.5, 0.0), "left"), ((0.0, -0.5, 0.0), "right"), ((-0.5, 0.0, 0.0), "up"), ((0.5, 0.0, 0.0), "down")],
+)
+def test_a_tilt_that_is_missing_is_asked_for(rotation, way: str) -> None:
+    without = [one for one in many() if not np.allclose(one.pixels, view(rotation, 0.45).pixels)]
+    assert len(without) == 12
+    assert [wish.text for wish in coverage.wishes(without, SIZES)] == [f"tilt the board more: let it face {way}"]
+
+
+def test_a_corner_of_the_image_that_nobody_has_seen_is_named() -> None:
+    without = [one for one in many() if coverage.counts([one], (640, 480), 3, 3)[0, 2] == 0]
+    assert "nobody has seen the top right corner of color" in [w.text for w in coverage.wishes(without, SIZES)]
+
+
+def test_near_and_far_are_asked_for() -> None:
+    far = [view(distance=1.5, shot=n) for n in range(12)]
+    near = [view(distance=0.45, shot=n) for n in range(12)]
+    assert "come closer" in [wish.text for wish in coverage.wishes(far, SIZES)]
+    assert "go further away" in [wish.text for wish in coverage.wishes(near, SIZES)]
+
+
+def test_sensors_have_to_see_the_board_together() -> None:
+    others = [view(distance=0.6, shot=100 + n, sensor="tof") for n in range(12)]
+    texts = [wish.text for wish in coverage.wishes([*many(), *others], {**SIZES, "tof": (640, 480)})]
+    assert "show the board to color and tof at the same time (0 of 6 times)" in texts
+    texts = [wish.text for wish in coverage.wishes(many(), {**SIZES, "tof": (640, 480)})]
+    assert texts == ["show the board to tof: it has not seen it yet"]
+
+
+def test_only_a_view_of_something_new_is_worth_keeping() -> None:
+    kept = [view(), view((0.5, 0, 0))]
+    assert not coverage.adds(view((0.02, 0.0, 0.0), 0.71), kept, (640, 480))
+    assert coverage.adds(view((0.0, 0.4, 0.0)), kept, (640, 480))
+    assert coverage.adds(view(shift=(0.25, 0.0)), kept, (640, 480))
+    assert coverage.adds(view(sensor="tof"), kept, (640, 480))
+
+
+def test_a_stance_tells_where_the_print_faces() -> None:
+    left = stance(view((0.0, 0.5, 0.0), 0.6), (640, 480))
+    assert left.tilt[0] == pytest.approx(-0.5, abs=0.1)
+    assert left.tilt[1] == pytest.approx(0.0, abs=0.02)
+    assert stance(view((0, 0, 0.3)), (640, 480)).roll == pytest.approx(0.3, abs=0.01)
