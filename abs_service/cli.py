@@ -25,6 +25,7 @@ COMMANDS = {
     "replay": "track a recording again, frame by frame",
     "check": "say what a configuration describes, or what is wrong with it",
     "devices": "what is attached, and what to do about what cannot be used",
+    "calibrate": "where the sensors of a rig are, how they project and how they err",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
     "import": "turn a folder of images into a recording",
     "recover": "repair recordings that were cut short",

@@ -92,14 +92,14 @@ class RigCalibration:
         name: of the rig.
         sensors: by name.
         provenance: where it comes from.
-        verdict: of the command that made it.
+        verdict: of the command that made it; unknown if it did not judge.
         covariance: of the parameters; empty if there is none.
     """
 
     name: str
     sensors: Mapping[str, SensorCalibration]
     provenance: Provenance
-    verdict: Literal["good", "doubtful", "bad"] = "good"
+    verdict: Literal["good", "doubtful", "bad", "unknown"] = "unknown"
     covariance: Covariance = field(default_factory=Covariance)
 
 

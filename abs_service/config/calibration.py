@@ -39,7 +39,7 @@ class ProvenanceTable(Table):
     command: str
     date: str
     version: str
-    verdict: Literal["good", "doubtful", "bad"] = "good"
+    verdict: Literal["good", "doubtful", "bad", "unknown"] = "unknown"
     data: tuple[DataTable, ...] = ()
 
 

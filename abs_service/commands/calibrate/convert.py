@@ -1,0 +1,182 @@
+"""Converts calibrations from and to the formats of other programs.
+
+  abs-service calibrate convert camchain.yaml lab.calibration.toml        from Kalibr
+  abs-service calibrate convert calib.json lab.calibration.toml --rename cam_a=color --rename cam_b=left
+  abs-service calibrate convert left.cameramodel right.cameramodel lab.calibration.toml
+  abs-service calibrate convert lab.calibration.toml color.yaml --to ros --sensor color
+  abs-service calibrate convert rig.toml rig.urdf                         the frames, for robots
+
+Formats: toml (our calibration and rig files), kalibr (camchain), ros (CameraInfo), opencv (FileStorage as YAML, XML or
+JSON), depthai (JSON), mrcal (.cameramodel), and to write only urdf and tf. What a format has no place for is said on
+standard error and, with --json, under "lost". A lens that a format cannot express is refused.
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from abs_service import keys
+from abs_service.calibration import exchange, provenance, rig_file
+from abs_service.commands import calibrations
+from abs_service.exits import Exit
+from abs_service.problems import none_of
+from calib.camera import Camera
+from calib.formats.content import Content, Hints
+from calib.formats.resizing import resized
+
+
+class ConvertError(Exception):
+    """Options that do not fit the files."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the command line asks for.
+
+    Attributes:
+        source, target: formats; None if they are to be told from the files.
+        sensors: the ones to write, by their new names; all if empty.
+        names: new names by old ones.
+        hints: what the input leaves open; `hints.size` is also what cameras of another size are resized to.
+    """
+
+    source: str | None
+    target: str | None
+    sensors: tuple[str, ...]
+    names: Mapping[str, str]
+    hints: Hints
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service calibrate convert`."""
+    parser.add_argument("inputs", metavar="IN", nargs="+", type=Path, help="calibration; several are put together")
+    parser.add_argument("out", metavar="OUT", type=Path, help="file to write; must not exist")
+    parser.add_argument("--from", dest="source", choices=[exchange.OWN, *exchange.READERS], help="format of IN")
+    parser.add_argument("--to", dest="target", choices=[exchange.OWN, *exchange.WRITERS], help="format of OUT")
+    parser.add_argument("--sensor", metavar="NAME", action="append", default=[], help="write only this one; repeatable")
+    parser.add_argument("--rename", metavar="OLD=NEW", action="append", default=[], help="call it so; repeatable")
+    parser.add_argument("--size", metavar="WxH", help="size of the images, if IN does not say it or they have another")
+    parser.add_argument(
+        "--unit-m", metavar="M", type=float, default=1.0, help="unit of T in OpenCV's files (default: 1)"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Converts, and says what was lost."""
+    out = arguments.out
+    if out.exists():
+        raise ConvertError(f"{out}: exists already; choose another name or remove it")
+    hints = Hints(size=_size(arguments.size), unit=arguments.unit_m)
+    options = Options(arguments.source, arguments.target, tuple(arguments.sensor), _names(arguments.rename), hints)
+    read = [_read(path, options) for path in arguments.inputs]
+    content = _chosen(read, options)
+    target = options.target or exchange.of_name(out)
+    lost = [*content.lost, *_write(out, target, content.cameras, arguments)]
+    if arguments.json:
+        print(json.dumps({"wrote": str(out), "format": target, "sensors": list(content.cameras), "lost": lost}))
+        return Exit.OK
+    for one in lost:
+        print(f"abs-service: lost: {one}", file=sys.stderr)
+    print(f"wrote {out}: {', '.join(content.cameras)}")
+    return Exit.OK
+
+
+def _read(path: Path, options: Options) -> Content:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ConvertError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ConvertError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
+    name = options.source or exchange.of_content(path, text)
+    if name == exchange.OWN:
+        return _own(path)
+    stem = re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem).strip("_-") or "camera"
+    hints = Hints(stem, options.hints.size, options.hints.unit)
+    return exchange.read(path, text, name, hints)
+
+
+def _own(path: Path) -> Content:
+    """Our own file, of which only the cameras go on."""
+    known = calibrations.load(path)
+    lost = ["the covariances"] if known.covariance.names else []
+    for name, sensor in known.sensors.items():
+        parts = {
+            "depth terms": sensor.depth_offset or sensor.depth_scale,
+            "time offset": sensor.time_offset,
+            "noise model": sensor.noise,
+            "texture": sensor.texture,
+            "factory calibration": sensor.factory,
+        }
+        lost += [f"{name}: {part}" for part, given in parts.items() if given]
+    return Content({name: sensor.camera for name, sensor in known.sensors.items()}, tuple(lost))
+
+
+def _chosen(contents: list[Content], options: Options) -> Content:
+    """The wanted cameras of all files under their new names and in the wanted size."""
+    cameras: dict[str, Camera] = {}
+    lost: list[str] = []
+    for content in contents:
+        lost += content.lost
+        for name, camera in content.cameras.items():
+            new = keys.check_name(options.names.get(name, re.sub(r"[^A-Za-z0-9_-]+", "_", name)))
+            if new in cameras:
+                raise ConvertError(f'two cameras are called "{new}"; give one another name with --rename')
+            cameras[new] = camera
+    there = [name for content in contents for name in content.cameras]
+    unknown = [name for name in options.names if name not in there]
+    if unknown:
+        raise ConvertError(f"--rename {unknown[0]}: no such sensor, {none_of(unknown[0], there)}")
+    unknown = [name for name in options.sensors if name not in cameras]
+    if unknown:
+        raise ConvertError(f"--sensor {unknown[0]}: no such sensor, {none_of(unknown[0], cameras)}")
+    wanted = options.sensors or tuple(cameras)
+    size = options.hints.size
+    return Content({name: resized(cameras[name], *size) if size else cameras[name] for name in wanted}, tuple(lost))
+
+
+def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
+    """Writes the file; returns what it has no place for."""
+    if target == exchange.OWN:
+        origin = provenance.trace(_said(arguments), arguments.inputs)
+        sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}
+        name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.name.partition(".")[0]) or "rig"
+        rig_file.write(rig_file.RigCalibration(name, sensors, origin, "unknown"), out)
+        return ()
+    written = exchange.write(out, target, cameras)
+    try:
+        out.write_text(written.text, encoding="utf-8")
+    except OSError as error:
+        raise ConvertError(f"{out}: cannot be written: {error.strerror}") from error
+    return written.lost
+
+
+def _said(arguments: argparse.Namespace) -> list[str]:
+    """The command line, as far as it matters for what is written."""
+    options = [("--from", arguments.source), ("--size", arguments.size)]
+    options += [("--unit-m", str(arguments.unit_m))] if arguments.unit_m != 1 else []
+    options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]
+    given = [word for option, value in options if value is not None for word in (option, value)]
+    return ["calibrate", "convert", *map(str, arguments.inputs), str(arguments.out), *given]
+
+
+def _size(given: str | None) -> tuple[int, int] | None:
+    if given is None:
+        return None
+    match = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", given)
+    if match is None:
+        raise ConvertError(f"--size {given}: must be width and height in pixels, such as 640x480")
+    return int(match[1]), int(match[2])
+
+
+def _names(given: list[str]) -> dict[str, str]:
+    pairs = [one.partition("=") for one in given]
+    wrong = [one for one, (old, _, new) in zip(given, pairs) if not (old and new)]
+    if wrong:
+        raise ConvertError(f"--rename {wrong[0]}: must be OLD=NEW")
+    return {old: new for old, _, new in pairs}

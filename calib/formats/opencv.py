@@ -1,0 +1,140 @@
+"""OpenCV's FileStorage, YAML, XML or JSON, under the keys that its own samples and many programs use.
+
+One camera stands at the top (`camera_matrix`, `distortion_coefficients`, as in the sample calibration.cpp), two as
+`M1, D1, M2, D2` with `R, T` (stereo_calib.cpp), several in a map each.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+
+from calib import pose
+from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, fisheye, rigid
+from calib.lens import LensModel
+
+_MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1", "M2")
+_DISTORTIONS = (
+    "distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "dist", "D", "D1", "D2",
+)  # fmt: skip
+_SIZES = ("img_size", "image_size", "imageSize", "size")
+_WIDTHS = ("image_width", "image_Width", "width")
+_HEIGHTS = ("image_height", "image_Height", "height")
+
+
+def read(text: str, hints: Hints) -> Content:
+    """All cameras of a storage.
+
+    Raises:
+        FormatError: it holds none, or not the size of its images, which the hints do not give either.
+    """
+    try:
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
+    except (cv2.error, SystemError) as error:  # a constructor's exception becomes the cause of a SystemError
+        raise FormatError("not a FileStorage of OpenCV: YAML whose first line is %YAML:1.0, XML or JSON") from error
+    try:
+        # The tree dies with the storage, so all of it becomes plain values first.
+        root = _plain(storage.root())
+    finally:
+        storage.release()
+    if not isinstance(root, dict):
+        raise FormatError("an empty FileStorage")
+    if "M1" in root and "M2" in root:
+        return _stereo(root, hints)
+    name = str(root.get("camera_name") or hints.name)
+    tables = {name: root} if _find(root, _MATRICES) is not None else root
+    cameras = {
+        key: _camera(key, table, hints)
+        for key, table in tables.items()
+        if isinstance(table, dict) and _find(table, _MATRICES) is not None
+    }
+    if not cameras:
+        raise FormatError(f"no camera: none of the keys {', '.join(_MATRICES)}")
+    return Content(cameras)
+
+
+def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_YAML) -> Written:
+    """One camera at the top, several in a map each; with T_rs beside OpenCV's own keys.
+
+    Args:
+        cameras: what to write.
+        dialect: a `cv2.FILE_STORAGE_FORMAT_…`.
+    """
+    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | dialect)
+    for name, one in cameras.items():
+        if len(cameras) > 1:
+            storage.startWriteStruct(name, cv2.FILE_NODE_MAP)
+        else:
+            storage.write("camera_name", name)
+        storage.write("image_width", one.width)
+        storage.write("image_height", one.height)
+        storage.write("camera_matrix", np.array([[one.fx, 0, one.cx], [0, one.fy, one.cy], [0, 0, 1]]))
+        storage.write("distortion_model", one.lens.name)
+        storage.write("distortion_coefficients", one.lens.coefficients.reshape(-1, 1))
+        storage.write("T_rs", one.T_rs)
+        if len(cameras) > 1:
+            storage.endWriteStruct()
+    return Written(storage.releaseAndGetString())
+
+
+def _plain(node: Any) -> Any:
+    if node.isMap():
+        keys = node.keys()
+        if "data" in keys and "rows" in keys:
+            return node.mat()
+        return {key: _plain(node.getNode(key)) for key in keys}
+    if node.isSeq():
+        return [_plain(node.at(index)) for index in range(node.size())]
+    if node.isString():
+        return node.string()
+    return node.real() if node.isReal() or node.isInt() else None
+
+
+def _find(table: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
+    return next((table[key] for key in keys if table.get(key) is not None), None)
+
+
+def _camera(name: str, table: Mapping[str, Any], hints: Hints) -> Camera:
+    size = _find(table, _SIZES)
+    if size is None:
+        size = (_find(table, _WIDTHS), _find(table, _HEIGHTS))
+    size = np.ravel(np.array(size)).tolist()
+    if None in size:
+        if hints.size is None:
+            raise FormatError(f"{name}: the size of the image is missing; give it as --size WIDTHxHEIGHT")
+        size = list(hints.size)
+    matrix = np.array(_find(table, _MATRICES), float)
+    if matrix.shape != (3, 3):
+        raise FormatError(f"{name}: a camera matrix has 3 × 3 numbers")
+    T_rs = rigid(table["T_rs"]) if table.get("T_rs") is not None else pose.identity()
+    return camera(size, matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), _lens(table), T_rs)
+
+
+def _lens(table: Mapping[str, Any]) -> LensModel:
+    coefficients = _find(table, _DISTORTIONS)
+    numbers = np.zeros(0) if coefficients is None else np.asarray(coefficients, float)
+    is_fisheye = table.get("distortion_model") == KannalaBrandt.name or bool(table.get("fisheye_model"))
+    return fisheye(numbers) if is_fisheye else brown_conrady(numbers)
+
+
+def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
+    """Two cameras of which the left one is the origin; x_right = R x_left + T."""
+    left, right = (
+        {key.removesuffix(side): value for key, value in root.items() if key not in other}
+        for side, other in (("1", ("M2", "D2")), ("2", ("M1", "D1")))
+    )
+    cameras = {"left": _camera("left", _sided(left), hints), "right": _camera("right", _sided(right), hints)}
+    if root.get("R") is None or root.get("T") is None:
+        return Content(cameras, ("nothing is said of where right is: R and T are missing",))
+    T_rl = rigid(np.hstack([np.array(root["R"], float), hints.unit * np.array(root["T"], float).reshape(3, 1)]))
+    one = cameras["right"]
+    matrix = (one.fx, one.fy, one.cx, one.cy)
+    moved = camera((one.width, one.height), matrix, one.lens, pose.inverse(T_rl))
+    return Content(cameras | {"right": moved})
+
+
+def _sided(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {{"M": "K"}.get(key, key): value for key, value in table.items()}

@@ -1,0 +1,112 @@
+"""ROS CameraInfo as YAML, as `camera_calibration_parsers` reads and writes it: one camera, no pose."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+
+from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.formats.content import (
+    Content,
+    FormatError,
+    Hints,
+    Written,
+    brown_conrady,
+    camera,
+    extra,
+    fisheye,
+    only,
+    placed,
+)
+from calib.lens import LensModel
+
+_KNOWN = (
+    "image_width", "image_height", "camera_name", "camera_matrix", "distortion_model", "distortion_coefficients",
+    "rectification_matrix", "projection_matrix",
+)  # fmt: skip
+
+#: As REP 127 names them, and as OpenCV does.
+_FISHEYES = ("equidistant", "fisheye", "kannala_brandt")
+
+
+def read(text: str, hints: Hints) -> Content:
+    """The camera, named by its `camera_name`.
+
+    Raises:
+        FormatError: the text describes none.
+    """
+    try:
+        info = yaml.safe_load(text)
+        matrix = _numbers(info["camera_matrix"], 9)
+        lens = _lens(info.get("distortion_model", "plumb_bob"), _numbers(info["distortion_coefficients"]))
+        one = camera((info["image_width"], info["image_height"]), matrix[[0, 4, 2, 5]], lens)
+    except yaml.YAMLError as error:
+        raise FormatError(f"not YAML: {error}") from error
+    except KeyError as error:
+        raise FormatError(f"{error.args[0]} is missing") from None
+    except (TypeError, AttributeError) as error:
+        raise FormatError(f"no CameraInfo: {error}") from error
+    lost = extra("file", info, _KNOWN)
+    if "rectification_matrix" in info and not np.array_equal(
+        _numbers(info["rectification_matrix"], 9), np.eye(3).ravel()
+    ):
+        lost += ("rectification_matrix and projection_matrix: images are used as they are, not rectified",)
+    return Content({str(info.get("camera_name") or hints.name): one}, lost)
+
+
+def write(cameras: Mapping[str, Camera]) -> Written:
+    """One camera; its image is its own rectified one.
+
+    Raises:
+        FormatError: there are several.
+    """
+    name, one = only(cameras, "CameraInfo")
+    matrix = [one.fx, 0.0, one.cx, 0.0, one.fy, one.cy, 0.0, 0.0, 1.0]
+    model, coefficients = _distortion(one.lens)
+    projection = [one.fx, 0.0, one.cx, 0.0, 0.0, one.fy, one.cy, 0.0, 0.0, 0.0, 1.0, 0.0]
+    info = {
+        "image_width": one.width,
+        "image_height": one.height,
+        "camera_name": name,
+        "camera_matrix": _table(3, 3, matrix),
+        "distortion_model": model,
+        "distortion_coefficients": _table(1, len(coefficients), coefficients),
+        "rectification_matrix": _table(3, 3, np.eye(3).ravel().tolist()),
+        "projection_matrix": _table(3, 4, projection),
+    }
+    return Written(yaml.safe_dump(info, default_flow_style=None, sort_keys=False, width=200), placed(cameras))
+
+
+def _table(rows: int, columns: int, data: list[float]) -> dict[str, Any]:
+    return {"rows": rows, "cols": columns, "data": [float(number) for number in data]}
+
+
+def _numbers(table: Any, count: int | None = None) -> Any:
+    try:
+        numbers = np.array([float(number) for number in table["data"]])
+    except (TypeError, ValueError) as error:
+        raise FormatError(f"no numbers: {error}") from None
+    if count is not None and numbers.size != count:
+        raise FormatError(f"{count} numbers are needed, not {numbers.size}")
+    return numbers
+
+
+def _lens(model: str, numbers: Any) -> LensModel:
+    if model in _FISHEYES:
+        return fisheye(numbers)
+    if model in {"plumb_bob", "rational_polynomial"}:
+        return brown_conrady(numbers)
+    raise FormatError(f"the distortion {model} cannot be expressed; plumb_bob, rational_polynomial, equidistant can")
+
+
+def _distortion(lens: LensModel) -> tuple[str, list[float]]:
+    if isinstance(lens, KannalaBrandt):
+        return "equidistant", lens.coefficients.tolist()
+    rational = bool(np.any(lens.coefficients[5:]))
+    return (
+        ("rational_polynomial", lens.coefficients.tolist())
+        if rational
+        else ("plumb_bob", lens.coefficients[:5].tolist())
+    )

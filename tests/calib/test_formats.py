@@ -1,0 +1,343 @@
+"""Formats of other programs: exact round trips, samples checked by hand, and refusal of what cannot be expressed."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+from xml.etree import ElementTree
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from calib import pose
+from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.formats import depthai, kalibr, mrcal, opencv, ros, tf, urdf
+from calib.formats.content import FormatError, Hints, rigid
+from calib.formats.resizing import resized
+from calib.lens import Lens
+
+HINTS = Hints("tof")
+ORIGIN = (np.zeros(3), np.zeros(3))
+
+numbers = st.floats(-2, 2, allow_subnormal=False)
+places = st.tuples(st.tuples(numbers, numbers, numbers), st.tuples(numbers, numbers, numbers))
+
+
+def lenses(count: int, *, fisheyes: bool = True):
+    brown = st.lists(numbers, min_size=count, max_size=count).map(lambda given: Lens(np.array(given)))
+    fisheye = st.lists(numbers, max_size=4).map(lambda given: KannalaBrandt(np.array(given)))
+    return brown | fisheye if fisheyes else brown
+
+
+def cameras(count: int, *, fisheyes: bool = True):
+    return st.builds(
+        lambda size, matrix, lens, place: Camera(*size, *matrix, lens=lens, T_rs=pose.from_rotation_vector(*place)),
+        st.tuples(st.integers(1, 8192), st.integers(1, 8192)),
+        st.tuples(*[st.floats(0.1, 1e4)] * 4),
+        lenses(count, fisheyes=fisheyes),
+        places,
+    )
+
+
+def assert_same(found: Mapping[str, Camera], expected: Mapping[str, Camera], poses: str = "absolute") -> None:
+    """Equal to 1e-9; poses as they are, relative to the first, or not at all."""
+    assert list(found) == list(expected)
+    origin = next(iter(expected.values())).T_sr if poses == "relative" else np.eye(4)
+    for name, camera in expected.items():
+        one = found[name]
+        assert (one.width, one.height, one.lens.name) == (camera.width, camera.height, camera.lens.name)
+        for key in ("fx", "fy", "cx", "cy"):
+            assert getattr(one, key) == pytest.approx(getattr(camera, key), rel=1e-9)
+        np.testing.assert_allclose(one.lens.coefficients, camera.lens.coefficients, rtol=1e-9, atol=1e-12)
+        T_rs = np.eye(4) if poses == "none" else origin @ camera.T_rs
+        np.testing.assert_allclose(one.T_rs, T_rs, rtol=0, atol=1e-9)
+
+
+@settings(max_examples=40)
+@given(cameras(4), cameras(4), cameras(2))
+def test_kalibr_keeps_all_but_where_the_first_camera_is(first: Camera, second: Camera, third: Camera) -> None:
+    given = {"tof": first, "left": second, "right": third}
+    written = kalibr.write(given)
+    assert_same(kalibr.read(written.text, HINTS).cameras, given, "relative")
+    assert bool(written.lost) == (not np.array_equal(first.T_rs, np.eye(4)))
+
+
+@settings(max_examples=40)
+@given(cameras(8))
+def test_ros_keeps_all_but_the_pose(camera: Camera) -> None:
+    written = ros.write({"tof": camera})
+    assert_same(ros.read(written.text, HINTS).cameras, {"tof": camera}, "none")
+    assert written.lost == (() if np.array_equal(camera.T_rs, np.eye(4)) else ("the pose of tof",))
+
+
+@pytest.mark.parametrize(
+    "dialect", [cv2.FILE_STORAGE_FORMAT_YAML, cv2.FILE_STORAGE_FORMAT_XML, cv2.FILE_STORAGE_FORMAT_JSON]
+)
+@settings(max_examples=15)
+@given(given=st.lists(cameras(8), min_size=1, max_size=3))
+def test_opencv_keeps_all(dialect: int, given: list[Camera]) -> None:
+    named: dict[str, Camera] = dict(zip(("tof", "left", "right"), given))
+    written = opencv.write(named, dialect)
+    assert_same(opencv.read(written.text, Hints("other")).cameras, named)
+    assert written.lost == ()
+
+
+@settings(max_examples=40)
+@given(cameras(8), cameras(5))
+def test_depthai_keeps_all_but_names_and_where_the_first_camera_is(first: Camera, second: Camera) -> None:
+    written = depthai.write({"tof": first, "left": second})
+    assert_same(depthai.read(written.text, HINTS).cameras, {"cam_a": first, "cam_b": second}, "relative")
+    assert "tof is cam_a, left is cam_b" in written.lost[-1]
+
+
+@settings(max_examples=40)
+@given(cameras(8, fisheyes=False))
+def test_mrcal_keeps_all(camera: Camera) -> None:
+    assert_same(mrcal.read(mrcal.write({"tof": camera}).text, HINTS).cameras, {"tof": camera})
+
+
+CAMCHAIN = """
+cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 7e-2, 1e-05, 2e-4]
+  distortion_model: radtan
+  intrinsics: [458.5, 457.5, 367.25, 248.5]
+  resolution: [752, 480]
+  rostopic: /camera/left/image_raw
+  timeshift_cam_imu: 0.001
+cam1:
+  T_cn_cnm1:
+  - [1.0, 0.0, 0.0, -0.11]
+  - [0.0, 0.0, 1.0, 0.01]
+  - [0.0, -1.0, 0.0, 0.02]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_coeffs: [0.01, 0.02, 0.03, 0.04]
+  distortion_model: equidistant
+  intrinsics: [457.0, 456.0, 379.0, 255.0]
+  resolution: [752, 480]
+  rostopic: /camera/right/image_raw
+"""
+
+
+def test_a_chain_of_kalibr_by_hand() -> None:
+    content = kalibr.read(CAMCHAIN, HINTS)
+    left, right = content.cameras["cam0"], content.cameras["cam1"]  # both topics begin with "camera"
+    assert left.lens.coefficients[:4].tolist() == [-0.28, 0.07, 1e-5, 2e-4]
+    assert isinstance(right.lens, KannalaBrandt)
+    assert content.lost == ("cam0: timeshift_cam_imu",)
+    # The origin of cam1 is where T_cn_cnm1 gives zero: x = 0.11, z = −0.01, −y = −0.02.
+    np.testing.assert_allclose(right.center, (0.11, 0.02, -0.01), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("camera_model: pinhole", "camera_model: omni", "cam0: the projection omni"),
+        ("radtan", "fov", "cam0: the distortion fov"),
+        ("  resolution: [752, 480]\n", "", "cam0: resolution is missing"),
+        ("458.5", "-458.5", "cam0: no camera: fx and fy must be positive"),
+        ("[1.0, 0.0, 0.0, -0.11]", "[2.0, 0.0, 0.0, -0.11]", "cam1: not a pose"),
+        ("cam", "kam", "no camera chain"),
+        ("cam0:", "cam0: [", "not YAML"),
+    ],
+)
+def test_what_is_wrong_with_a_chain_is_named(old: str, new: str, said: str) -> None:
+    with pytest.raises(FormatError, match=said):
+        kalibr.read(CAMCHAIN.replace(old, new), HINTS)
+
+
+CAMERA_INFO = """
+image_width: 640
+image_height: 480
+camera_name: color
+camera_matrix:
+  rows: 3
+  cols: 3
+  data: [500.5, 0, 320.25, 0, 501.5, 240.75, 0, 0, 1]
+distortion_model: plumb_bob
+distortion_coefficients:
+  rows: 1
+  cols: 5
+  data: [0.1, -0.2, 1e-3, 2e-3, 0.3]
+rectification_matrix:
+  rows: 3
+  cols: 3
+  data: [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+projection_matrix:
+  rows: 3
+  cols: 4
+  data: [500.5, 0, 320.25, 0, 0, 501.5, 240.75, 0, 0, 0, 1, 0]
+"""
+
+
+def test_a_camera_info_by_hand() -> None:
+    content = ros.read(CAMERA_INFO, HINTS)
+    camera = content.cameras["color"]
+    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (500.5, 501.5, 320.25, 240.75)
+    assert camera.lens.coefficients.tolist() == [0.1, -0.2, 0.001, 0.002, 0.3, 0, 0, 0]
+    assert "not rectified" in content.lost[0]
+    for model, wrong in (("plumb_bob", "double_sphere"), ("image_width: 640\n", "")):
+        with pytest.raises(FormatError):
+            ros.read(CAMERA_INFO.replace(model, wrong), HINTS)
+
+
+CAMERAMODEL = """# written by hand
+{
+    'lensmodel':  'LENSMODEL_OPENCV4',
+    # fx, fy, cx, cy, k1, k2, p1, p2
+    'intrinsics': [ 1000., 1001., 639.5, 359.5, -0.1, 0.02, 0.001, -0.002,],
+    'valid_intrinsics_region': [ [0, 0], [0, 719], ],
+    # rt_fromref
+    'extrinsics': [ 0, 0, 1.5707963267948966, 1, 2, 3,],
+    'imagersize': [ 1280, 720,],
+    'icam_intrinsics': 0,
+}
+"""
+
+
+def test_a_camera_model_of_mrcal_by_hand() -> None:
+    content = mrcal.read(CAMERAMODEL, HINTS)
+    camera = content.cameras["tof"]
+    # A quarter turn about z takes the reference's x to the camera's y; the camera's centre is −Rᵀ t.
+    np.testing.assert_allclose(camera.T_sr[:3, :3] @ (1, 0, 0), (0, 1, 0), atol=1e-12)
+    np.testing.assert_allclose(camera.center, (-2, 1, -3), atol=1e-12)
+    assert content.lost == ("tof: valid_intrinsics_region, icam_intrinsics",)
+    for wrong in ("LENSMODEL_CAHVOR", "LENSMODEL_OPENCV8"):
+        with pytest.raises(FormatError, match=wrong):
+            mrcal.read(CAMERAMODEL.replace("LENSMODEL_OPENCV4", wrong), HINTS)
+    for wrong in ("", "{", "[1]", "{}", "__import__('os')"):
+        with pytest.raises(FormatError, match="no camera model of mrcal"):
+            mrcal.read(wrong, HINTS)
+
+
+def test_a_calibration_of_depthai_by_hand() -> None:
+    """Right (socket 2) leads to left (1), which leads to colour (0); lengths in centimetres."""
+    link = {"rotationMatrix": np.eye(3).tolist(), "specTranslation": {"x": 0, "y": 0, "z": 0}}
+    table = {
+        "cameraType": 0, "distortionCoeff": [0.1] + [0.0] * 13, "height": 800, "width": 1280,
+        "intrinsicMatrix": [[800.0, 0, 640.0], [0, 801.0, 400.0], [0, 0, 1]],
+    }  # fmt: skip
+    nowhere = {"rotationMatrix": [], "toCameraSocket": -1, "translation": {"x": 0, "y": 0, "z": 0}}
+    to_color = link | {"toCameraSocket": 0, "translation": {"x": 3.75, "y": 0.5, "z": 0}}
+    to_left = link | {"toCameraSocket": 1, "translation": {"x": -75.0, "y": 0, "z": 0}, "lengthUnit": 2}
+    data = [[2, table | {"extrinsics": to_left}], [0, table | {"extrinsics": nowhere}]]
+    data.append([1, table | {"extrinsics": to_color, "cameraType": 1}])
+    found = depthai.read(json.dumps({"cameraData": data}), HINTS).cameras
+    assert list(found) == ["cam_a", "cam_b", "cam_c"]
+    assert isinstance(found["cam_b"].lens, KannalaBrandt)
+    np.testing.assert_allclose(found["cam_b"].center, (0.0375, 0.005, 0), atol=1e-12)
+    np.testing.assert_allclose(found["cam_c"].center, (-0.0375, 0.005, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("wrong", ["", "{}", "[]", '{"cameraData": [[0, {"intrinsicMatrix": [[1]]}]]}'])
+def test_what_is_no_calibration_of_depthai_is_refused(wrong: str) -> None:
+    with pytest.raises(FormatError, match="no calibration of DepthAI"):
+        depthai.read(wrong, HINTS)
+
+
+def test_depthai_itself_reads_what_we_write() -> None:
+    dai = pytest.importorskip("depthai")
+    color = Camera(1280, 800, 800.0, 801.0, 640.5, 400.25, Lens(np.array([0.1, -0.2])))
+    left = Camera(
+        640, 400, 400.0, 401.0, 320.0, 200.0, T_rs=pose.from_rotation_vector((0.1, 0.2, 0.3), (0.075, 0.01, 0))
+    )
+    handler = dai.CalibrationHandler.fromJson(json.loads(depthai.write({"color": color, "left": left}).text))
+    sockets = dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_A
+    T_color_left = np.array(handler.getCameraExtrinsics(*sockets))
+    T_color_left[:3, 3] /= 100
+    np.testing.assert_allclose(T_color_left, left.T_rs, atol=1e-6)
+    np.testing.assert_allclose(handler.getCameraIntrinsics(sockets[1])[0], (800, 0, 640.5))
+
+
+def test_opencv_finds_a_stereo_pair_in_any_unit() -> None:
+    storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML)
+    for side in "12":
+        storage.write(f"M{side}", np.array([[500.0, 0, 320], [0, 501, 240], [0, 0, 1]]))
+        storage.write(f"D{side}", np.array([[0.1, 0.2, 0, 0, float(side)]]))
+    text = storage.releaseAndGetString()
+    hints = Hints(size=(640, 480), unit=1e-3)
+    assert "R and T are missing" in opencv.read(text, hints).lost[0]
+    turned = pose.from_rotation_vector((0, 0.1, 0), (0, 0, 0))[:3, :3]
+    placed = text + "R: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: " + str(turned.ravel().tolist())
+    placed += "\nT: !!opencv-matrix\n   rows: 3\n   cols: 1\n   dt: d\n   data: [-60., 1., 2.]\n"
+    found = opencv.read(placed, hints).cameras
+    np.testing.assert_allclose(found["right"].T_sr[:3, 3], (-0.06, 0.001, 0.002), atol=1e-12)
+    np.testing.assert_allclose(found["right"].T_sr[:3, :3], turned, atol=1e-9)
+    assert (found["left"].lens.coefficients[4], found["right"].lens.coefficients[4]) == (1, 2)
+    with pytest.raises(FormatError, match="--size"):
+        opencv.read(text, HINTS)
+
+
+@pytest.mark.parametrize("text", ["", "%YAML:1.0\n---\na: 1\n", "hello", "%YAML:1.0\n---\nM: [\n"])
+def test_what_is_no_camera_of_opencv_is_refused(text: str) -> None:
+    with pytest.raises(FormatError):
+        opencv.read(text, Hints(size=(640, 480)))
+
+
+def test_lenses_that_a_format_lacks_are_refused_and_never_cut_off() -> None:
+    rational = Camera(640, 480, 500.0, 500.0, 320.0, 240.0, Lens(np.arange(1, 9) / 100))
+    wide = Camera(640, 480, 300.0, 300.0, 320.0, 240.0, KannalaBrandt(np.array([0.1])))
+    with pytest.raises(FormatError, match="k3"):
+        kalibr.write({"tof": rational})
+    with pytest.raises(FormatError, match="no fisheye"):
+        mrcal.write({"tof": wide})
+    with pytest.raises(FormatError, match="one of tof, color"):
+        ros.write({"tof": wide, "color": wide})
+    prism = yaml.safe_load(CAMERA_INFO) | {
+        "distortion_model": "rational_polynomial", "distortion_coefficients": {"data": [0.1] * 12}
+    }  # fmt: skip
+    with pytest.raises(FormatError, match="thin prism"):
+        ros.read(yaml.safe_dump(prism), HINTS)
+
+
+def _origin(joint: Any) -> np.ndarray:
+    """As URDF says it: fixed axes, roll about x first."""
+    origin = joint.find("origin")
+    xyz, rpy = ([float(number) for number in origin.get(key).split()] for key in ("xyz", "rpy"))
+    T = np.eye(4)
+    T[:3, :3] = (
+        Rotation.from_rotvec([0, 0, rpy[2]])
+        * Rotation.from_rotvec([0, rpy[1], 0])
+        * Rotation.from_rotvec([rpy[0], 0, 0])
+    ).as_matrix()
+    T[:3, 3] = xyz
+    return T
+
+
+@settings(max_examples=30)
+@given(places)
+def test_frames_of_a_urdf_lead_to_the_cameras(place) -> None:
+    camera = Camera(640, 480, 500.0, 500.0, 320.0, 240.0, T_rs=pose.from_rotation_vector(*place))
+    robot = ElementTree.fromstring(urdf.write({"tof": camera}).text.partition("\n")[2])
+    joints = {joint.find("child").get("link"): joint for joint in robot.iter("joint")}  # pyright: ignore[reportOptionalMemberAccess]
+    T_rs = _origin(joints["tof_link"]) @ _origin(joints["tof_optical_frame"])
+    np.testing.assert_allclose(T_rs, camera.T_rs, atol=1e-9)
+    assert {link.get("name") for link in robot.iter("link")} == {"rig", "tof_link", "tof_optical_frame"}
+    # The link's x axis is the optical axis.
+    np.testing.assert_allclose(_origin(joints["tof_optical_frame"])[:3, :3] @ (0, 0, 1), (1, 0, 0), atol=1e-12)
+    transform = yaml.safe_load(tf.write({"tof": camera}).text)["transforms"][0]["transform"]
+    turned = Rotation.from_quat(list(transform["rotation"].values())).as_matrix()
+    np.testing.assert_allclose(turned, camera.T_rs[:3, :3], atol=1e-9)
+
+
+def test_an_image_of_another_size_shows_the_same_directions() -> None:
+    """Each coarse pixel lies in the middle of the fine ones that it is made of."""
+    camera = Camera(1280, 800, 800.0, 801.0, 641.0, 399.0)
+    half = resized(camera, 640, 360)  # scaled by a half, then 20 rows cropped above and below
+    fine = camera.directions(np.array([[100.0, 240.0], [101.0, 241.0]])).mean(axis=0)
+    np.testing.assert_allclose(half.directions(np.array([50.0, 100.0])), fine / np.linalg.norm(fine), atol=1e-6)
+
+
+def test_a_rounded_rotation_is_made_orthonormal_and_a_wrong_one_refused() -> None:
+    T = pose.from_rotation_vector((0.1, 0.2, 0.3), (1, 2, 3))
+    assert pose.is_pose(rigid(np.round(T, 5)), 1e-12)
+    for wrong in (2 * T, np.diag([1, 1, -1, 1]), np.full((4, 4), np.nan), np.eye(3)):
+        with pytest.raises(FormatError):
+            rigid(wrong)
