@@ -17,7 +17,7 @@ from scipy.sparse.linalg import aslinearoperator
 
 from calib.solve import robust
 from calib.solve.blocks import Planes
-from calib.solve.determined import require_determined
+from calib.solve.determined import require_determined, require_touched
 from calib.solve.equations import Equations, Group
 from calib.solve.layout import Layout
 from calib.solve.state import State
@@ -27,6 +27,16 @@ Formulate = Callable[[State, tuple[float, ...]], Equations]
 
 #: Searches with deviations of the groups estimated in between.
 ROUNDS = 3
+
+#: Steps until the metric is taken anew, and how often that is done: far from the minimum its metric is another.
+STEPS = 25
+STAGES = 12
+
+#: A stage that lowers the cost by less than this was the last: a tenth of a deviation of the least known parameter.
+LEAST_GAIN = 0.005
+
+#: Added to the metric, as a share of each parameter's own: a rational lens without distortion is no direction twice.
+DAMPING = 1e-10
 
 #: A factor of a deviation is not believed to be smaller: no detector is a hundred times better than it says.
 LEAST_FACTOR = 0.01
@@ -96,29 +106,34 @@ def search(equations: Equations) -> State:
     Raises:
         UndeterminedError, NotSolvedError: as `adjust`.
     """
+    if not np.all(np.isfinite(equations.residuals(np.zeros(equations.layout.size)))):
+        raise NotSolvedError("the first guess puts a board behind a camera that saw it; check the given calibration")
+    for _ in range(STAGES):
+        increments, ended = _stage(equations)
+        equations = replace(equations, base=equations.layout.move(equations.base, increments))
+        if ended:
+            return equations.base
+    raise NotSolvedError(
+        f"no minimum after {STAGES * STEPS} steps: the views contradict each other, or the kind of lens does not fit"
+    )
+
+
+def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
+    """Increments after some steps in the metric of the curvature at their start, and whether that is the minimum."""
     start = np.zeros(equations.layout.size)
     residuals = equations.residuals(start)
-    if not np.all(np.isfinite(residuals)):
-        raise NotSolvedError("the first guess puts a board behind a camera that saw it; check the given calibration")
-    jacobian = equations.jacobian(start)
     # Weighted as the loss weighs the residuals there, so that a few gross errors do not shape the metric.
     weights = sparse.diags_array(np.sqrt(robust.influence(residuals) / np.where(residuals == 0, 1, residuals)))
-    curvature = require_determined(_normal(weights @ jacobian), equations.layout.names)
-    metric = linalg.cholesky(curvature + 1e-12 * np.diag(np.diag(curvature)), lower=True)
-    inverse_metric = linalg.solve_triangular(metric.T, np.eye(len(metric)))
+    curvature = require_touched(_normal(weights @ equations.jacobian(start)), equations.layout.names)
+    factor = linalg.cholesky(curvature + DAMPING * np.diag(np.diag(curvature)), lower=True)
+    metric = linalg.solve_triangular(factor.T, np.eye(len(factor)))
 
-    def unscaled(steps: NDArray[np.float64]) -> NDArray[np.float64]:
-        return inverse_metric @ steps
-
-    def derivatives(
-        steps: NDArray[np.float64],
-    ) -> Any:  # a product of two linear operators, for which SciPy has no public type
-        matrix = aslinearoperator(equations.jacobian(unscaled(steps)))
-        return matrix @ aslinearoperator(inverse_metric)
+    def derivatives(steps: NDArray[np.float64]) -> Any:  # SciPy's product of operators is no public type
+        return aslinearoperator(equations.jacobian(metric @ steps)) @ aslinearoperator(metric)
 
     found = least_squares(
-        lambda steps: equations.residuals(unscaled(steps)),
-        np.zeros(equations.layout.size),
+        lambda steps: equations.residuals(metric @ steps),
+        start,
         jac=derivatives,  # pyright: ignore[reportArgumentType]
         method="trf",
         tr_solver="lsmr",
@@ -127,13 +142,16 @@ def search(equations: Equations) -> State:
         ftol=1e-8,  # a cost of n / 2 then ends within a hundredth of a deviation
         xtol=1e-10,
         gtol=1e-3,  # of a deviation, since the metric is that of the curvature
-        max_nfev=200,
+        max_nfev=STEPS,
     )
-    if found.status == 0:
-        raise NotSolvedError(
-            "no minimum after 200 steps: the views contradict each other, or the kind of lens does not fit"
-        )
-    return equations.layout.move(equations.base, unscaled(found.x))
+    gained = _cost(residuals) - float(found.cost)
+    return metric @ found.x, found.status > 0 or gained < LEAST_GAIN
+
+
+def _cost(residuals: NDArray[np.float64]) -> float:
+    """Half the sum of the loss, as SciPy counts it."""
+    scale = robust.SOFT_L1_SCALE
+    return float(np.sum(scale**2 * (np.sqrt(1 + (residuals / scale) ** 2) - 1)))
 
 
 def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

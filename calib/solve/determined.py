@@ -23,17 +23,25 @@ class UndeterminedError(ValueError):
         )
 
 
+def require_touched(curvature: NDArray[np.float64], names: tuple[str, ...]) -> NDArray[np.float64]:
+    """The curvature (n, n), if every parameter changes some residual: enough to begin a search with.
+
+    Raises:
+        UndeterminedError: with the names of those that change none.
+    """
+    untouched = [name for name, value in zip(names, np.diag(curvature), strict=True) if not value > 0]
+    if untouched:
+        raise UndeterminedError(untouched)
+    return curvature
+
+
 def require_determined(curvature: NDArray[np.float64], names: tuple[str, ...]) -> NDArray[np.float64]:
     """The curvature (n, n) of the whitened residuals, if it determines all parameters.
 
     Raises:
         UndeterminedError: with the names of those that it does not.
     """
-    diagonal = np.diag(curvature)
-    untouched = [name for name, value in zip(names, diagonal, strict=True) if not value > 0]
-    if untouched:
-        raise UndeterminedError(untouched)
-    size = np.sqrt(diagonal)
+    size = np.sqrt(np.diag(require_touched(curvature, names)))
     values, directions = linalg.eigh(curvature / np.outer(size, size))
     if values[0] < LEAST_EIGENVALUE:
         shares = np.abs(directions[:, 0]) / np.abs(directions[:, 0]).max()

@@ -17,9 +17,8 @@ from calib.solve.state import State
 from calib.solve.tasks import Task
 from calib.views import CornerView
 
-#: Fewest views of a sensor whose intrinsics are free, and of one that only has to be placed.
+#: Fewest views of a sensor whose intrinsics are free.
 LEAST_VIEWS = 6
-LEAST_VIEWS_KEPT = 3
 
 #: A board whose squares are this much larger or smaller than said is noticed.
 SCALE_TOLERANCE = 0.02
@@ -58,7 +57,7 @@ def require_views(task: Task) -> None:
     for name, sensor in task.sensors.items():
         corners = sum(view.sensor == name for view in task.corners)
         planes = sum(view.sensor == name for view in task.planes)
-        least = LEAST_VIEWS_KEPT if sensor.keeps_intrinsics else LEAST_VIEWS
+        least = task.least_kept if sensor.keeps_intrinsics else LEAST_VIEWS
         count = max(corners, planes) if sensor.keeps_intrinsics else corners
         if count < least:
             why = "to be placed in the rig" if sensor.keeps_intrinsics else "to find its intrinsics"
@@ -175,7 +174,7 @@ def _scale(name: str, task: Task, state: State) -> float | None:
     views = [view for view in task.planes if view.sensor == name and view.shot in state.boards]
     own = {view.shot for view in task.corners if view.sensor == name}
     views = [view for view in views if view.shot in own]
-    if len(views) < LEAST_VIEWS_KEPT:
+    if len(views) < LEAST_VIEWS:
         return None
     said, measured = np.empty(len(views)), np.empty(len(views))
     for index, view in enumerate(views):

@@ -13,7 +13,7 @@ from calib.lens import LensError
 from calib.solve import motion, rotations
 from calib.solve.blocks import Corners, Derivatives, Planes
 from calib.solve.layout import DEPTH_TERMS, POSE, Layout
-from calib.solve.lenses import MATRIX
+from calib.solve.lenses import HELD, MATRIX
 from calib.solve.motion import Boards, Placed
 from calib.solve.state import State
 
@@ -72,20 +72,37 @@ class Equations:
             boards = self._boards(increments)
             parts = [_residuals(group, state, self._placed(group, state, boards)) for group in self.groups]
         except (CameraError, LensError):
-            return np.full(self.ends[-1], np.inf)
-        return np.concatenate(parts)
+            return np.full(self.ends[-1] + len(self._held_columns), np.inf)
+        return np.concatenate([*parts, self._held(state)])
 
     def jacobian(self, increments: NDArray[np.float64]) -> sparse.csr_array:
         """Derivatives of `residuals` by the increments."""
         state = self.layout.move(self.base, increments)
         boards = self._boards(increments)
         blocks = [self._rows(group, state, boards, increments) for group in self.groups]
-        return sparse.csr_array(sparse.vstack(blocks))
+        count = len(self._held_columns)
+        held = (np.full(count, 1 / HELD), (np.arange(count), self._held_columns))
+        return sparse.csr_array(sparse.vstack([*blocks, sparse.csr_array(held, shape=(count, self.layout.size))]))
 
     @cached_property
     def ends(self) -> NDArray[np.intp]:
         """First residual of every group, and the number of all."""
         return np.cumsum([0, *(len(group.views_of_rows) for group in self.groups)])
+
+    @cached_property
+    def _held_columns(self) -> NDArray[np.intp]:
+        """Parameters that are held near zero."""
+        held = [self.layout.columns(name, freedom.held) for name, freedom in self.layout.freedoms.items()]
+        return np.concatenate(held)
+
+    def _held(self, state: State) -> NDArray[np.float64]:
+        """Values of those, in deviations; they follow the residuals of all groups."""
+        values = [
+            state.sensors[name].camera.lens.coefficients[freedom.kind.every.index(each)]
+            for name, freedom in self.layout.freedoms.items()
+            for each in freedom.held
+        ]
+        return np.array(values) / HELD
 
     def slices(self) -> list[slice]:
         """Residuals of every group."""

@@ -40,6 +40,11 @@ class Freedom:
     runs_free: bool = False
 
     @property
+    def held(self) -> tuple[str, ...]:
+        """Free parameters that are held near zero."""
+        return tuple(name for name in self.kind.held if name in self.intrinsics)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """All free parameters of the sensor, in the order of the vector."""
         return (

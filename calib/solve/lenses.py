@@ -14,6 +14,11 @@ from calib.lens import Lens, LensModel
 MATRIX = ("fx", "fy", "cx", "cy")
 
 
+#: Deviation of coefficients that are held near zero. Numerator and denominator of a rational lens may share a factor,
+#: which says nothing and can be anything; without this the search wanders along it for ever.
+HELD = 2.0
+
+
 @dataclass(frozen=True)
 class LensKind:
     """A family of lenses.
@@ -23,17 +28,21 @@ class LensKind:
         every: names of all coefficients of such a lens.
         coefficients: names of those that are fitted, the first of all; the others stay as they are.
         make: the lens with given coefficients.
+        held: names of coefficients that are held near zero; what they should be is known to about `HELD`.
+        simpler: kinds to begin the search with, at most one.
     """
 
     name: str
     every: tuple[str, ...]
     coefficients: tuple[str, ...]
     make: Callable[[NDArray[np.float64]], LensModel]
+    held: tuple[str, ...] = ()
+    simpler: tuple["LensKind", ...] = ()
 
 
 PINHOLE = LensKind("pinhole", lens.COEFFICIENTS, (), Lens)
 BROWN_CONRADY = LensKind("brown-conrady", lens.COEFFICIENTS, lens.COEFFICIENTS[:5], Lens)
-RATIONAL = LensKind("rational", lens.COEFFICIENTS, lens.COEFFICIENTS, Lens)
+RATIONAL = LensKind("rational", lens.COEFFICIENTS, lens.COEFFICIENTS, Lens, ("k4", "k5", "k6"), (BROWN_CONRADY,))
 FISHEYE = LensKind("fisheye", fisheye.COEFFICIENTS, fisheye.COEFFICIENTS, KannalaBrandt)
 
 KINDS: Mapping[str, LensKind] = {kind.name: kind for kind in (PINHOLE, BROWN_CONRADY, RATIONAL, FISHEYE)}

@@ -109,7 +109,9 @@ class Undone:
     ) -> NDArray[np.float64]:
         """Changes (n, 2, k) at points (n, 3), given those in the volume (m, 2, k)."""
         count = in_volume.shape[-1]
-        motions, *_ = np.linalg.lstsq(self._by_motion(self.volume), in_volume.reshape(-1, count), rcond=None)
+        motions, *_ = np.linalg.lstsq(
+            self._by_motion(self.volume), in_volume.reshape(2 * len(self.volume), count), rcond=None
+        )
         return changes - (self._by_motion(points) @ motions).reshape(len(points), 2, count)
 
     def _by_motion(self, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -15,10 +15,10 @@ from calib.solve.lenses import LensKind
 from calib.views import CornerView
 
 #: Focal lengths that are tried, as shares of the image's width: from a wide fisheye to a telephoto.
-FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 17)
+FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)
 
 #: Views that focal lengths are tried on.
-TRIED = 12
+TRIED = 6
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def sightings(camera: Camera, view: CornerView) -> list[Sighting]:
 def guess(width: int, height: int, kind: LensKind, views: Sequence[CornerView]) -> Camera:
     """A camera with no distortion and the focal length for which the boards look most like boards.
 
-    Each focal length is tried on a dozen views. It need not be exact, since the solve begins with every camera alone.
+    Each focal length is tried on some views. It need not be exact, since the solve begins with every camera alone.
     """
     tried = views[:: max(1, len(views) // TRIED)]
     cameras = [_plain(width, height, kind, share * width) for share in FOCAL_LENGTHS]

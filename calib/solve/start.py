@@ -61,6 +61,9 @@ def alone(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Cam
     Raises:
         NotSolvedError: if no view shows a board that such a camera could have seen.
     """
+    for simpler in sensor.lens.simpler:  # a rational lens without distortion says everything twice
+        if first.lens.is_pinhole:
+            first = alone(name, replace(sensor, lens=simpler), views, first)
     boards = {view.shot: found[0].T_sb for view in views if (found := sightings(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")

@@ -1,7 +1,7 @@
 """What a calibration is asked: the sensors with what is known of them, and what they saw."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from calib.camera import Camera
 from calib.solve.layout import DEPTH_TERMS, Freedom
@@ -62,6 +62,7 @@ class Task:
         corners, planes: what they saw.
         reference: sensor whose pose in the rig is not free: the rig's frame, or fixed in it by its `factory` pose.
         longest_gap: between two shots of one motion of the board [s]; for sensors that run freely.
+        least_kept: fewest views of a sensor whose intrinsics are kept.
     """
 
     sensors: Mapping[str, SensorTask]
@@ -69,6 +70,7 @@ class Task:
     planes: Sequence[PlaneView]
     reference: str
     longest_gap: float = 0.5
+    least_kept: int = 3
 
     def __post_init__(self) -> None:
         if self.reference not in self.sensors:
@@ -89,10 +91,8 @@ class Task:
     def of_shots(self, shots: Sequence[int]) -> "Task":
         """The same with the views of some shots only."""
         wanted = set(shots)
-        return Task(
-            self.sensors,
-            [view for view in self.corners if view.shot in wanted],
-            [view for view in self.planes if view.shot in wanted],
-            self.reference,
-            self.longest_gap,
+        return replace(
+            self,
+            corners=[view for view in self.corners if view.shot in wanted],
+            planes=[view for view in self.planes if view.shot in wanted],
         )

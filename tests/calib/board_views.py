@@ -82,14 +82,18 @@ class Seen:
 
 
 def look(
-    heads: Mapping[str, Head], boards: Mapping[int, Pose], random: np.random.Generator, times: Mapping[int, float] = {}
+    heads: Mapping[str, Head],
+    boards: Mapping[int, Pose],
+    random: np.random.Generator,
+    times: Mapping[int, float] = {},
+    points: int = 150,
 ) -> Seen:
     """What the heads see of boards `T_rb`, with noise."""
     seen = Seen()
     for shot, T_rb in boards.items():
         for name, head in heads.items():
             seen.corners.extend(corners(name, head, shot, T_rb, random, times.get(shot, float(shot))))
-            seen.planes.extend(distances(name, head, shot, T_rb, random, times.get(shot, float(shot))))
+            seen.planes.extend(distances(name, head, shot, T_rb, random, times.get(shot, float(shot)), points))
     return seen
 
 
@@ -106,18 +110,18 @@ def corners(name: str, head: Head, shot: int, T_rb: Pose, random: np.random.Gene
 
 
 def distances(
-    name: str, head: Head, shot: int, T_rb: Pose, random: np.random.Generator, time: float
+    name: str, head: Head, shot: int, T_rb: Pose, random: np.random.Generator, time: float, points: int = 150
 ) -> list[PlaneView]:
     """Distances along the lines of sight through points of the board, at the pixels where OpenCV shows these."""
     if head.depth_sigma == 0:
         return []
-    spread = random.uniform(-0.02, 1.02, (150, 2)) * ((COLUMNS - 1) * SQUARE, (ROWS - 1) * SQUARE)
-    points = np.concatenate([spread, np.zeros((150, 1))], axis=1)
-    pixels = projected(head.camera, T_rb, points)
+    spread = random.uniform(-0.02, 1.02, (points, 2)) * ((COLUMNS - 1) * SQUARE, (ROWS - 1) * SQUARE)
+    points_b = np.concatenate([spread, np.zeros((points, 1))], axis=1)
+    pixels = projected(head.camera, T_rb, points_b)
     inside = np.all((pixels > 0) & (pixels < (head.camera.width - 1, head.camera.height - 1)), axis=1)
     if inside.sum() < 20:
         return []
-    true = np.linalg.norm(pose.transform(head.camera.T_sr @ T_rb, points[inside]), axis=1)
+    true = np.linalg.norm(pose.transform(head.camera.T_sr @ T_rb, points_b[inside]), axis=1)
     sigmas = head.depth_sigma * true**2
     measured = (1 + head.depth_scale) * true + head.depth_offset + random.normal(0, sigmas)
     return [PlaneView(name, shot, time, pixels[inside], measured, sigmas)]
