@@ -1,6 +1,6 @@
-"""Where the sensors of a rig are, how they project and how they err."""
+"""Where the sensors of a rig are, how they project and how they err: print a board, show it to them, solve."""
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
-    "convert": "calibrations from and to the formats of other programs",
+    "target": "a board to print, true to scale, and its description",
 }
