@@ -220,21 +220,24 @@ def depth_cost(  # one argument per symbol
 
 def color_cost(
     camera: Camera,
-    sigma: float,
+    sigma: float | np.ndarray,
     image: np.ndarray,
     colors: np.ndarray,
     vertices: np.ndarray,
     normals: np.ndarray,
     outlier_share: float,
 ) -> float:
-    """−Σ_v log of the density of the measured colour given the vertex's; uniform where one of them is unknown."""
+    """−Σ_v log of the density of the measured colour given the vertex's; uniform where one of them is unknown.
+
+    The deviation σ is one, or one of every vertex and channel (n, 3).
+    """
     total, uniform = 0.0, 256.0**-3
-    for vertex, normal, color in zip(vertices, normals, colors):
+    for vertex, normal, color, own in zip(vertices, normals, colors, np.broadcast_to(sigma, colors.shape)):
         pixel = seen_pixel(camera, vertex, normal)
         density = uniform
         if pixel is not None and np.all(np.isfinite(color)):
-            e = (image[pixel].astype(float) - color) / sigma
-            density = np.exp(-0.5 * e @ e) / (np.sqrt(2 * np.pi) * sigma) ** 3
+            e = (image[pixel].astype(float) - color) / own
+            density = np.exp(-0.5 * e @ e) / np.prod(np.sqrt(2 * np.pi) * own)
         total -= np.log(max((1 - outlier_share) * density, outlier_share * uniform))
     return float(total)
 
@@ -255,18 +258,19 @@ def channel_cost(  # one argument per symbol
     vertices: np.ndarray,
     normals: np.ndarray,
     outlier_share: float,
+    widening: np.ndarray | float = 1.0,
 ) -> float:
     """−Σ_v log of the density of the measured number given the vertex's own in the channel that its pixel has.
 
     Uniform where one of them is unknown; where something covers the object, what an agreeing number costs on average.
-    The deviation is that of the measured number.
+    The deviation is that of the measured number, widened for every vertex and channel (n, channels).
     """
     total, uniform = 0.0, np.exp(-noise.uniform)
-    for vertex, normal, look in zip(vertices, normals, looks):
+    for vertex, normal, look, wider in zip(vertices, normals, looks, np.broadcast_to(widening, looks.shape)):
         pixel = seen_pixel(camera, vertex, normal)
         density = uniform
         if pixel is not None and np.isfinite(image[pixel]) and np.isfinite(look[channel[pixel]]):
-            sigma = picture_deviation(noise, float(image[pixel]))
+            sigma = picture_deviation(noise, float(image[pixel])) * wider[channel[pixel]]
             if covered[pixel]:
                 total += 0.5 + np.log(np.sqrt(2 * np.pi) * sigma) - np.log(1 - outlier_share)
                 continue

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from annotated_types import Gt, Interval
+from annotated_types import Ge, Gt, Interval
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.making import make_term
+from abs_service.tracker.terms.misplacement import Misplacement
 from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
 
@@ -25,15 +26,24 @@ class Settings:
             (1 − ε) times the noise model's and ε times the uniform one, at most log 2 from their sum.
         range_m: distances that a depth sensor can report at all; a measurement that says nothing about the surface is
             uniform over it.
+        misplacement_px: standard deviation of where on the mesh its appearance lies, in pixels of the sensor that
+            looks: around edges of a print, pictures may deviate by so much more than their noise models say. About
+            0.2 for sharp edges, such as those of a checker board.
     """
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
+    misplacement_px: Annotated[float, Ge(0)] = 0.0
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
+        misplacement = Misplacement(self.misplacement_px)
         return TermSum(
-            synthesizer, [make_term(sensor, mesh, synthesizer, self.bounds(sensor)) for sensor in rig.sensors.values()]
+            synthesizer,
+            [
+                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement)
+                for sensor in rig.sensors.values()
+            ],
         )
 
     def bounds(self, sensor: Sensor) -> Bounds:

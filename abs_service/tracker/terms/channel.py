@@ -12,6 +12,7 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import chained, channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
+from abs_service.tracker.terms.misplacement import NO_WIDENING, NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
 from calib.noise.base import LOG_SQRT_2PI
@@ -45,6 +46,7 @@ class ChannelTerm:
         noise: ChannelNoise,
         illumination: Illumination,
         bounds: Bounds,
+        misplacement: Misplacement = NOT_AT_ALL,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer
@@ -53,6 +55,8 @@ class ChannelTerm:
         self._shadow = Shadow(self._view.camera)
         self._noise = noise
         self._bounds = bounds
+        self._misplacement = misplacement
+        self._widening = NO_WIDENING
         self._image = np.zeros((1, 1, 4), np.float32)
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
@@ -69,6 +73,11 @@ class ChannelTerm:
         _border(self._image, texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
+        self._widening = NO_WIDENING
+        _, inverse, _ = self._residuals(predicted)
+        with np.errstate(divide="ignore"):
+            deviation = (1 / inverse)[:, None]
+        self._widening = self._misplacement.widening(self._view, predicted, deviation)
 
     def foreground(self) -> NDArray[np.float64]:
         """None: brightness does not tell what is nearer."""
@@ -84,7 +93,7 @@ class ChannelTerm:
         seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         out = np.empty(len(seen.pixel))
         uniform = self._bounds.inlier + self._bounds.uniform
-        _channel_cost(seen.pixel, self._texture, seen.attributes, self._bounds.outlier, uniform, out)
+        _channel_cost(seen.pixel, self._texture, seen.attributes, *self._widening, self._bounds.outlier, uniform, out)
         return self._view.balance(out, surface, uniform)
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
@@ -127,9 +136,13 @@ class ChannelTerm:
         seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         texels = self._texture[seen.pixel[0]].astype(np.float64)
         own = seen.attributes[0][np.arange(len(texels)), texels[:, CHANNEL].astype(int)]
-        residual = (texels[:, VALUE] - own) * texels[:, INVERSE]
+        widened = np.broadcast_to(self._widening.factor, (len(texels), self._widening.factor.shape[1]))
+        inverse = (
+            texels[:, INVERSE] / widened[np.arange(len(texels)), texels[:, CHANNEL].astype(int) % widened.shape[1]]
+        )
+        residual = (texels[:, VALUE] - own) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
-        return np.where(measured, residual, np.inf), texels[:, INVERSE], measured
+        return np.where(measured, residual, np.inf), inverse, measured
 
 
 def _fitting(buffer: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
@@ -180,17 +193,20 @@ def _channel_cost(
     pixel: NDArray[np.int32],
     texture: NDArray[np.float32],
     appearance: NDArray[np.float32],
+    factor: NDArray[np.float32],
+    log_factor: NDArray[np.float32],
     outlier: float,
     uniform: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over samples of min(normaliser + ½e², outlier).
+    """Sum over samples of min(normaliser + ½e², outlier), with deviations widened as `Widening` says.
 
     Where the value or the vertex's own is unknown (NaN) of `uniform`, and where something stands before the object (∞)
     of what an agreeing value costs on average. Texels are [value, channel, inverse deviation, normaliser].
     """
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
+    samples, channels = factor.shape
     for k in range(pixel.shape[0]):
         total = np.float32(0)
         own = k % appearance.shape[0]
@@ -198,7 +214,10 @@ def _channel_cost(
             if pixel[k, v] < 0:
                 continue
             texel = texture[pixel[k, v]]
-            e = (texel[0] - appearance[own, v, np.int32(texel[1])]) * texel[2]
-            agreeing = half + texel[3] if abs(e) > farthest else min(half * e * e + texel[3], most)
+            channel = np.int32(texel[1])
+            row, column = (v if samples > 1 else 0), (channel if channels > 1 else 0)
+            e = (texel[0] - appearance[own, v, channel]) * texel[2] / factor[row, column]
+            normalizer = texel[3] + log_factor[row, column]
+            agreeing = half + normalizer if abs(e) > farthest else min(half * e * e + normalizer, most)
             total += unknown if np.isnan(e) else agreeing
         out[k] = total

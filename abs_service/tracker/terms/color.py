@@ -8,6 +8,7 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
 from abs_service.tracker.terms.gradients import chained, color_rows
+from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
 from calib.noise.base import LOG_SQRT_2PI
@@ -22,15 +23,24 @@ class ColorTerm:
     """
 
     def __init__(
-        self, sensor: str, synthesizer: Synthesizer, colors: NDArray[np.float32], noise: GaussianColor, bounds: Bounds
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        colors: NDArray[np.float32],
+        noise: GaussianColor,
+        bounds: Bounds,
+        misplacement: Misplacement = NOT_AT_ALL,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, colors)
         self._shadow = Shadow(self._view.camera)
         self._bounds = bounds
-        self._inverse_deviation = 1 / noise.sigma
-        self._normalizer = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
+        self._sigma = np.array([[noise.sigma]], np.float32)
+        self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
+        self._misplacement = misplacement
+        self._inverse = np.zeros((0, 3), np.float32)
+        self._normalizer = np.zeros(0, np.float32)
         self._texture = np.zeros((0, 3), np.float32)
         self._image = np.zeros((1, 1, 3), np.float32)
 
@@ -41,6 +51,11 @@ class ColorTerm:
         self._image = self._synthesizer.image(self.sensor, image.rgb.astype(np.float32))
         self._texture = np.pad(self._image, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan).reshape(-1, 3)
         self._view.look(predicted)
+        widening = self._misplacement.widening(self._view, predicted, self._sigma)
+        self._inverse = np.repeat(
+            np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
+        )
+        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
 
     def foreground(self) -> NDArray[np.float64]:
         """None: colours do not tell what is nearer."""
@@ -55,22 +70,18 @@ class ColorTerm:
         """−Σ_v log of the density of the measured colours (population,)."""
         seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
-        constants = (
-            self._inverse_deviation,
-            self._normalizer,
-            self._bounds.outlier,
-            self._bounds.inlier + self._bounds.uniform,
-            self._normalizer + 1.5,
-        )
-        _color_cost(seen.pixel, self._texture, seen.attributes, *constants, out)
-        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+        uniform = self._bounds.inlier + self._bounds.uniform
+        noise = (self._inverse, self._normalizer, self._bounds.outlier, uniform)
+        _color_cost(seen.pixel, self._texture, seen.attributes, *noise, out)
+        return self._view.balance(out, surface, uniform)
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
-        rows = color_rows(self._image, self._view.camera, vertices) * self._inverse_deviation
+        inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
+        rows = color_rows(self._image, self._view.camera, vertices) * inverse
         return Linearization(residual[use].ravel(), chained(rows, use, self._view.spread(surface, jacobian)))
 
     def fit(self, surface: Surface) -> SensorFit:
@@ -86,7 +97,7 @@ class ColorTerm:
         """Normalised residuals (n, 3) and whether there is a measurement (n,)."""
         seen = self._view.synthesize(surface)
         colors = seen.attributes[0].astype(np.float64)
-        residual = (self._texture[seen.pixel[0]] - colors) * self._inverse_deviation
+        residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
         measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
         return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
 
@@ -96,19 +107,20 @@ def _color_cost(
     pixel: NDArray[np.int32],
     texture: NDArray[np.float32],
     colors: NDArray[np.float32],
-    inverse_deviation: float,
-    normalizer: float,
+    inverse: NDArray[np.float32],
+    normalizer: NDArray[np.float32],
     outlier: float,
     uniform: float,
-    hidden: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over samples of min(normaliser + ½e², outlier).
+    """Sum over samples of min(normaliser + ½e², outlier), of as many samples as have noise of their own, or of all.
 
-    Where either colour is unknown (NaN) of `uniform`, and of `hidden` where something stands before the object (∞).
+    Where either colour is unknown (NaN) of `uniform`, and where something stands before the object (∞) of what an
+    agreeing colour costs on average.
     """
-    scale = np.float32(0.5 * inverse_deviation * inverse_deviation)
-    farthest = np.float32(3e5)  # no two colours differ by more; np.isfinite does not survive reordered sums
+    half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
+    farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
+    shared = inverse.shape[0] == 1
     for k in range(pixel.shape[0]):
         total = 0.0
         own = k % colors.shape[0]
@@ -116,8 +128,12 @@ def _color_cost(
             if pixel[k, v] < 0:
                 continue
             measured, color = texture[pixel[k, v]], colors[own, v]
-            red, green, blue = measured[0] - color[0], measured[1] - color[1], measured[2] - color[2]
+            row = 0 if shared else v
+            red = (measured[0] - color[0]) * inverse[row, 0]
+            green = (measured[1] - color[1]) * inverse[row, 1]
+            blue = (measured[2] - color[2]) * inverse[row, 2]
             square = red * red + green * green + blue * blue
-            cost = hidden if square > farthest else min(normalizer + scale * square, outlier)
-            total += uniform if np.isnan(square) else cost
+            agreeing = average + normalizer[row]
+            cost = agreeing if square > farthest else min(normalizer[row] + half * square, most)
+            total += unknown if np.isnan(square) else cost
         out[k] = total

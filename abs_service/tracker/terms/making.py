@@ -8,6 +8,7 @@ from abs_service.tracker.terms.channel import ChannelTerm
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
 from abs_service.tracker.terms.illumination import Active, Passive
+from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
 from calib.noise.base import DepthNoise
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
@@ -17,19 +18,23 @@ from calib.noise.intensity import GaussianIntensity
 from calib.rig import Sensor
 
 
-def make_term(sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, bounds: Bounds) -> Term:
+def make_term(
+    sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, bounds: Bounds, misplacement: Misplacement = NOT_AT_ALL
+) -> Term:
     """The term that compares a mesh with what a sensor measures, under the sensor's own noise model."""
     name = sensor.name
     match sensor.noise:
         case DepthNoise() as noise:
             return DepthTerm(name, synthesizer, len(mesh.vertices), noise, bounds)
         case GaussianColor() as noise:
-            return ColorTerm(name, synthesizer, mesh.looks(name), noise, bounds)
+            return ColorTerm(name, synthesizer, mesh.looks(name), noise, bounds, misplacement)
         case GaussianGrey() | GaussianBayer() as noise:
-            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds)
+            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds, misplacement)
         case GaussianIntensity(illumination="active") as noise:
-            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Active(sensor.camera.center), bounds)
+            return ChannelTerm(
+                name, synthesizer, mesh.looks(name), noise, Active(sensor.camera.center), bounds, misplacement
+            )
         case GaussianIntensity() as noise:
-            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds)
+            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds, misplacement)
         case LightBarrier() as noise:
             return BarrierTerm(name, sensor.camera, mesh.faces, noise, bounds)
