@@ -68,9 +68,5 @@ def _advice(message: str) -> str:
     return message
 
 
-#: What makes a device accessible to everyone at the machine.
-UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
-UDEV_REMEDY = (
-    f"echo '{UDEV_RULE}' | sudo tee /etc/udev/rules.d/80-movidius.rules"
-    " && sudo udevadm control --reload-rules && sudo udevadm trigger"
-)
+#: What lets people at this machine open the device.
+UDEV_REMEDY = "abs-service devices --udev | sudo tee /etc/udev/rules.d/60-abs-service.rules  and plug it in again"

@@ -1,7 +1,10 @@
 """An attached OAK: found, opened, and running what an address asks for."""
 
 import json
+import time
+from collections.abc import Callable, Mapping
 from typing import Any
+from urllib.parse import urlsplit, urlunsplit
 
 from drivers.capabilities import SyncRole
 from drivers.clock import DeviceClock
@@ -17,6 +20,8 @@ from drivers.oak.pipelines import build
 
 #: Newest images that wait; the pump takes them at once.
 _QUEUE = 4
+#: How often the temperature is asked for [s].
+TEMPERATURE_S = 5.0
 _LINKS = {"SUPER_PLUS": "USB 3, 10 Gbit/s", "SUPER": "USB 3, 5 Gbit/s", "HIGH": "USB 2, 480 Mbit/s"}
 
 
@@ -77,7 +82,7 @@ def _run(dai: Any, device: Any, address: Address) -> Connection:
         device.close()
 
     return Connection(
-        info=_info(device),
+        info=_info(device, address),
         queues=queues,
         poses=poses,
         rate_hz=address.fps,
@@ -87,14 +92,42 @@ def _run(dai: Any, device: Any, address: Address) -> Connection:
         stamp=synchronised,
         controls=controls,
         sync_roles=(SyncRole.FREE, SyncRole.MASTER, SyncRole.SLAVE),
-        gauges=lambda: {"temperature_c": float(device.getChipTemperature().average)},
+        gauges=Thermometer(device),
     )
 
 
-def _info(device: Any) -> DeviceInfo:
+def _info(device: Any, address: Address) -> DeviceInfo:
     serial = device.getDeviceId()
     link = _LINKS.get(device.getUsbSpeed().name, "") if device.getDeviceInfo().protocol.name == "X_LINK_USB_VSC" else ""
-    return DeviceInfo(f"oak://{serial}", str(device.getProductName() or device.getDeviceName()), serial, link=link)
+    # On the network the address itself is who it is: without it, nobody would look there again.
+    name = address.name if address.network and address.name else serial
+    uri = urlunsplit(("oak", name, "", urlsplit(address.uri).query, ""))
+    return DeviceInfo(uri, str(device.getProductName() or device.getDeviceName()), serial, link=link)
+
+
+class Thermometer:
+    """The chip's temperature, asked for once in a while, because every question takes its way through the cable.
+
+    Args:
+        device: `dai.Device`.
+        clock: [s].
+    """
+
+    def __init__(self, device: Any, clock: Callable[[], float] = time.monotonic) -> None:
+        self._device = device
+        self._clock = clock
+        self._next_s = 0.0
+        self._latest: Mapping[str, float] = {}
+
+    def __call__(self) -> Mapping[str, float]:
+        """`temperature_c` [°C]; nothing if the device does not tell."""
+        if self._clock() >= self._next_s:
+            self._next_s = self._clock() + TEMPERATURE_S
+            try:
+                self._latest = {"temperature_c": float(self._device.getChipTemperature().average)}
+            except Exception:  # a device that is gone is noticed elsewhere
+                self._latest = {}
+        return self._latest
 
 
 def _found(dai: Any, info: Any) -> Found:

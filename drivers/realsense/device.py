@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from calib.camera import Camera
-from drivers.capabilities import Capabilities, ClockInfo, StreamInfo, SyncRole
+from drivers.capabilities import Capabilities, StreamInfo, SyncRole
 from drivers.clock import DeviceClock
 from drivers.delivery import Delivery
 from drivers.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.realsense import controls
 from drivers.realsense.inbox import Inbox
 from drivers.realsense.library import naming
-from drivers.realsense.picture import TICK_HZ, Picture, frame, from_frame
+from drivers.realsense.picture import CLOCK, HARDWARE, Picture, frame, from_frame
 from drivers.realsense.profiles import Stream, cameras
 from drivers.realsense.streams import Role, StreamError
 
@@ -29,8 +29,10 @@ _log = logging.getLogger(__name__)
 _LOOK_S = 0.1
 #: When nothing has come for so long, it asks whether the camera is still there [s].
 _SILENT_S = 1.0
-#: The cameras' counter of microseconds has 32 bits. Stamps that have more, of the host's clock, come through unchanged.
-CLOCK = ClockInfo("realsense hardware clock", TICK_HZ, 32)
+_NO_METADATA = (
+    "images are stamped by {}, not by the camera, because the kernel withholds their metadata; librealsense's "
+    "installation page says how to patch it"
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +65,7 @@ class RealsenseDevice:
         self._clock = clock
         self._lock = threading.RLock()
         self._running: list[Any] = []
+        self._warned = False
         self._thread = threading.Thread()
         self._clocks: dict[Role, DeviceClock] = {}
         self._inbox: Inbox[tuple[Role, Any, int]] = Inbox()
@@ -193,6 +196,9 @@ class RealsenseDevice:
         except (StreamError, RuntimeError):
             self._delivery.drop("undecodable")
             return
+        if picture.domain != HARDWARE and not self._warned:
+            self._warned = True
+            self._delivery.warn("clock", _NO_METADATA.format(picture.domain))
         stamp = self._clocks[role].stamp(picture.ticks, t_arrival_ns)
         if stamp.stepped:
             self._delivery.begin_epoch()

@@ -1,7 +1,9 @@
 """From an address to a device: attached cameras, and recordings that librealsense plays."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
+from urllib.parse import urlsplit
 
 from drivers.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
 from drivers.discovery import Availability, Found, choose
@@ -44,7 +46,9 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
         offers = [(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
         chosen = set(map(id, wanted([stream for _, streams in offers for stream in streams], address)))
     used = [Used(sensor, [stream for stream in streams if id(stream) in chosen]) for sensor, streams in offers]
-    return _device(rs, camera, about(rs, camera), used, clock)
+    info = about(rs, camera)
+    query = urlsplit(uri).query
+    return _device(rs, camera, replace(info, uri=f"{info.uri}?{query}" if query else info.uri), used, clock)
 
 
 def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) -> RealsenseDevice:
@@ -97,8 +101,7 @@ def _found(rs: Any, camera: Any) -> Found:
         camera.query_sensors()
     except RuntimeError as error:
         who = DeviceInfo("realsense://", "RealSense", "")
-        remedy = "install librealsense's udev rules (99-realsense-libusb.rules) and plug the camera in again"
-        return Found(who, Availability.NO_PERMISSION, f"it cannot be read: {error}", remedy)
+        return Found(who, Availability.NO_PERMISSION, f"it cannot be read: {error}", library.UDEV_REMEDY)
     return Found(info)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.capabilities import ClockInfo
 from drivers.frame import ENCODINGS, Frame, Kind, Reference
 from drivers.realsense.streams import Role, StreamError
 
@@ -18,8 +19,11 @@ FORMATS: Mapping[Kind, Mapping[str, str]] = {
     Kind.CONFIDENCE: {"raw8": "mono8", "y8": "mono8"},
     Kind.COLOR: {"rgb8": "rgb8", "bgr8": "bgr8", "y8": "mono8", "y16": "mono16"},
 }
-#: Ticks per second: librealsense gives milliseconds with three digits behind the point.
-TICK_HZ = 1e6
+#: librealsense gives milliseconds with three digits behind the point, of a counter of microseconds with 32 bits. Stamps
+#: that have more, of the host's clock, come through the unwrapping unchanged.
+CLOCK = ClockInfo("realsense", 1e6, 32)
+#: The domain that stamps come in unless the kernel withholds the images' metadata.
+HARDWARE = "hardware clock"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +55,7 @@ class Picture:
 
     @property
     def ticks(self) -> int:
-        """Its time in ticks of `TICK_HZ`; 0 if it has none."""
+        """Its time in ticks of `CLOCK`; 0 if it has none."""
         return round(self.time_ms * 1000) if math.isfinite(self.time_ms) else 0
 
 
@@ -98,8 +102,8 @@ def frame(picture: Picture, role: Role, calib_id: str) -> Frame:
         geometry=role.geometry,
         invalid=0.0 if is_depth else None,
         t_device_ticks=picture.ticks,
-        tick_hz=TICK_HZ,
-        clock_domain=f"realsense {picture.domain}",
+        tick_hz=CLOCK.tick_hz,
+        clock_domain=CLOCK.domain,
         t_reference=Reference.END,
         exposure_s=picture.exposure * role.exposure_unit_s,
         gain=picture.gain,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from drivers.realsense import library
+from tests.drivers.conformance import Fault
 
 SIZE = (64, 48)
 
@@ -14,12 +15,22 @@ SIZE = (64, 48)
 class SoftwareCamera:
     """Depth, infra-red and confidence behind one lens and colours beside it, as an L515 has them.
 
+    Args:
+        serial: its serial number.
+        model: of its lenses.
+        fault: what goes wrong.
+        after: from which exposure on.
+
     Attributes:
         device: `rs.software_device`.
     """
 
-    def __init__(self, serial: str = "0001", model: str = "brown_conrady") -> None:
+    def __init__(
+        self, serial: str = "0001", model: str = "brown_conrady", fault: Fault = Fault.NONE, after: int = 0
+    ) -> None:
         self.rs = rs = library.load()
+        self.fault = fault
+        self._after = after
         self.device = rs.software_device()
         self.device.register_info(rs.camera_info.serial_number, serial)
         self.device.register_info(rs.camera_info.name, "software camera")
@@ -46,13 +57,18 @@ class SoftwareCamera:
     def show(self, number: int, time_ms: float) -> None:
         """Shows one exposure to whoever listens: depth 1000 + number everywhere but in the first row."""
         rs, (width, height) = self.rs, SIZE
+        fault = self.fault if number >= self._after else Fault.NONE
+        if fault in {Fault.STALL, Fault.UNPLUG}:
+            return
         for sensor, kind, bpp, profile in self._streams:
             depth = np.full((height, width), 1000 + number, np.uint16)
-            depth[0] = 0
+            depth[0 if fault != Fault.NAN else slice(None)] = 0
             images = {"depth": depth, "color": np.full((height, width, 3), number % 256, np.uint8)}
             frame = rs.software_video_frame()
             frame.pixels = images.get(kind, np.full((height, width), number % 256, np.uint8))
             frame.bpp, frame.stride = bpp, width * bpp
+            if fault in {Fault.DROP, Fault.WRONG_SIZE} and number % 2:
+                frame.stride = width * bpp // 2  # rows with half of their pixels
             frame.timestamp, frame.domain = time_ms, rs.timestamp_domain.hardware_clock
             frame.frame_number = number
             frame.profile = profile.as_video_stream_profile()
@@ -63,7 +79,9 @@ class SoftwareCamera:
     def run(self, rate_hz: float = 100.0) -> None:
         """Begins to show exposures until `halt`."""
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._show_all, args=(self._stop, 1 / rate_hz), daemon=True)
+        self._thread = threading.Thread(
+            target=self._show_all, args=(self._stop, 1 / rate_hz), name="shows", daemon=True
+        )
         self._thread.start()
 
     def halt(self) -> None:
