@@ -17,6 +17,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
+from drivers.host_clock import host_clock
 from drivers.mcap_file import file_descriptor_set
 
 #: What `foxglove.CameraCalibration` calls the lens models.
@@ -68,6 +69,7 @@ def sensor_model(
     """
     message = sensor_model_pb2.SensorModel(
         header=header,
+        host_clock=host_clock(),
         sensor=sensor,
         width=camera.width,
         height=camera.height,

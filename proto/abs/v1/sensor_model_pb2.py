@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from abs.v1 import common_pb2 as abs_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19\x61\x62s/v1/sensor_model.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"\xed\x02\n\x0bSensorModel\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0e\n\x06sensor\x18\x02 \x01(\t\x12\r\n\x05width\x18\x03 \x01(\r\x12\x0e\n\x06height\x18\x04 \x01(\r\x12\n\n\x02\x66x\x18\x05 \x01(\x01\x12\n\n\x02\x66y\x18\x06 \x01(\x01\x12\n\n\x02\x63x\x18\x07 \x01(\x01\x12\n\n\x02\x63y\x18\x08 \x01(\x01\x12\x0c\n\x04lens\x18\t \x03(\x01\x12\x0c\n\x04T_rs\x18\n \x03(\x01\x12\x10\n\x08\x63\x61lib_id\x18\x0b \x01(\t\x12\r\n\x05noise\x18\x0c \x01(\t\x12\x42\n\x10noise_parameters\x18\r \x03(\x0b\x32(.abs.v1.SensorModel.NoiseParametersEntry\x12\x12\n\nlens_model\x18\x0e \x01(\t\x1aJ\n\x14NoiseParametersEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12!\n\x05value\x18\x02 \x01(\x0b\x32\x12.abs.v1.NumberList:\x02\x38\x01\"\x1c\n\nNumberList\x12\x0e\n\x06values\x18\x01 \x03(\x01\"W\n\x06\x43onfig\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0c\n\x04toml\x18\x02 \x01(\t\x12\x0e\n\x06sha256\x18\x03 \x01(\t\x12\x0f\n\x07version\x18\x04 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x19\x61\x62s/v1/sensor_model.proto\x12\x06\x61\x62s.v1\x1a\x13\x61\x62s/v1/common.proto\"\x81\x03\n\x0bSensorModel\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0e\n\x06sensor\x18\x02 \x01(\t\x12\r\n\x05width\x18\x03 \x01(\r\x12\x0e\n\x06height\x18\x04 \x01(\r\x12\n\n\x02\x66x\x18\x05 \x01(\x01\x12\n\n\x02\x66y\x18\x06 \x01(\x01\x12\n\n\x02\x63x\x18\x07 \x01(\x01\x12\n\n\x02\x63y\x18\x08 \x01(\x01\x12\x0c\n\x04lens\x18\t \x03(\x01\x12\x0c\n\x04T_rs\x18\n \x03(\x01\x12\x10\n\x08\x63\x61lib_id\x18\x0b \x01(\t\x12\r\n\x05noise\x18\x0c \x01(\t\x12\x42\n\x10noise_parameters\x18\r \x03(\x0b\x32(.abs.v1.SensorModel.NoiseParametersEntry\x12\x12\n\nlens_model\x18\x0e \x01(\t\x12\x12\n\nhost_clock\x18\x0f \x01(\t\x1aJ\n\x14NoiseParametersEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12!\n\x05value\x18\x02 \x01(\x0b\x32\x12.abs.v1.NumberList:\x02\x38\x01\"\x1c\n\nNumberList\x12\x0e\n\x06values\x18\x01 \x03(\x01\"W\n\x06\x43onfig\x12\x1e\n\x06header\x18\x01 \x01(\x0b\x32\x0e.abs.v1.Header\x12\x0c\n\x04toml\x18\x02 \x01(\t\x12\x0e\n\x06sha256\x18\x03 \x01(\t\x12\x0f\n\x07version\x18\x04 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,11 +35,11 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._loaded_options = None
   _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_options = b'8\001'
   _globals['_SENSORMODEL']._serialized_start=59
-  _globals['_SENSORMODEL']._serialized_end=424
-  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_start=350
-  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_end=424
-  _globals['_NUMBERLIST']._serialized_start=426
-  _globals['_NUMBERLIST']._serialized_end=454
-  _globals['_CONFIG']._serialized_start=456
-  _globals['_CONFIG']._serialized_end=543
+  _globals['_SENSORMODEL']._serialized_end=444
+  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_start=370
+  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_end=444
+  _globals['_NUMBERLIST']._serialized_start=446
+  _globals['_NUMBERLIST']._serialized_end=474
+  _globals['_CONFIG']._serialized_start=476
+  _globals['_CONFIG']._serialized_end=563
 # @@protoc_insertion_point(module_scope)

@@ -1,0 +1,157 @@
+"""A remote rig as a device: its frames as they were, with their times on this host's clock."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from calib.camera import Camera
+from drivers import codec
+from drivers.capabilities import Capabilities, ClockInfo
+from drivers.clock import DeviceClock
+from drivers.codec import CodecError
+from drivers.controls import Controls
+from drivers.delivery import Delivery
+from drivers.device import DeviceInfo, DeviceState, Sink
+from drivers.frame import Frame
+from drivers.remote.link import Link
+from drivers.remote.survey import IMAGES, Survey
+
+TRUTHS = "*/truth"
+#: The other host's monotonic clock, by its stamps.
+CLOCK = ClockInfo("remote host", 1e9)
+
+
+@dataclass(slots=True)
+class _Stream:
+    """Where one stream is: the epoch of its rig, its number here, and the latest exposure."""
+
+    theirs: int
+    ours: int
+    seq: int
+    clock: DeviceClock
+
+
+class RemoteDevice:
+    """Delivers what another `abs-service capture` publishes. Sequence numbers, ticks and settings stay as they are.
+
+    Host times stay, too, if both processes read the same clock; else each stream's are mapped from the other host's
+    clock by `drivers.clock`. An epoch there is one here. If the other process ends, the device has FAILED.
+
+    Args:
+        uri: address that opens it again.
+        rig: name of the remote rig.
+        link: to it; closed with the device.
+        survey: what the rig delivers.
+        clock: CLOCK_MONOTONIC [ns].
+    """
+
+    def __init__(self, uri: str, rig: str, link: Link, survey: Survey, clock: Callable[[], int]) -> None:
+        self.info = DeviceInfo(uri, "abs-service rig", rig, link=uri.removeprefix("remote://").partition("/")[0])
+        self.capabilities = Capabilities(survey.streams)
+        self.cameras: Mapping[str, Camera] = survey.cameras
+        self.controls = Controls()
+        self._rig = rig
+        self._link = link
+        self._same_clock = survey.same_clock
+        self._clock = clock
+        self._delivery = Delivery(survey.streams, causes=["missing", "malformed"])
+        self._streams: dict[tuple[str, str], _Stream] = {}
+
+    @property
+    def state(self) -> DeviceState:
+        """See `drivers.device.Device.state`."""
+        return self._delivery.state
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames`; exposures that are `missing` between two that came, lost there or on the way; `malformed` ones."""
+        return self._delivery.counters
+
+    @property
+    def gauges(self) -> Mapping[str, float]:
+        """Of each stream's mapping from the other host's clock, see `drivers.clock.DeviceClock.gauges`."""
+        streams = {} if self._same_clock else dict(self._streams)
+        return {
+            f"clock.{sensor}/{stream}.{name}": value
+            for (sensor, stream), one in streams.items()
+            for name, value in one.clock.gauges.items()
+        }
+
+    def start(self, sink: Sink) -> None:
+        """Subscribes.
+
+        Raises:
+            DeviceError: the device was closed.
+        """
+        stop = self._delivery.begin(sink, f'subscribing to rig "{self._rig}"')
+        if stop is None:
+            return
+        self._streams = {}
+        self._delivery.report(DeviceState.STREAMING, f'rig "{self._rig}" is captured elsewhere')
+        self._link.listen(self._rig, IMAGES, self._on_image)
+        self._link.listen(self._rig, TRUTHS, self._on_truth)
+        self._link.watch(self._rig, self._on_gone)
+        if stop.is_set():
+            self._link.silence()
+
+    def stop(self) -> None:
+        """Ends delivery; after it returns the sink is not called again."""
+        self._delivery.end("stopped")
+        self._link.silence()
+
+    def close(self) -> None:
+        """Stops and ends the session."""
+        self._delivery.release()
+        self._link.close()
+
+    def _on_gone(self) -> None:
+        self._delivery.report(DeviceState.FAILED, f'the capture of rig "{self._rig}" has ended')
+
+    def _on_truth(self, topic: str, payload: bytes, attachment: bytes) -> None:
+        # Truths of another clock would have no frame of the same time.
+        if self._same_clock:
+            try:
+                self._delivery.truth(codec.decode_truth(payload))
+            except CodecError:
+                self._delivery.drop("malformed")
+
+    def _on_image(self, topic: str, payload: bytes, attachment: bytes) -> None:
+        t_arrival_ns = self._clock()
+        try:
+            frame = codec.decode(payload, attachment)
+        except CodecError:
+            self._delivery.drop("malformed")
+            return
+        stream = self._follow(frame)
+        if self._same_clock:
+            self._delivery.frame(replace(frame, epoch=stream.ours))
+            return
+        stamp = stream.clock.stamp(frame.t_arrival_ns, t_arrival_ns)
+        if stamp.stepped:
+            self._delivery.begin_epoch()
+            stream.ours = self._delivery.epoch
+        t_host_ns = min(stamp.t_host_ns + frame.t_host_ns - frame.t_arrival_ns, t_arrival_ns)
+        sigma_ns = round(math.hypot(frame.t_sigma_ns, stamp.t_sigma_ns))
+        self._delivery.frame(
+            replace(frame, epoch=stream.ours, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, t_sigma_ns=sigma_ns)
+        )
+
+    def _follow(self, frame: Frame) -> _Stream:
+        """Where the frame's stream is; counts what is missing before the frame."""
+        stream = self._streams.get(frame.key)
+        if stream is None:
+            stream = _Stream(frame.epoch, self._delivery.epoch, frame.seq, DeviceClock(CLOCK))
+            self._streams[frame.key] = stream
+            return stream
+        if stream.theirs != frame.epoch:
+            siblings = [s for key, s in self._streams.items() if key[0] == frame.sensor and s.theirs == frame.epoch]
+            if siblings:
+                stream.ours = siblings[0].ours
+            else:
+                self._delivery.begin_epoch()
+                stream.ours = self._delivery.epoch
+            stream.theirs, stream.clock = frame.epoch, DeviceClock(CLOCK)
+        elif frame.seq > stream.seq:
+            self._delivery.drop("missing", frame.seq - stream.seq - 1)
+        stream.seq = frame.seq
+        return stream

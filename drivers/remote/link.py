@@ -1,0 +1,126 @@
+"""The way to another process: a zenoh session as this driver needs it, and nothing else here knows zenoh.
+
+Keys are those of docs/subscribing.md: `abs/RIG/TOPIC`.
+"""
+
+import json
+import threading
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+import zenoh
+
+from drivers.device import DeviceError
+from drivers.remote.address import Address
+
+#: Without a sign of life for this long the other side counts as gone [ms].
+LEASE_MS = 2000
+#: How long the other side may take to answer [s].
+ANSWER_S = 3.0
+
+#: Takes topic, payload and attachment of a message, from a thread of zenoh's; must be quick.
+OnMessage = Callable[[str, bytes, bytes], None]
+
+T = TypeVar("T")
+
+
+class Link:
+    """One session with a router.
+
+    Args:
+        session: an open session; the link closes it.
+    """
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._declared: list[Any] = []
+        self._lock = threading.Lock()
+
+    def rigs(self, timeout_s: float = ANSWER_S) -> list[str]:
+        """Names of the rigs whose devices are captured."""
+        replies = self._session.liveliness().get("abs/*/live/capture", timeout=timeout_s)
+        return sorted({str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok is not None})
+
+    def ask(self, rig: str, pattern: str) -> list[bytes]:
+        """What answers a question for the topics of a rig that match."""
+        replies = self._session.get(f"abs/{rig}/{pattern}", target=zenoh.QueryTarget.ALL, timeout=ANSWER_S)
+        return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
+
+    def listen(self, rig: str, pattern: str, on_message: OnMessage) -> None:
+        """Hears the messages of a rig's topics that match, until `silence`."""
+        prefix = f"abs/{rig}/"
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            attachment = b"" if sample.attachment is None else sample.attachment.to_bytes()
+            on_message(str(sample.key_expr).removeprefix(prefix), sample.payload.to_bytes(), attachment)
+
+        self._keep(lambda: self._session.declare_subscriber(prefix + pattern, on_sample))
+
+    def watch(self, rig: str, on_gone: Callable[[], None]) -> None:
+        """Hears when the capture of a rig ends, cleanly or not, until `silence`."""
+
+        def on_token(sample: zenoh.Sample) -> None:
+            if sample.kind == zenoh.SampleKind.DELETE:
+                on_gone()
+
+        tokens, key = self._session.liveliness(), f"abs/{rig}/live/capture"
+        self._keep(lambda: tokens.declare_subscriber(key, on_token, history=True))
+
+    def silence(self) -> None:
+        """Hears nothing any more."""
+        with self._lock:
+            declared, self._declared = self._declared, []
+        for one in declared:
+            one.undeclare()
+
+    def close(self) -> None:
+        """Ends the session; may be called again. Has to happen before the interpreter ends: zenoh hangs there else."""
+        self.silence()
+        if not self._session.is_closed():
+            self._session.close()
+
+    def _keep(self, declare: Callable[[], Any]) -> None:
+        declared = _outside_daemons(declare)
+        with self._lock:
+            self._declared.append(declared)
+
+
+def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
+    """Connects to a router.
+
+    Raises:
+        DeviceError: nothing answers there in time.
+    """
+    settings = {
+        "mode": "client",
+        "connect": {
+            "endpoints": [address.endpoint],
+            "timeout_ms": round(timeout_s * 1000),
+            "exit_on_failure": True,
+        },
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
+        "transport": {"link": {"tx": {"lease": LEASE_MS}}, "shared_memory": {"enabled": address.shared_memory}},
+    }
+    zenoh.init_log_from_env_or("error")
+    try:
+        return Link(zenoh.open(zenoh.Config.from_json5(json.dumps(settings))))
+    except zenoh.ZError as error:
+        raise DeviceError(
+            f"nothing answers at {address.endpoint} within {timeout_s:g} s; is `abs-service run` running there, or "
+            "`abs-service capture` with --listen?"
+        ) from error
+
+
+def _outside_daemons(declare: Callable[[], T]) -> T:
+    """Declares a callback from a thread that is no daemon: zenoh's thread would be one, too, and abort at the end."""
+    declared: Future[T] = Future()
+
+    def run() -> None:
+        try:
+            declared.set_result(declare())
+        except Exception as error:
+            declared.set_exception(error)
+
+    threading.Thread(target=run, name="declare", daemon=False).start()
+    return declared.result()
