@@ -3,4 +3,5 @@
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
     "target": "a board to print, true to scale, and its description",
+    "convert": "calibrations from and to the formats of other programs",
 }
