@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.camera import Camera, CameraError
+from calib.fisheye import KannalaBrandt
 from calib.lens import Lens, LensError
 from drivers.o3r.chunks import ChunkError
 
@@ -16,7 +17,9 @@ from drivers.o3r.chunks import ChunkError
 _INFO = struct.Struct("<I2f3f6f I32f I32f")
 #: What versions 3 and 4 add: times of three exposures [ns], their durations [s], temperature of the light source [°C].
 _MORE = struct.Struct("<3Q3ff")
-_BROWN_CONRADY = 1
+#: Lens models from directions to pixels: Bouguet's, of heads with a narrow view, and the fisheye's. The latter's fifth
+#: number is the angle beyond which its polynomial stands still, outside of the image.
+_BROWN_CONRADY, _KANNALA_BRANDT = 1, 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +48,16 @@ class TofInfo:
         Raises:
             ChunkError: a lens model that is not understood.
         """
-        fx, fy, mx, my, skew, k1, k2, p1, p2, k3 = self.parameters[:10]
-        if self.model != _BROWN_CONRADY or skew != 0:
+        fx, fy, mx, my, skew = self.parameters[:5]
+        if self.model not in {_BROWN_CONRADY, _KANNALA_BRANDT} or skew != 0:
             raise ChunkError(
-                f"TOF_INFO: lens model {self.model} with skew {skew:g} is not supported, only model {_BROWN_CONRADY} "
-                "(Bouguet, heads with a narrow view) without skew"
+                f"TOF_INFO: lens model {self.model} with skew {skew:g} is not supported, only "
+                f"{_BROWN_CONRADY} (Bouguet) and {_KANNALA_BRANDT} (fisheye) without skew"
             )
         try:
-            return Camera(width, height, fx, fy, mx - 0.5, my - 0.5, Lens(np.array([k1, k2, p1, p2, k3])))
+            distortion = np.array(self.parameters[5:10])
+            lens = Lens(distortion) if self.model == _BROWN_CONRADY else KannalaBrandt(distortion[:4])
+            return Camera(width, height, fx, fy, mx - 0.5, my - 0.5, lens)
         except (CameraError, LensError) as error:
             raise ChunkError(f"TOF_INFO: {error}") from error
 

@@ -34,12 +34,11 @@ class Inbox(Generic[Item]):
         """Says that nothing will come after what is in it."""
         with self._changed:
             self._end = reason
-            self._changed.notify()
 
     def take(self, timeout_s: float) -> Item | None:
-        """The oldest item, None if none comes for so long, or none will."""
+        """The oldest item, None if none comes for so long. What was said to be the end may have overtaken the last."""
         with self._changed:
-            self._changed.wait_for(lambda: self._items or self._end, timeout_s)
+            self._changed.wait_for(lambda: self._items, timeout_s)
             return self._items.popleft() if self._items else None
 
     def ended(self) -> str:

@@ -53,6 +53,16 @@ def test_the_camera_is_opencvs_with_pixels_counted_from_their_centres(tmp_path: 
     np.testing.assert_allclose(camera.project(point), corner.ravel() - 0.5, atol=1e-5)
 
 
+def test_the_lens_of_a_wide_view_is_opencvs_fisheye(tmp_path: Path) -> None:
+    lens = (9.0, 8.0, 4.5, 3.25, 0.0, 0.05, -0.02, 0.004, -0.001, 1.4)
+    chunks = (o3r_buffer.chunk(100, bytes(96), 8, 6, 2), o3r_buffer.chunk(420, o3r_buffer.tof_info(3, lens), 8, 6, 0))
+    camera = footage(tmp_path, o3r_buffer.message(*chunks)).cameras["depth"]
+    point = np.array([0.7, -0.4, 0.5])
+    matrix = np.array([[9.0, 0, 4.5], [0, 8, 3.25], [0, 0, 1]])
+    corner, _ = cv2.fisheye.projectPoints(point[None, None], np.zeros(3), np.zeros(3), matrix, np.array(lens[5:9]))
+    np.testing.assert_allclose(camera.project(point), corner.ravel() - 0.5, atol=1e-5)
+
+
 def test_messages_as_they_travel_and_older_ones_are_read(tmp_path: Path) -> None:
     old = o3r_buffer.message(
         o3r_buffer.chunk(100, bytes(96), 8, 6, 2, version=1),
@@ -76,9 +86,9 @@ def test_messages_as_they_travel_and_older_ones_are_read(tmp_path: Path) -> None
         (o3r_buffer.message(o3r_buffer.chunk(420, o3r_buffer.tof_info(), 8, 6, 0)), "no chunk DISTANCE"),
         (
             o3r_buffer.message(
-                o3r_buffer.chunk(100, bytes(96), 8, 6, 2), o3r_buffer.chunk(420, o3r_buffer.tof_info(3), 8, 6, 0)
+                o3r_buffer.chunk(100, bytes(96), 8, 6, 2), o3r_buffer.chunk(420, o3r_buffer.tof_info(2), 8, 6, 0)
             ),
-            "lens model 3 with skew 0 is not supported",
+            "lens model 2 with skew 0 is not supported",
         ),
         (
             o3r_buffer.message(o3r_buffer.chunk(100, bytes(96), 8, 6, 2), o3r_buffer.chunk(420, bytes(200), 8, 6, 0)),
