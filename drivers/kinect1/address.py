@@ -19,6 +19,12 @@ class Address:
     serial: str = ""
     streams: tuple[Stream, ...] = (Stream.DEPTH, Stream.COLOR)
 
+    @property
+    def uri(self) -> str:
+        """The address as text; what is as usual is left out."""
+        query = "" if self.streams == Address.streams else f"?streams={','.join(self.streams)}"
+        return f"kinect1://{self.serial}{query}"
+
 
 def parse(uri: str) -> Address:
     """Reads an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.

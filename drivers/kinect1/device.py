@@ -13,6 +13,7 @@ from drivers.kinect1.assembly import CAUSES
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
 from drivers.kinect1.channel import Channel, camera_of, describe
 from drivers.kinect1.commands import Commands
+from drivers.kinect1.losses import LossWatch
 from drivers.kinect1.port import Port
 
 #: The longest that the thread waits for packets before it looks whether it shall stop [s].
@@ -42,6 +43,7 @@ class Kinect1Device:
         sleep: Callable[[float], object],
     ) -> None:
         self._port = port
+        self._clock = clock
         self._camera = KinectCamera(Commands(port, clock, sleep))
         self._streams = streams
         self._plane = self._camera.reference_plane()
@@ -108,6 +110,8 @@ class Kinect1Device:
         channels = {stream.form.endpoint: Channel(stream, self._plane) for stream in self._streams}
         self._channels = channels
         counted = dict.fromkeys(CAUSES, 0)
+        losses = LossWatch(self._clock, self._delivery.warn)
+        delivered = 0
         with ExitStack() as ending:
             reader = ending.enter_context(self._port.reading(tuple(channels)))
             for stream in self._streams:
@@ -122,10 +126,12 @@ class Kinect1Device:
                         if stamped.stepped:
                             self._delivery.begin_epoch()
                         self._delivery.frame(stamped.frame)
+                        delivered += 1
                 for cause in CAUSES:
                     total = sum(channel.dropped[cause] for channel in channels.values())
                     self._delivery.drop(cause, total - counted[cause])
                     counted[cause] = total
+                losses.see(delivered, sum(counted.values()))
 
     def _end(self, stream: Stream) -> None:
         with suppress(DeviceError):  # it may be gone

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 
 from drivers.device import DeviceError
 from drivers.discovery import Found, choose
@@ -41,7 +42,9 @@ def open_camera(
     (device,) = [one.device for one in there_are if one.found is chosen]
     port = Port(device, backend, streaming, clock)
     try:
-        return Kinect1Device(chosen.info, address.streams, port, clock, time.sleep)
+        # The same streams when it is opened again after a loss, and the same camera.
+        info = replace(chosen.info, uri=replace(address, serial=chosen.info.serial).uri)
+        return Kinect1Device(info, address.streams, port, clock, time.sleep)
     except DeviceError:
         with suppress(DeviceError):
             port.close()

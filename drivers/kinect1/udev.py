@@ -7,20 +7,23 @@ CAMERAS = {0x02AE: "Kinect for Xbox 360", 0x02BF: "Kinect for Windows"}
 #: The audio parts beside the cameras, which know the serial number where the camera does not.
 AUDIO = frozenset({0x02AD, 0x02BB, 0x02BE, 0x02C3})
 
+#: The motor of the foot, which this driver leaves alone, but whoever may look may also turn the head.
+MOTOR = 0x02B0
+
 #: Where the rules belong.
 PATH = "/etc/udev/rules.d/60-abs-service.rules"
 
-#: Lets users at the machine open camera and audio part, and keeps the kernel's webcam driver away from the camera.
+#: Lets users at the machine open them.
 RULES = "\n".join(
     f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR:04x}", ATTR{{idProduct}}=="{product:04x}", MODE="0660", '
     'GROUP="plugdev", TAG+="uaccess"'
-    for product in sorted({*CAMERAS, *AUDIO})
+    for product in sorted({*CAMERAS, *AUDIO, MOTOR})
 )
 
 #: What to do when the camera must not be opened.
 PERMISSION_REMEDY = (
-    f"put this into {PATH} (`abs-service devices --udev` prints it), run `sudo udevadm control --reload` and plug the "
-    f"camera in again:\n{RULES}"
+    f"abs-service devices --udev | sudo tee {PATH}, then sudo udevadm control --reload, and plug the camera in again. "
+    f"The rules for it are:\n{RULES}"
 )
 
 #: What to do when the kernel's own driver does not let go of the camera.

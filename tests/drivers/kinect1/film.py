@@ -12,7 +12,7 @@ MICROFRAMES_HZ, RATE_HZ = 8000, 30
 
 
 class Film:
-    """Images shown one after the other, over and over, at the pace of the USB's microframes.
+    """Images shown one after the other, over and over until it is told otherwise, at the pace of the USB's microframes.
 
     Image i begins in microframe ⌈i · 8000 / 30⌉; one packet of it goes out in every microframe until it is complete.
 
@@ -28,6 +28,7 @@ class Film:
         self._packets = np.stack([_cut(form, image) for image in images])
         self._lengths = np.full(form.packets, HEADER_BYTES + form.payload, np.uint32)
         self._lengths[-1] = HEADER_BYTES + form.image_bytes - (form.packets - 1) * form.payload
+        self._image = lambda number: number % len(images)
         self.lose(lost)
 
     def lose(self, share: float) -> None:
@@ -43,14 +44,18 @@ class Film:
         packets = np.zeros((count, PACKET_BYTES), np.uint8)
         lengths = np.where(used, self._lengths[np.minimum(place, self.form.packets - 1)], 0).astype(np.uint32)
         number, place = number[used], place[used]
-        packets[used] = self._packets[number % len(self.images), place]
+        packets[used] = self._packets[self._image(number), place]
         packets[used, 5] = number * self.form.packets + place
         packets[used, 8:12] = (number * self.form.period_ticks).astype("<u4")[:, None].view(np.uint8)
         return packets, lengths
 
     def shown(self, number: int) -> bytes:
         """The image with a number."""
-        return self.images[number % len(self.images)]
+        return self.images[self._image(number)]
+
+    def play(self, start: int, repeat: int) -> None:
+        """From now on shows its images once, each so often, from image number `start` on; before, the first one."""
+        self._image = lambda number: np.clip((number - start) // repeat, 0, len(self.images) - 1)
 
     def is_whole(self, number: int) -> bool:
         """Whether every packet of the image arrives."""
@@ -63,6 +68,13 @@ Number = TypeVar("Number", int, np.ndarray)
 def begin(number: Number) -> Number:
     """The microframe in which an image begins."""
     return -(-number * MICROFRAMES_HZ // RATE_HZ)
+
+
+def images_of(first: int, end: int) -> range:
+    """The numbers of the images that are shown in microframes from the first to before the end."""
+    return (
+        range(first * RATE_HZ // MICROFRAMES_HZ, (end - 1) * RATE_HZ // MICROFRAMES_HZ + 1) if end > first else range(0)
+    )
 
 
 def _cut(form: PacketFormat, image: bytes) -> np.ndarray:

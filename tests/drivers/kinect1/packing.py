@@ -5,8 +5,8 @@ import numpy as np
 
 def pack(values: np.ndarray, bits: int) -> bytes:
     """Numbers as a stream of `bits` each, most significant first."""
-    places = np.arange(bits - 1, -1, -1)
-    return np.packbits((values.ravel()[:, None].astype(int) >> places) & 1).tobytes()
+    words = (values.ravel().astype(np.uint16) << (16 - bits)).astype(">u2")
+    return np.packbits(np.unpackbits(words.view(np.uint8).reshape(-1, 2), axis=1)[:, :bits]).tobytes()
 
 
 def unpack(packed: bytes, bits: int) -> np.ndarray:

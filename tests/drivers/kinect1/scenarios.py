@@ -65,7 +65,7 @@ def loss() -> None:
     with Server("--patient") as server:
         device = open_device("kinect1://", time.monotonic_ns)
         listener = Listener()
-        server.tell("lose 0.01")
+        server.tell("lose 0 0.01")
         device.start(listener)
         listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= 4)
         device.stop()
@@ -77,7 +77,7 @@ def loss() -> None:
         assert counters["bad_header"] == counters["wrong_size"] == counters["resynchronised"] == 0
         gauges = device.gauges
         assert gauges["depth.missing_packets"] > 0.005 * 242 * last["depth"]
-        server.tell("lose 0")
+        server.tell("lose 0 0")
         again = watch(device, each=8)
         compare(again.frames)
         device.close()

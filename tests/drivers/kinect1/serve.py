@@ -4,9 +4,10 @@ Says "ready"; then it takes a command a line and answers each:
 
   unplug N, plug N     the camera leaves and comes back
   driver N NAME        a kernel driver takes the camera; "driver N stubborn" one that does not let go
-  lose SHARE           of the packets from now on
+  lose N SHARE         of the packets of a camera from now on
+  play NS RATE         films once, from a moment of CLOCK_MONOTONIC on, with so many images per second
   cpu                  seconds of processor time that the server has used so far
-  late                 microframes in which no transfer was waiting for a packet, for all cameras
+  late N               images of a camera that came when no transfer was waiting for them
 """
 
 import argparse
@@ -21,11 +22,10 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.kinect1.packets import COLOR, DEPTH
-from tests.drivers.kinect1.emulator import EmulatedKinect, noise
-from tests.drivers.kinect1.film import Film
+from tests.drivers.kinect1.emulator import FORMS, EmulatedKinect, noise
+from tests.drivers.kinect1.film import RATE_HZ, Film
 from tests.drivers.kinect1.testbed import NAMES, NUMBERS, SERIALS
-from tests.drivers.kinect1.usbfs import Connection, Socketed
+from tests.drivers.kinect1.usbfs import BEGIN_S, Connection, Socketed
 
 
 class Bus:
@@ -60,11 +60,16 @@ class Bus:
         self.devices[index].driver = "gspca_kinect"
         self.devices[index].stubborn = driver == "stubborn"
 
-    def lose(self, share: float) -> None:
-        """Loses packets from now on."""
+    def lose(self, index: int, share: float) -> None:
+        """Loses packets of a camera from now on."""
+        for film in self.devices[index].kinect.films.values():
+            film.lose(share)
+
+    def play(self, begin_ns: int, rate_hz: int) -> None:
+        """Shows the films of all cameras once."""
         for device in self.devices:
             for film in device.kinect.films.values():
-                film.lose(share)
+                film.play(round((begin_ns * 1e-9 - BEGIN_S) * RATE_HZ), RATE_HZ // rate_hz)
 
     @staticmethod
     def _accept(listener: socket.socket, device: Socketed, patient: bool) -> None:
@@ -74,10 +79,12 @@ class Bus:
 
 
 def load(path: Path) -> EmulatedKinect:
-    """A camera that shows the film in a file, made by `tests.drivers.kinect1.studio`."""
-    with np.load(path) as film:
-        depth, color = ([image.tobytes() for image in film[name]] for name in ("depth", "color"))
-        return EmulatedKinect({"depth": Film(DEPTH, depth), "color": Film(COLOR, color)})
+    """A camera that shows the film in a file, made by `tests.drivers.kinect1.studio`: for now its first image."""
+    with np.load(path) as images:
+        films = {name: Film(FORMS[name], [image.tobytes() for image in images[name]]) for name in images}
+    for film in films.values():
+        film.play(sys.maxsize, 1)
+    return EmulatedKinect(films)
 
 
 def main() -> None:
@@ -99,8 +106,9 @@ def main() -> None:
         "unplug": lambda index: bus.plug(int(index), False),
         "plug": lambda index: bus.plug(int(index), True),
         "driver": lambda index, name: bus.hold(int(index), name),
-        "lose": lambda share: bus.lose(float(share)),
-        "late": lambda: str(sum(device.late for device in bus.devices)),
+        "lose": lambda index, share: bus.lose(int(index), float(share)),
+        "late": lambda index: str(len(bus.devices[int(index)].late)),
+        "play": lambda begin_ns, rate_hz: bus.play(int(begin_ns), int(rate_hz)),
         "cpu": lambda: f"{time.process_time():.3f}",
     }
     print("ready", flush=True)

@@ -227,6 +227,13 @@ def test_addresses() -> None:
     assert parse(f"kinect1://{SERIAL}?streams=ir,depth") == Address(SERIAL, (Stream.IR, Stream.DEPTH))
 
 
+def test_the_address_of_an_opened_camera_opens_the_same_streams_of_the_same_camera(fake: FakeDevice) -> None:
+    for streams in (BOTH, (Stream.IR,), (Stream.IR, Stream.DEPTH)):
+        device = opened(fake, streams)
+        assert parse(device.info.uri) == Address(SERIAL, streams)
+        device.close()
+
+
 def test_pyusb_is_imported_only_when_it_is_needed() -> None:
     code = "import sys, drivers.kinect1; sys.exit(any(name.split('.')[0] == 'usb' for name in sys.modules))"
     assert (

@@ -11,14 +11,14 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from tests.drivers.kinect1 import descriptors
 from tests.drivers.kinect1.emulator import EmulatedKinect
-from tests.drivers.kinect1.film import MICROFRAMES_HZ
+from tests.drivers.kinect1.film import MICROFRAMES_HZ, images_of
 
 # umockdev's commands.
 _DONE, _RUN, _READ_MEMORY, _WRITE_MEMORY, _READ, _WRITE = 3, 4, 5, 6, 7, 8
@@ -50,7 +50,7 @@ _CAPABLE = 0x17
 _HIGH_SPEED = 3
 
 #: The first microframe: when this process began.
-_BEGIN_S = time.monotonic()
+BEGIN_S = time.monotonic()
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Socketed:
         driver: the kernel driver that holds it, "" if none does; a `stubborn` one does not let go.
         plugged: whether it is attached.
         claimed: by how many programs.
-        late: microframes of pipes that were read in which nobody was there to take a packet.
+        late: images by pipe and number that cannot have been received whole, because nobody took a packet of them.
     """
 
     kinect: EmulatedKinect
@@ -72,7 +72,7 @@ class Socketed:
     stubborn: bool = False
     plugged: bool = True
     claimed: int = 0
-    late: int = 0
+    late: set[tuple[int, int]] = field(default_factory=set)
 
 
 @dataclass
@@ -174,11 +174,10 @@ class Connection:
             return 0
         if kind != _ISOCHRONOUS_URB or endpoint not in self._queues:
             return -errno.EINVAL
-        first = max(self._ends[endpoint], _now() + 1)
-        if self._patient and self._ends[endpoint]:
-            first = self._ends[endpoint]
-        elif self._ends[endpoint]:
-            self._device.late += first - self._ends[endpoint]
+        end = self._ends[endpoint]
+        first = end if self._patient and end else max(end, _now() + 1)
+        if end:
+            self._device.late |= {(endpoint, number) for number in images_of(end, first)}
         self._queues[endpoint].append(_Urb(address, buffer, first, count))
         self._ends[endpoint] = first + count
         return 0
@@ -261,4 +260,4 @@ class Connection:
 
 def _now() -> int:
     """The microframe under way."""
-    return int((time.monotonic() - _BEGIN_S) * MICROFRAMES_HZ)
+    return int((time.monotonic() - BEGIN_S) * MICROFRAMES_HZ)

@@ -1,0 +1,50 @@
+"""Films for emulated cameras of the simulated world: what `drivers.simulated` sees, in a Kinect's raw numbers."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.pose import Pose
+from drivers.kinect1.reference_plane import NO_RETURN, ReferencePlane
+from drivers.simulated.bayer import Bayer
+from drivers.simulated.color import Picture
+from drivers.simulated.exposure import Exposure
+from drivers.simulated.scene import Scene
+from drivers.simulated.structured_light import StructuredLight, StructuredLightNoise
+from tests.drivers.kinect1.packing import pack
+
+PLANE = ReferencePlane()
+
+
+def shoot(path: Path, scene: Scene, T_rs: Pose, seconds: float, rate_hz: float) -> None:
+    """Writes what a Kinect sees of a scene from its beginning on.
+
+    Args:
+        path: of the film.
+        scene: what it sees.
+        T_rs: pose of its depth camera in the rig.
+        seconds: length of the film [s].
+        rate_hz: images per second.
+    """
+    # The disparity is made whole by the raw numbers, so the simulated head must not do it as well.
+    noise = StructuredLightNoise(step=1e-6)
+    depth_camera, color_camera = replace(PLANE.depth_camera(), T_rs=T_rs), PLANE.color_camera()
+    depth = StructuredLight("depth", depth_camera, scene, rate_hz, noise)
+    color = Bayer("color", Picture(replace(color_camera, T_rs=T_rs @ color_camera.T_rs), scene), rate_hz)
+    generator = np.random.default_rng(1)
+    images: dict[str, list[NDArray[np.uint8]]] = {"depth": [], "color": []}
+    for number in range(round(seconds * rate_hz)):
+        exposure = Exposure(number, scene.at(number / rate_hz), generator, 0)
+        (frame,), (mosaic,) = depth.expose(exposure), color.expose(exposure)
+        images["depth"].append(np.frombuffer(pack(raw(frame.si()), 11), np.uint8))
+        images["color"].append(np.frombuffer(mosaic.data.tobytes(), np.uint8))
+    np.savez(path, allow_pickle=False, **{name: np.stack(shown) for name, shown in images.items()})
+
+
+def raw(z: NDArray[np.floating]) -> NDArray[np.int64]:
+    """The raw value nearest to each distance along the optical axis [m]; NaN is no return."""
+    infinity = 4 * (PLANE.baseline / PLANE.pixel + 0.375) + 4 * PLANE.shift
+    values = np.rint(infinity - 1 / (np.where(np.isnan(z), 1.0, z) * PLANE.step))
+    return np.where(np.isnan(z), NO_RETURN, np.clip(values, 0, NO_RETURN)).astype(np.int64)

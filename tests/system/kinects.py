@@ -1,0 +1,81 @@
+"""A rig of two emulated Kinects and a simulated time-of-flight camera that look at the same simulated sheet.
+
+The emulated cameras show films, made beforehand, of the scene that the simulated device sees. Its scene begins with its
+first exposure; so whoever runs this listens for that on the bus and lets the films play from then on. The sheet moves
+slowly: the films have few images per second, and a machine that is late must not show another place.
+
+  umockdev-run … -- python -m tests.system.kinects FOLDER ENDPOINT      prints every estimate as `run` does
+"""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from calib import pose
+from drivers.simulated import address
+from tests.drivers.kinect1 import studio
+from tests.drivers.kinect1.testbed import SERIALS, Server
+from tests.system.running import START_S, Ear, wait_until
+
+SCENE = "simulated://sheet?seed=1&sensors=tof&speed=0.05"
+
+#: Length and rate of the films.
+FILM_S, FILM_HZ = 80.0, 2
+
+#: Estimates after which all is said.
+ESTIMATES = 40
+
+#: Where the Kinects are, on both sides of the time-of-flight camera, and what they are called.
+POSES = {name: pose.look_at((x, -0.05, 0.0), (0.0, 0.0, 1.0)) for name, x in (("left", -0.25), ("right", 0.25))}
+
+
+def write_rig(path: Path, endpoint: str) -> None:
+    """The rig's configuration."""
+    parts = [
+        f'version = 1\nname = "kinects"\n\n[bus]\nendpoint = "{endpoint}"\n',
+        f'[devices.sim]\nuri = "{SCENE}"\n\n[sensors.tof]\ndevice = "sim"\n',
+        '[sensors.tof.noise]\ntype = "gaussian_polynomial"\namplitudes = [400.0, 10000.0]',
+        "sigma = [[1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14], [5.0e-4, 0.0, 0.0, 0.0]]\n",
+    ]
+    for (name, T_rs), serial in zip(POSES.items(), SERIALS):
+        T_rc = T_rs @ studio.PLANE.color_camera().T_rs
+        parts += [
+            f'[devices.{name}]\nuri = "kinect1://{serial}"\n',
+            f'[sensors.{name}_depth]\ndevice = "{name}"\nhead = "depth"\ncamera = {{ T_rs = {T_rs.tolist()} }}',
+            'noise = { type = "structured_light", noise = 1.425e-3, step = 2.89e-3 }\n',
+            f'[sensors.{name}_color]\ndevice = "{name}"\nhead = "color"\ncamera = {{ T_rs = {T_rc.tolist()} }}',
+            'noise = { type = "bayer", sigma = 8.0 }\n',
+        ]
+    sensors = ["tof", *(f"{name}_{head}" for name in POSES for head in ("depth", "color"))]
+    parts += [
+        '[synchronisation]\nreference = "tof/depth"\ntolerance_ms = 25.0\n',
+        f"[trackers.sheet]\nsensors = {sensors}\n".replace("'", '"'),
+        '[trackers.sheet.model]\ntype = "nurbs"\ncontrol_points = [4, 4]\ndegree = 2\n',
+        "[record]\nenabled = false\n",
+    ]
+    path.write_text("\n".join(parts), encoding="utf-8")
+
+
+def main(folder: Path, endpoint: str) -> None:
+    """Makes the films, runs the rig, lets the films play and ends the rig when it has tracked for a while."""
+    scene = address.parse(SCENE).build().scene
+    films = [folder / f"{name}.npz" for name in POSES]
+    for film, T_rs in zip(films, POSES.values()):
+        studio.shoot(film, scene, T_rs, FILM_S, FILM_HZ)
+    rig = folder / "rig.toml"
+    write_rig(rig, endpoint)
+    with Server("--films", *map(str, films)) as server:
+        command = [sys.executable, "-m", "abs_service", "run", str(rig), "--json"]
+        with subprocess.Popen(command) as process, Ear(endpoint, rig="kinects") as ear:
+            wait_until(lambda: ear.frames("tof/depth/image"), START_S, "an image of the simulated camera")
+            first = ear.frames("tof/depth/image")[0]
+            server.tell(f"play {first.header.t_host_ns - round(first.seq * 1e9 / 30)} {FILM_HZ}")
+            wait_until(lambda: len(ear.states()) >= ESTIMATES, START_S, f"{ESTIMATES} estimates")
+            process.send_signal(signal.SIGTERM)
+            process.wait(20)
+        sys.exit(process.returncode)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2])
