@@ -33,6 +33,7 @@ class LiveShots:
         cameras: of every sensor, by its name in the rig.
         tolerance_ns: largest difference between the stamps of images that show one moment [ns].
         clock: CLOCK_MONOTONIC [ns].
+        is_over: whether to end now; asked again and again.
     """
 
     def __init__(
@@ -41,8 +42,10 @@ class LiveShots:
         cameras: Mapping[str, Camera],
         tolerance_ns: int,
         clock: Callable[[], int],
+        is_over: Callable[[], bool] = lambda: False,
     ) -> None:
         self._devices = devices
+        self._is_over = is_over
         self._clock = clock
         self._assembler = Assembler(cameras)
         self._inboxes = {name: _Inbox(wired.heads) for name, wired in devices.items()}
@@ -76,13 +79,13 @@ class LiveShots:
             wired.device.close()
 
     def __iter__(self) -> Iterator[Shot]:
-        """The newest shot whenever one is asked for, until a device comes to its end.
+        """The newest shot whenever one is asked for, until all is over or all devices have come to their end.
 
         Raises:
             ShotsError: a device failed, or nothing comes any more.
         """
         number, last, heard_ns = 0, None, self._clock()
-        while True:
+        while not self._is_over():
             ended = all(inbox.state == DeviceState.CLOSED for inbox in self._inboxes.values())
             self._check_devices()
             sets = self._new_sets()

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain, pairwise
 
 import cv2
 import numpy as np
@@ -19,6 +20,9 @@ USED = frozenset({*SOUGHT, Kind.DEPTH, Kind.DEVIATION})
 
 #: Images of the sensor's own light: where it is saturated, distances are wrong.
 _OWN_LIGHT = frozenset({Kind.AMPLITUDE, Kind.IR})
+
+#: What changed within this time moved; what changed in a longer time may have been moved and held still again [ns].
+_CLOSE_NS = 250_000_000
 
 _GREY_OF_BAYER = {
     "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
@@ -64,10 +68,12 @@ class Shot:
     Attributes:
         number: of the moment.
         looks: what each sensor saw, by sensor name; a sensor that saw nothing is missing.
+        frames: what it was made of, the frames before them included; empty if it was made of files.
     """
 
     number: int
     looks: Mapping[str, Look]
+    frames: tuple[Frame, ...] = ()
 
     @property
     def t_ns(self) -> int:
@@ -94,7 +100,10 @@ class Assembler:
         """
         sensors = dict.fromkeys(sensor for sensor, _ in frames.frames)
         looks = {sensor: self._look(sensor, frames, before) for sensor in sensors}
-        return Shot(number, looks)
+        both = {
+            (frame.key, frame.t_host_ns): frame for frames_ in (before, frames) for frame in frames_.frames.values()
+        }
+        return Shot(number, looks, tuple(both.values()))
 
     def _look(self, sensor: str, frames: FrameSet, before: FrameSet) -> Look:
         now, earlier = _by_kind(sensor, frames), _by_kind(sensor, before)
@@ -128,19 +137,30 @@ class Assembler:
 def thinned(sets: Iterable[FrameSet], assembler: Assembler, every_s: float) -> Iterator[Shot]:
     """Shots of sets of frames, at least `every_s` apart; the set before each tells what moved.
 
+    A set that has none shortly before it is left out if it has one shortly after it: that one will tell. A set on its
+    own is taken for still.
+
     Raises:
         ShotsError: as `Assembler.shot`.
     """
     last_ns: int | None = None
     before: FrameSet | None = None
     number = 0
-    for frames in sets:
-        # The first set has none before it and would pass for still.
-        if before is not None and (last_ns is None or frames.stamp_ns - last_ns >= every_s * 1e9):
+    waiting: Iterator[FrameSet | None] = chain(sets, [None])
+    for frames, after in pairwise(waiting):
+        if frames is None:
+            return
+        compared = before if before is not None and _is_close(before, frames) else frames
+        is_due = last_ns is None or frames.stamp_ns - last_ns >= every_s * 1e9
+        if is_due and (compared is not frames or not _is_close(frames, after)):
             last_ns = frames.stamp_ns
-            yield assembler.shot(number, frames, before)
+            yield assembler.shot(number, frames, compared)
             number += 1
         before = frames
+
+
+def _is_close(first: FrameSet | None, second: FrameSet | None) -> bool:
+    return first is not None and second is not None and second.stamp_ns - first.stamp_ns <= _CLOSE_NS
 
 
 def _by_kind(sensor: str, frames: FrameSet) -> dict[Kind, Frame]:

@@ -3,5 +3,6 @@
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
     "target": "a board to print, true to scale, and its description",
+    "capture": "show a board to the sensors: what they have seen, and what is missing",
     "convert": "calibrations from and to the formats of other programs",
 }

@@ -1,0 +1,163 @@
+"""Shows a board to the sensors of a rig, and keeps the views that a calibration needs.
+
+  abs-service calibrate capture rig.toml --target target.toml --out board.mcap
+  abs-service calibrate capture rig.toml --target target.toml --out board.mcap --limit-s 120 --json
+
+Hold the board still for a moment, change its pose, hold it still again. A map for each sensor shows where it has seen
+the board, and the lines below say what is missing. It ends when nothing is, or with Ctrl-C.
+
+A view is kept if the board holds still and shows something that the kept views do not. `left` and `right` are those of
+the sensor's image, and the board faces where its print does.
+
+Writes the recording OUT, from which the other commands calibrate, and a picture OUT-SENSOR.png of what each sensor has
+seen: where it is red, it has not seen the board. Exit code 0: enough; 1: ended before it was enough; 2: of no use.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import cv2
+from rich.console import Console
+
+from abs_service import config
+from abs_service.calibration import target_file
+from abs_service.calibration.collecting import Collector
+from abs_service.calibration.guide import Guide, LineGuide, LiveGuide, coverage_map
+from abs_service.calibration.live_shots import LiveShots, Wired
+from abs_service.calibration.report import Level
+from abs_service.calibration.seeing import see
+from abs_service.calibration.shot_recording import ShotFileError, ShotRecording
+from abs_service.calibration.shots import SOUGHT, Shot
+from abs_service.commands import participant
+from abs_service.stamps import Speaker, WallClock
+from calib.board.target import Target
+from calib.camera import Camera
+from drivers.opening import open_device
+
+
+class HeadError(Exception):
+    """A configuration that names a head which its device does not have."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service calibrate capture`."""
+    parser.add_argument("config", metavar="RIG", type=Path, help="TOML file of the rig")
+    parser.add_argument("--target", type=Path, required=True, metavar="FILE", help="description of the board")
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE.mcap", help="recording; must not exist")
+    parser.add_argument("--limit-s", type=float, default=float("inf"), metavar="S", help="longest time (no limit)")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Collects views until there are enough."""
+    rig = participant.load_config(arguments)
+    target = target_file.read(arguments.target)
+    stop = participant.stop_on_signals()
+    end_ns = time.monotonic_ns() + arguments.limit_s * 1e9
+    console = Console(stderr=True)
+    with opened(rig) as (devices, cameras):
+        speaker = Speaker(rig.name, WallClock())
+        shots = LiveShots(
+            devices,
+            cameras,
+            round(rig.synchronisation.tolerance_ms * 1e6),
+            time.monotonic_ns,
+            lambda: stop.is_set() or time.monotonic_ns() > end_ns,
+        )
+        collector = Collector(_sizes(devices))
+        recording = ShotRecording(arguments.out, speaker, cameras, config.to_toml(rig))
+        guide = LiveGuide(console) if console.is_terminal else LineGuide(console)
+        try:
+            with shots, guide:
+                _collect(target, shots, cameras, collector, recording, guide, arguments.out)
+        finally:
+            recording.finish()
+    return _conclude(collector, arguments)
+
+
+@contextmanager
+def opened(rig: config.ServiceConfig) -> Iterator[tuple[dict[str, Wired], dict[str, Camera]]]:
+    """The devices of a rig, opened, and the camera of every sensor; closes them afterwards.
+
+    Raises:
+        DeviceError: one cannot be opened.
+        HeadError: the configuration names a head that a device does not have.
+    """
+    devices: dict[str, Wired] = {}
+    cameras: dict[str, Camera] = {}
+    with ExitStack() as stack:
+        for name in rig.devices:
+            device = open_device(rig.devices[name].uri, time.monotonic_ns)
+            stack.callback(device.close)
+            devices[name] = Wired(device, rig.heads(name))
+            for head, sensor in rig.heads(name).items():
+                if head not in device.cameras:
+                    there_are = ", ".join(sorted(device.cameras))
+                    raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
+                cameras[sensor] = rig.sensors[sensor].camera.applied_to(device.cameras[head])
+        yield devices, cameras
+
+
+def _collect(
+    target: Target,
+    shots: LiveShots,
+    cameras: Mapping[str, Camera],
+    collector: Collector,
+    recording: ShotRecording,
+    guide: Guide,
+    out: Path,
+) -> None:
+    for shot in shots:
+        is_kept = collector.take(see(target, shot, cameras))
+        if is_kept:
+            recording.write(shot)
+            _picture(shot, collector, out)
+        guide.update(collector, is_kept)
+        if not collector.wishes:
+            return
+
+
+def _sizes(devices: Mapping[str, Wired]) -> dict[str, tuple[int, int]]:
+    """Width and height of the images in which corners are sought, by the names of the rig [px]."""
+    return {
+        wired.heads[stream.sensor]: (stream.width, stream.height)
+        for wired in devices.values()
+        for stream in wired.device.capabilities.streams
+        if stream.sensor in wired.heads and stream.kind in SOUGHT
+    }
+
+
+def _picture(shot: Shot, collector: Collector, out: Path) -> None:
+    for sensor, look in shot.looks.items():
+        if look.image.size:
+            views = [view for view in collector.views if view.sensor == sensor]
+            path = _picture_path(out, sensor)
+            if not cv2.imwrite(str(path), coverage_map(look.image, views)):
+                raise ShotFileError(f"{path}: cannot be written")
+
+
+def _picture_path(out: Path, sensor: str) -> Path:
+    return out.with_name(f"{out.stem}-{sensor}.png")
+
+
+def _conclude(collector: Collector, arguments: argparse.Namespace) -> int:
+    problem, wishes = collector.problem(), collector.wishes
+    level = Level.BAD if problem else Level.DOUBTFUL if wishes else Level.GOOD
+    views = {s: sum(view.sensor == s for view in collector.views) for s in collector.sizes}
+    if arguments.json:
+        missing = [{"sensor": wish.sensor, "text": wish.text} for wish in wishes]
+        found = {"verdict": str(level), "exit_code": int(level), "shots": collector.kept, "views": views}
+        print(json.dumps({**found, "problem": problem, "missing": missing, "recording": str(arguments.out)}))
+        return int(level)
+    counts = ", ".join(f"{number} of {sensor}" for sensor, number in views.items())
+    print(f"{arguments.out}: {collector.kept} shots; views: {counts}")
+    if problem:
+        print(f"No calibration can be made of this. {problem}", file=sys.stderr)
+    for wish in wishes:
+        print(f"missing: {wish.sensor}: {wish.text}", file=sys.stderr)
+    return int(level)
