@@ -17,7 +17,7 @@ from tests.calib.board_views import Head
 
 SEEDS = 50
 PLANE_SEEDS = 6
-SHOTS = 12
+SHOTS = 10
 INTRINSICS = 9
 
 #: Deviation of corners in the amplitudes of a coarse time-of-flight camera, which are noisy and blurred [px].
@@ -45,7 +45,7 @@ def solved(seed: int) -> tuple[Mapping[str, Head], Solution]:
     generator = np.random.default_rng(seed)
     heads = board_views.three_heads()
     heads["tof"] = replace(heads["tof"], depth_offset=0.012)
-    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=40)
+    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=30)
     sensors = {
         name: SensorTask(
             head.camera.width,

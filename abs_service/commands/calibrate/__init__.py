@@ -4,5 +4,7 @@
 COMMANDS = {
     "target": "a board to print, true to scale, and its description",
     "capture": "show a board to the sensors: what they have seen, and what is missing",
+    "intrinsics": "cameras one by one, from images of a board",
+    "rig": "a whole rig in one solve: cameras, poses, distances",
     "convert": "calibrations from and to the formats of other programs",
 }

@@ -1,0 +1,91 @@
+"""Calibrates a whole rig in one solve: cameras, where they stand to each other, and what depth sensors measure.
+
+  abs-service calibrate rig take.mcap --board board.toml --out lab.calibration.toml
+  abs-service calibrate rig take.mcap --board board.toml --keep tof --depth-terms tof=offset --out lab.calibration.toml
+  abs-service calibrate rig rig.toml --board board.toml --out lab.calibration.toml          live, 30 different views
+  abs-service calibrate rig --images left='l*.png' --images right='r*.png' --board board.toml --out p.toml
+
+Corners in colour, infrared and amplitude images and the distances that depth sensors measure on the board are explained
+together. Sensors named with --keep keep the intrinsics of the device or of --start. With --depth-terms an offset, a
+scale or both of a sensor's distances are found; with --free-running the offset of its clock, which needs a board that
+moves.
+Beside the calibration FILE its covariances are written, and a report as FILE.html and FILE.json.
+
+The exit code is 0 if the result can be trusted, 1 if it was found but must not be trusted yet, 2 if the images or
+options have to be changed first. What the verdicts mean: docs/calibration.md.
+"""
+
+import argparse
+from collections.abc import Iterable
+
+from abs_service.commands.calibrate import solving
+from abs_service.commands.calibrate.solving import Material, SolveOptionError
+from abs_service.problems import none_of
+from calib.solve.tasks import Task
+
+#: What `--depth-terms` may say.
+TERMS = {"offset": ("depth_offset",), "scale": ("depth_scale",), "both": ("depth_offset", "depth_scale")}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service calibrate rig`."""
+    solving.add_arguments(parser)
+    parser.add_argument("--keep", metavar="NAME", action="append", default=[], help="keep its intrinsics; repeatable")
+    parser.add_argument(
+        "--depth-terms", metavar="NAME=TERMS", action="append", default=[], help=f"{', '.join(TERMS)}; repeatable"
+    )
+    parser.add_argument(
+        "--free-running", metavar="NAME", action="append", default=[], help="its clock has an offset; repeatable"
+    )
+    parser.add_argument("--reference", metavar="NAME", help="sensor that stays where it is (default: a depth sensor)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Solves the rig."""
+    found = solving.material(arguments)
+    there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]
+    terms = solving.named(arguments.depth_terms, "--depth-terms")
+    for option, names in (
+        ("--keep", arguments.keep),
+        ("--free-running", arguments.free_running),
+        ("--depth-terms", terms),
+        ("--reference", [arguments.reference] if arguments.reference else []),
+    ):
+        _check_names(option, names, there)
+    for name, term in terms.items():
+        if term not in TERMS:
+            raise SolveOptionError(f"--depth-terms {name}={term}: {none_of(term, TERMS)}")
+    with_corners = {view.sensor for view in found.seen.corners}
+    sensors = {
+        name: solving.sensor_task(
+            name,
+            arguments,
+            found,
+            keeps=name in arguments.keep or name not in with_corners,
+            depth_terms=TERMS[terms[name]] if name in terms else (),
+            runs_free=name in arguments.free_running,
+        )
+        for name in there
+    }
+    reference = arguments.reference or _reference(found, there, arguments.free_running)
+    task = Task(sensors, found.seen.corners, found.seen.planes, reference)
+    return solving.finish(f"Calibration of {', '.join(there)}", task, arguments, found)
+
+
+def _views(found: Material) -> list:
+    return [*found.seen.corners, *found.seen.planes]
+
+
+def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:
+    for name in names:
+        if name not in there:
+            raise SolveOptionError(f"{option} {name}: no sensor that saw the board, {none_of(name, there)}")
+
+
+def _reference(found: Material, there: list[str], free_running: list[str]) -> str:
+    """The first depth sensor, as in the built-in rigs, or else the first sensor; one whose clock counts."""
+    measured = [view.sensor for view in found.seen.planes]
+    able = [name for name in there if name not in free_running]
+    if not able:
+        raise SolveOptionError("--free-running: at least one sensor has to keep the time")
+    return next((name for name in able if name in measured), able[0])

@@ -1,0 +1,209 @@
+"""What `calibrate intrinsics` and `calibrate rig` share: sources, options, and everything after the solve."""
+
+import argparse
+import itertools
+import json
+import math
+import re
+import sys
+import time
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from abs_service import config
+from abs_service.calibration import page, provenance, rig_file, seeing, solve_report, target_file
+from abs_service.calibration.live_shots import LiveShots, Wired
+from abs_service.calibration.rig_file import SensorCalibration
+from abs_service.calibration.seeing import Seen
+from abs_service.calibration.shot_sources import FolderShots, RecordingShots
+from abs_service.calibration.shots import Shot
+from abs_service.commands import calibrations
+from abs_service.exits import Exit
+from abs_service.problems import none_of
+from calib.board import coverage
+from calib.camera import Camera
+from calib.solve.calibrate import calibrate
+from calib.solve.lenses import KINDS, kind_of
+from calib.solve.tasks import SensorTask, Task
+from calib.solve.verdict import assess
+from calib.solve.weights import shared
+from drivers.opening import open_device
+from drivers.replay.recording import Recording
+
+
+class SolveOptionError(ValueError):
+    """Options that do not fit the images."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a calibration starts from.
+
+    Attributes:
+        seen: boards.
+        known: what was known of the sensors before, by name.
+        data: files that the images come from.
+    """
+
+    seen: Seen
+    known: Mapping[str, SensorCalibration]
+    data: tuple[Path, ...]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments that both commands have."""
+    parser.add_argument(
+        "source", metavar="SOURCE", nargs="?", type=Path, help="recording (.mcap), or rig (.toml): live"
+    )
+    parser.add_argument(
+        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
+    )
+    parser.add_argument("--board", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
+    parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")
+    parser.add_argument(
+        "--lens", metavar="NAME=KIND", action="append", default=[], help=f"kind of lens: {', '.join(KINDS)}"
+    )
+    parser.add_argument(
+        "--every", metavar="S", type=float, default=0.5, help="least time between shots of a recording (%(default)g)"
+    )
+    parser.add_argument(
+        "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
+    )
+    parser.add_argument(
+        "--distance", metavar="M", type=float, help="of what will be looked at (default: where the boards were)"
+    )
+    parser.add_argument(
+        "--needed", metavar="PX", type=float, default=1.0, help="how well projections have to be known (%(default)g)"
+    )
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def material(arguments: argparse.Namespace) -> Material:
+    """Looks for the board in all images, and tells the terminal how it goes.
+
+    Raises:
+        SolveOptionError: options that do not go together.
+        TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
+        TooFewViewsError, ViewsAlikeError: views of which no calibration can be made.
+    """
+    if arguments.out.exists():
+        raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
+    if (arguments.source is None) == (not arguments.images):
+        raise SolveOptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
+    target = target_file.read(arguments.board)
+    known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
+    with ExitStack() as stack:
+        shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
+        known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
+        live = arguments.source is not None and arguments.source.suffix == ".toml"
+        seen = Seen()
+        for shot in shots:
+            new = seeing.see(target, shot, cameras)
+            if live and not any(coverage.adds(view, seen.corners, new.sizes[view.sensor]) for view in new.corners):
+                continue
+            seen += new
+            say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
+            if live and len({view.shot for view in seen.corners}) >= arguments.shots:
+                break
+    coverage.check(view for view in seen.corners)
+    return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
+
+
+def _shots(
+    arguments: argparse.Namespace, cameras: Mapping[str, Camera], stack: ExitStack
+) -> tuple[Iterable[Shot], Mapping[str, Camera], tuple[Path, ...]]:
+    """Shots, cameras known, and files they come from."""
+    if arguments.images:
+        patterns = named(arguments.images, "--images")
+        folders = dict.fromkeys(Path(pattern).parent for pattern in patterns.values())
+        return FolderShots(patterns), cameras, tuple(folders)
+    if arguments.source.suffix != ".toml":
+        recording = Recording(arguments.source)
+        known = {**recording.cameras, **cameras}
+        return RecordingShots(recording, arguments.every, cameras=known), known, (arguments.source,)
+    rig = config.load(arguments.source)
+    devices = {
+        name: Wired(open_device(table.uri, time.monotonic_ns), rig.heads(name)) for name, table in rig.devices.items()
+    }
+    given = {
+        wired.heads[head]: rig.sensors[wired.heads[head]].camera.applied_to(camera)
+        for wired in devices.values()
+        for head, camera in wired.device.cameras.items()
+        if head in wired.heads
+    }
+    known = {**given, **cameras}
+    live = stack.enter_context(
+        LiveShots(devices, known, int(rig.synchronisation.tolerance_ms * 1e6), time.monotonic_ns)
+    )
+    return live, known, (arguments.source,)
+
+
+def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
+    """The task of one sensor, from its size, what is known of it and the options.
+
+    Raises:
+        SolveOptionError: intrinsics to keep that nobody knows, or no such kind of lens.
+    """
+    size = found.seen.sizes[name]
+    factory = (replace(found.known[name].camera),) if name in found.known else ()
+    lenses = named(arguments.lens, "--lens")
+    kind = lenses.get(name, kind_of(factory[0].lens).name if factory else "brown-conrady")
+    if kind not in KINDS:
+        raise SolveOptionError(f"--lens {name}={kind}: {none_of(kind, KINDS)}")
+    if factory and name in lenses and kind_of(factory[0].lens).make is not KINDS[kind].make and not keeps:
+        factory = ()  # of another family: nothing to start from
+    if keeps and not factory:
+        raise SolveOptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
+    return SensorTask(*size, KINDS[kind], factory, keeps, **terms)  # pyright: ignore[reportArgumentType]
+
+
+def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
+    """Solves, cross-validates, writes calibration and report, and says what to think of it."""
+    solution = calibrate(task, say)
+    distance = arguments.distance or _usual(solution.task.reference, solution)
+    assessment = assess(solution, distance, arguments.needed, say)
+    data = [path for path in (*found.data, arguments.board) if path.exists()]
+    origin = provenance.trace(sys.argv[1:], data)
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
+    made = solve_report.calibration(name, origin, solution, assessment.trusted, found.known)
+    notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.refused.items()]
+    result = solve_report.report(title, origin, solution, assessment, notes)
+    written = [*rig_file.write(made, arguments.out), *page.write(result, arguments.out)]
+    if arguments.json:
+        files = [str(path) for path in written]
+        print(json.dumps({"trusted": assessment.trusted, "verdict": assessment.verdict, "files": files}))
+    else:
+        for line in itertools.chain([assessment.verdict], assessment.reasons[1:]):
+            print(line)
+        print(f"wrote {', '.join(map(str, written))}")
+    return Exit.OK if assessment.trusted else Exit.FAILED
+
+
+def _usual(reference: str, solution) -> float:
+    """The distance in the middle of where the boards were, from the reference."""
+    from calib.solve.projection import reach  # noqa: PLC0415
+
+    return round(math.fsum(reach(solution, reference)) / 2, 2)
+
+
+def named(options: Iterable[str], option: str) -> dict[str, str]:
+    """`NAME=VALUE` options as a table.
+
+    Raises:
+        SolveOptionError: one is not of this form.
+    """
+    found = {}
+    for text in options:
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise SolveOptionError(f"{option} {text}: must be NAME=VALUE")
+        found[name] = value
+    return found
+
+
+def say(text: str) -> None:
+    """Tells the user how it goes."""
+    print(f"  {text}", file=sys.stderr)
