@@ -17,7 +17,8 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens `remote://HOST:PORT/RIG`; the rig may be left out where there is only one, and all of it on this host.
 
     Keys: `protocol`, tcp, tls, quic, udp or ws, tcp if not given; `shared_memory`, 0 or 1, 1 if not given: whether
-    images of a rig on this host travel through it; `learn`, time to see which streams come [s], 1 if not given.
+    images of a rig on this host travel through it; `learn`, time to see which streams come [s], 1 if not given;
+    `sensors`, which of the rig's are wanted, all if not given.
 
     Raises:
         AddressError: the address is not understood.
@@ -27,7 +28,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     link = open_link(address)
     try:
         rig = choose_rig(link, address)
-        return RemoteDevice(address.uri(rig), rig, link, survey(link, rig, address.learn_s, clock), clock)
+        return RemoteDevice(address.uri(rig), rig, link, survey(link, rig, address), clock)
     except BaseException:
         link.close()
         raise

@@ -21,6 +21,7 @@ class Address:
         protocol: one of `PROTOCOLS`.
         shared_memory: whether images may pass through shared memory on one host.
         learn_s: time to see which streams come [s].
+        sensors: names of those that are wanted, () for all that its configuration names.
     """
 
     host: str = "127.0.0.1"
@@ -29,6 +30,7 @@ class Address:
     protocol: str = "tcp"
     shared_memory: bool = True
     learn_s: float = 1.0
+    sensors: tuple[str, ...] = ()
 
     @property
     def endpoint(self) -> str:
@@ -41,6 +43,7 @@ class Address:
             f"protocol={self.protocol}" if self.protocol != Address.protocol else "",
             "" if self.shared_memory else "shared_memory=0",
             f"learn={self.learn_s:g}" if self.learn_s != Address.learn_s else "",
+            f"sensors={','.join(self.sensors)}" if self.sensors else "",
         ]
         query = "&".join(filter(None, keys))
         return f"remote://{_bracketed(self.host)}:{self.port}/{rig}" + (f"?{query}" if query else "")
@@ -94,10 +97,18 @@ def _seconds(text: str) -> float:
     return value
 
 
+def _names(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    if not all(names):
+        raise ValueError("names of sensors with commas in between")
+    return names
+
+
 _KEYS: Mapping[str, tuple[str, Callable[[str], object]]] = {
     "protocol": ("protocol", _protocol),
     "shared_memory": ("shared_memory", _switch),
     "learn": ("learn_s", _seconds),
+    "sensors": ("sensors", _names),
 }
 
 

@@ -1,10 +1,11 @@
 """What a remote rig delivers: its sensors say it, its streams show it."""
 
 import threading
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from abs.v1.sensor_model_pb2 import SensorModel
+from abs.v1.sensor_model_pb2 import Config, SensorModel
 from google.protobuf.message import DecodeError
 
 from calib.camera import Camera
@@ -20,6 +21,8 @@ from drivers.remote.link import Link
 from drivers.sensor_model import decode_camera
 
 IMAGES = "*/*/image"
+#: How long to wait for the first image [s].
+FIRST_S = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,33 +50,32 @@ def choose_rig(link: Link, address: Address) -> str:
     return choose(found, "remote", address.rig).info.serial
 
 
-def survey(link: Link, rig: str, learn_s: float, clock: Callable[[], int]) -> Survey:
+def survey(link: Link, rig: str, address: Address) -> Survey:
     """Asks for the sensors of a rig and watches for a while what they deliver.
 
     Args:
         link: to the rig.
         rig: its name.
-        learn_s: time to watch, from the first frame on [s].
-        clock: CLOCK_MONOTONIC [ns].
+        address: says which sensors are wanted and how long to watch.
 
     Raises:
-        DeviceError: no sensor is announced, a model is none, or nothing comes.
+        DeviceError: a sensor that is wanted is not announced or delivers nothing, as while its device is opened.
     """
-    models = _models(link, rig)
-    cameras = {model.sensor: _camera(rig, model) for model in models}
+    wanted = address.sensors or _configured(link, rig)
+    models = _models(link, rig, wanted)
+    cameras = {name: _camera(rig, model) for name, model in models.items()}
     seen = _Seen()
     link.listen(rig, IMAGES, seen.on_message)
     try:
-        if seen.first.wait(5 + learn_s):
-            threading.Event().wait(learn_s)
+        if seen.first.wait(FIRST_S):
+            threading.Event().wait(address.learn_s)
     finally:
         link.silence()
-    streams = tuple(
-        stream for key, frames in sorted(seen.frames.items()) if key[0] in cameras for stream in [_stream(frames)]
-    )
-    if not streams:
-        raise DeviceError(f'rig "{rig}" delivers no images; look at its own table or health')
-    clocks = {model.host_clock for model in models}
+    streams = tuple(_stream(seen.frames[key]) for key in sorted(seen.frames) if key[0] in cameras)
+    silent = sorted(set(wanted) - {stream.sensor for stream in streams})
+    if silent:
+        raise DeviceError(f'sensor {", ".join(silent)} of rig "{rig}" delivers nothing yet')
+    clocks = {model.host_clock for model in models.values()}
     return Survey(cameras, streams, same_clock=clocks == {host_clock()} and clocks != {""})
 
 
@@ -93,14 +95,30 @@ class _Seen:
         self.first.set()
 
 
-def _models(link: Link, rig: str) -> list[SensorModel]:
+def _configured(link: Link, rig: str) -> tuple[str, ...]:
+    """The sensors that the rig's configuration names: more may be announced one after the other."""
+    try:
+        configs = [tomllib.loads(Config.FromString(payload).toml) for payload in link.ask(rig, "config")]
+    except (DecodeError, tomllib.TOMLDecodeError) as error:
+        raise DeviceError(f'rig "{rig}" announces a configuration that is not understood: {error}') from error
+    sensors = tuple(sorted({name for config in configs for name in config.get("sensors", {})}))
+    if not sensors:
+        raise DeviceError(f'rig "{rig}" has announced no sensor yet')
+    return sensors
+
+
+def _models(link: Link, rig: str, wanted: Collection[str]) -> dict[str, SensorModel]:
+    """What is announced of the wanted sensors, by name."""
     try:
         models = [SensorModel.FromString(payload) for payload in link.ask(rig, "*/model")]
     except DecodeError as error:
         raise DeviceError(f'rig "{rig}" announces a sensor in a way that is not understood: {error}') from error
-    if not models:
-        raise DeviceError(f'rig "{rig}" has announced no sensor yet; its devices may still be opening')
-    return models
+    announced = {model.sensor: model for model in models}
+    missing = sorted(set(wanted) - set(announced))
+    if missing:
+        there_are = ", ".join(sorted(announced)) or "none"
+        raise DeviceError(f'rig "{rig}" has not announced {", ".join(missing)} yet; announced: {there_are}')
+    return {name: announced[name] for name in wanted}
 
 
 def _camera(rig: str, model: SensorModel) -> Camera:

@@ -9,7 +9,7 @@ from abs.v1.common_pb2 import Header
 from abs_service import keys
 from drivers import codec
 from drivers.capabilities import StreamInfo
-from drivers.device import AddressError, DeviceError, DeviceState
+from drivers.device import AddressError, DeviceError, DeviceState, FinalError
 from drivers.frame import Frame
 from drivers.opening import open_device
 from drivers.remote.address import Address, parse
@@ -134,8 +134,8 @@ def test_the_end_of_the_other_process_is_a_failure(heard) -> None:
 
 def test_an_address_names_host_rig_and_options() -> None:
     assert parse("remote://") == Address()
-    address = parse("remote://192.168.1.7:7448/bench?protocol=udp&learn=2&shared_memory=0")
-    assert address == Address("192.168.1.7", 7448, "bench", "udp", False, 2.0)
+    address = parse("remote://192.168.1.7:7448/bench?protocol=udp&learn=2&shared_memory=0&sensors=a,b")
+    assert address == Address("192.168.1.7", 7448, "bench", "udp", False, 2.0, ("a", "b"))
     assert address.endpoint == "udp/192.168.1.7:7448"
     assert parse(address.uri("bench")) == address
     assert parse("remote://[fe80::1]/a").endpoint == "tcp/[fe80::1]:7447"
@@ -149,6 +149,7 @@ def test_an_address_names_host_rig_and_options() -> None:
         ("remote://a/x?speed=1", "unknown key 'speed'; allowed are"),
         ("remote://a/x?learn=0", r"learn = '0' must be a number from 0\.1 to 60"),
         ("remote://a/x?protocol=http", "protocol = 'http' must be one of tcp, tls"),
+        ("remote://a/x?sensors=tof,", "sensors = 'tof,' must be names of sensors with commas in between"),
         ("remote://a/x?shared_memory=yes", "shared_memory = 'yes' must be 0 or 1"),
     ],
 )
@@ -171,6 +172,14 @@ def test_a_rig_that_is_not_there_is_named_with_those_that_are() -> None:
             open_device(f"remote://127.0.0.1:{rigs.port}/none", time.monotonic_ns)
         with pytest.raises(DeviceError, match="2 remote devices are attached; say which one"):
             open_device(f"remote://127.0.0.1:{rigs.port}", time.monotonic_ns)
+
+
+def test_sensors_that_are_not_there_yet_are_awaited_not_left_out() -> None:
+    with bench() as rigs:
+        uri = f"remote://127.0.0.1:{rigs.port}/bench?learn=0.3&sensors=tof,color"
+        with pytest.raises(DeviceError, match='rig "bench" has not announced color yet; announced: tof') as caught:
+            open_device(uri, time.monotonic_ns)
+        assert not isinstance(caught.value, FinalError)
 
 
 def test_processes_of_one_host_know_that_they_share_a_clock() -> None:

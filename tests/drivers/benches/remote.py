@@ -14,7 +14,7 @@ from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.envelope import MODEL
+from abs_service.envelope import CONFIG, MODEL
 from abs_service.stamps import Speaker, WallClock
 from drivers.device import Device
 from drivers.frame import Frame, Kind
@@ -37,6 +37,8 @@ class Peer:
         self.publisher = FramePublisher(self.bus, speaker, "sim")
         model = announcements.sensor_model(speaker.now(0), "tof", CAMERAS["tof"], {})
         self.bus.announce(keys.model("tof"), MODEL).put(model.SerializeToString())
+        toml = announcements.config(speaker.now(0), '[sensors.tof]\ndevice = "sim"\n')
+        self.bus.announce(keys.CONFIG, CONFIG).put(toml.SerializeToString())
         self.alive: Subscription = self.bus.show_alive("capture")
         self.frames = [frame for frame in SIMULATION.frames(0) if frame.sensor == "tof"]
         self.fault, self.begin, self.seq, self.epoch = Fault.NONE, 0, 0, 5_000
