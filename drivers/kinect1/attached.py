@@ -4,6 +4,7 @@ import errno
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import libusb_package
@@ -74,6 +75,7 @@ def _judge(device: Any, neighbours: list[Any]) -> Found:
         _try_to_claim(device)
     except usb.core.USBError as error:
         availability, reason, remedy = _obstacle(error)
+        serial = serial or _public_serial(device)
     if device.speed is not None and device.speed < _HIGH_SPEED and availability == Availability.READY:
         availability, reason = Availability.FAULTY, f"it is attached by {_LINKS.get(device.speed, 'a slow link')}"
         remedy = "it needs USB 2 with 480 Mbit/s: use another port or cable"
@@ -105,6 +107,16 @@ def _read_serial(device: Any) -> str:
         return ""
     text = usb.util.get_string(device, device.iSerialNumber, _ENGLISH) or ""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
+
+
+def _public_serial(device: Any) -> str:
+    """The serial number that the kernel tells everybody, also those who may not open the camera; "" without one."""
+    ports = ".".join(map(str, device.port_numbers or ()))
+    try:
+        serial = Path(f"/sys/bus/usb/devices/{device.bus}-{ports}/serial").read_text(encoding="utf-8").strip()
+    except (OSError, ValueError):
+        return ""
+    return serial if serial.isascii() and serial.isalnum() and serial.strip("0") else ""
 
 
 def _hub(device: Any) -> tuple[Any, ...]:

@@ -17,9 +17,6 @@ from drivers.kinect1.packets import TICK_HZ
 from drivers.kinect1.reference_plane import DEPTH_SCALE, ReferencePlane
 from drivers.kinect1.transfer import Transfer
 
-#: The device's counter; both streams are stamped by it.
-CLOCK = ClockInfo("kinect1", TICK_HZ, bits=32)
-
 _STREAMS = {
     Stream.DEPTH: ("depth", "depth", Kind.DEPTH, "16UC1"),
     Stream.COLOR: ("color", "bayer", Kind.BAYER, "bayer_grbg8"),
@@ -27,9 +24,10 @@ _STREAMS = {
 }
 
 
-def describe(stream: Stream) -> StreamInfo:
-    """What a stream is to the service."""
-    return StreamInfo(*_STREAMS[stream], stream.form.width, stream.form.height, stream.form.rate_hz, CLOCK)
+def describe(stream: Stream, serial: str) -> StreamInfo:
+    """What a stream is to the service; all of a camera are stamped by its one counter."""
+    clock = ClockInfo(f"kinect1 {serial}", TICK_HZ, bits=32)
+    return StreamInfo(*_STREAMS[stream], stream.form.width, stream.form.height, stream.form.rate_hz, clock)
 
 
 def camera_of(stream: Stream, plane: ReferencePlane) -> Camera:
@@ -53,16 +51,17 @@ class Channel:
 
     Args:
         stream: which.
-        plane: the device's calibration.
+        serial: of the camera.
+        plane: its calibration.
     """
 
-    def __init__(self, stream: Stream, plane: ReferencePlane) -> None:
-        self.info = describe(stream)
+    def __init__(self, stream: Stream, serial: str, plane: ReferencePlane) -> None:
+        self.info = describe(stream, serial)
         self._stream = stream
         self._table = plane.table()
         self._calib_id = camera_of(stream, plane).calib_id
         self._assembler = Assembler(stream.form)
-        self._clock = DeviceClock(CLOCK)
+        self._clock = DeviceClock(self.info.clock)
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -99,7 +98,7 @@ class Channel:
                     invalid=0 if is_depth else None,
                     t_device_ticks=image.ticks,
                     tick_hz=TICK_HZ,
-                    clock_domain=CLOCK.domain,
+                    clock_domain=self.info.clock.domain,
                     t_sigma_ns=stamp.t_sigma_ns,
                     t_reference=Reference.END,
                     calib_id=self._calib_id,

@@ -49,9 +49,12 @@ class Kinect1Device:
         self._plane = self._camera.reference_plane()
         self.info = info
         self.controls = _controls(self._camera, streams)
-        self.capabilities = Capabilities(tuple(map(describe, streams)), self.controls.infos)
+        self.capabilities = Capabilities(
+            tuple(describe(stream, info.serial) for stream in streams), self.controls.infos
+        )
         self.cameras: Mapping[str, Camera] = {
-            describe(stream).sensor: camera_of(stream, self._plane) for stream in streams
+            described.sensor: camera_of(stream, self._plane)
+            for stream, described in zip(streams, self.capabilities.streams)
         }
         self._delivery = Delivery(self.capabilities.streams, CAUSES)
         self._channels: Mapping[int, Channel] = {}
@@ -107,7 +110,7 @@ class Kinect1Device:
             raise
 
     def _stream(self, stop: threading.Event) -> None:
-        channels = {stream.form.endpoint: Channel(stream, self._plane) for stream in self._streams}
+        channels = {stream.form.endpoint: Channel(stream, self.info.serial, self._plane) for stream in self._streams}
         self._channels = channels
         counted = dict.fromkeys(CAUSES, 0)
         losses = LossWatch(self._clock, self._delivery.warn)

@@ -21,7 +21,7 @@ from tests.system.running import START_S, Ear, wait_until
 SCENE = "simulated://sheet?seed=1&sensors=tof&speed=0.05"
 
 #: Length and rate of the films.
-FILM_S, FILM_HZ = 80.0, 2
+FILM_S, FILM_HZ = 60.0, 2
 
 #: Estimates after which all is said.
 ESTIMATES = 40

@@ -119,6 +119,7 @@ def permission() -> None:
     with Server("--patient") as server, nobody(server.root):
         (found,) = discover(1.0)
         assert found.availability == Availability.NO_PERMISSION, found
+        assert found.info.serial == SERIALS[0]
         assert "/etc/udev/rules.d/60-abs-service.rules" in found.remedy
         with pytest.raises(DeviceError, match=re.escape('ATTR{idProduct}=="02ae"')):
             open_device("kinect1://", time.monotonic_ns)
