@@ -27,6 +27,7 @@ def make(dai: Any, device: Any, outputs: Outputs, address: Address) -> Controls:
         lights = {"laser_power": device.setIrLaserDotProjectorIntensity, "flood_power": device.setIrFloodLightIntensity}
         for (name, write), first in zip(lights.items(), (address.dots, address.flood)):
             controls.append(_light(name, write, first))
+    controls.append(_sync(dai, device, address.sync))
     return Controls(controls)
 
 
@@ -80,6 +81,23 @@ def _modulation(dai: Any, queue: Any, first: str) -> Control:
 
     info = ControlInfo("modulation", ControlKind.CHOICE, choices=("low", "mid", "high"))
     return Control(info, lambda: state["range"], write)
+
+
+def _sync(dai: Any, device: Any, first: str) -> Control:
+    """The part among devices that trigger each other; a device alone that detects it by itself runs free."""
+    state = {"role": first}
+    roles = dai.ExternalFrameSyncRole
+    numbers = {"free": roles.AUTO_DETECT, "master": roles.MASTER, "slave": roles.SLAVE}
+
+    def write(value: Value) -> None:
+        if value != state["role"]:
+            done, reason = device.setExternalFrameSyncRole(numbers[str(value)])
+            if not done:
+                raise DeviceError(f"sync_role = {value}: {reason}")
+            state["role"] = str(value)
+
+    info = ControlInfo("sync_role", ControlKind.CHOICE, choices=tuple(numbers))
+    return Control(info, lambda: state["role"], write)
 
 
 def _light(name: str, send: Any, first: float) -> Control:

@@ -113,6 +113,22 @@ def test_what_is_no_such_recording_is_named(tmp_path: Path) -> None:
             AzureRecording(tmp_path / name)
 
 
+def test_a_damaged_recording_is_read_or_refused(recording: Path, tmp_path: Path) -> None:
+    content, rng = recording.read_bytes(), np.random.default_rng(11)
+    damaged, refused = tmp_path / "damaged.mkv", 0
+    for k in range(40):
+        changed = bytearray(content[: int(rng.integers(2000, len(content))) if k % 2 else None])
+        # Where the container describes its tracks, and anywhere.
+        for position in (*rng.integers(min(9000, len(changed)), size=3), *rng.integers(len(changed), size=3)):
+            changed[position] = int(rng.integers(256))
+        damaged.write_bytes(changed)
+        try:
+            list(AzureRecording(damaged).frames())
+        except FootageError:
+            refused += 1
+    assert refused > 0
+
+
 @pytest.mark.parametrize(
     ("content", "modes", "complaint"),
     [

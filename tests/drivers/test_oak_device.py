@@ -278,6 +278,19 @@ def test_the_range_can_be_changed_while_it_runs() -> None:
     assert controls.get("modulation") == "high"
 
 
+def test_a_sync_role_is_taken_by_the_device_or_not_at_all() -> None:
+    device, (pipeline, _) = mock_device("RVC2", tof=True), mock_pipeline()
+    address = parse("oak://")
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    device.setExternalFrameSyncRole.return_value = (True, "")
+    controls.set("sync_role", "slave")
+    device.setExternalFrameSyncRole.assert_called_once_with(dai.ExternalFrameSyncRole.SLAVE)
+    device.setExternalFrameSyncRole.return_value = (False, "no cable")
+    with pytest.raises(DeviceError, match="sync_role = master: no cable"):
+        controls.set("sync_role", "master")
+    assert controls.get("sync_role") == "slave"
+
+
 @pytest.mark.parametrize(
     ("status", "state", "availability"),
     [

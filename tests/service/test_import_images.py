@@ -9,8 +9,9 @@ import pytest
 
 from abs_service import cli
 from abs_service.exits import Exit
-from drivers.frame import Frame, Geometry
+from drivers.frame import Frame, Geometry, Kind
 from drivers.replay import Recording
+from tests.drivers import o3r_buffer
 
 CAMERA = """\
 [depth]
@@ -103,6 +104,21 @@ def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
     assert depth.si()[0, 0] == 1.0
     assert depth.t_host_ns == 1_305_031_102_500_000_000
     assert Recording(tmp_path / "out.mcap").cameras["depth"].fx == 525
+
+
+def test_a_recording_of_another_program_brings_its_calibration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "o3r.data").write_bytes(o3r_buffer.exposure(3) + o3r_buffer.exposure(4))
+    arguments = ["import", str(tmp_path / "o3r.data"), "--layout", "o3r", "--out", str(tmp_path / "out.mcap")]
+    assert cli.main([*arguments, "--camera", "camera.toml"]) == Exit.USER
+    assert "--camera: a recording with layout o3r needs none" in capsys.readouterr().err
+    assert cli.main(arguments) == Exit.OK
+    assert "2 depth, 2 depth/deviation, 2 depth/amplitude, 2 depth/confidence images" in capsys.readouterr().out
+    recording = Recording(tmp_path / "out.mcap")
+    assert recording.cameras["depth"].fx == o3r_buffer.LENS[0]
+    deviations = [frame for frame in frames_of(tmp_path / "out.mcap") if frame.kind == Kind.DEVIATION]
+    assert [frame.unit for frame in deviations] == ["m", "m"]
 
 
 @pytest.mark.parametrize(
