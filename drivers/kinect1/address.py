@@ -32,7 +32,10 @@ def parse(uri: str) -> Address:
     Raises:
         AddressError: an unknown key, or a value that is not allowed; says what is.
     """
-    parts = urlsplit(uri)
+    try:
+        parts = urlsplit(uri)
+    except ValueError as error:
+        raise AddressError(f"{uri}: {error}") from error
     given = parse_qsl(parts.query, keep_blank_values=True)
     if parts.path not in {"", "/"}:
         raise AddressError(f"{uri}: nothing may follow the serial number but ?streams=…, not {parts.path!r}")

@@ -105,7 +105,10 @@ def _serial(device: Any, neighbours: list[Any]) -> str:
 def _read_serial(device: Any) -> str:
     if device.iSerialNumber == 0:
         return ""
-    text = usb.util.get_string(device, device.iSerialNumber, _ENGLISH) or ""
+    try:
+        text = usb.util.get_string(device, device.iSerialNumber, _ENGLISH) or ""
+    except (ValueError, IndexError):  # no text at all
+        return ""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 

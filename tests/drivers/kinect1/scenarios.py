@@ -19,7 +19,7 @@ from drivers.discovery import Availability
 from drivers.frame import Frame
 from drivers.kinect1 import discover, open_device, unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.conformance import resources
+from tests.drivers.conformance import eventually, resources
 from tests.drivers.kinect1.emulator import noise
 from tests.drivers.kinect1.listener import Listener
 from tests.drivers.kinect1.testbed import SERIALS, Server
@@ -81,6 +81,20 @@ def loss() -> None:
         again = watch(device, each=8)
         compare(again.frames)
         device.close()
+
+
+def disturbance() -> None:
+    """Packets that the host reports as damaged are not used, whatever they hold: their images are dropped."""
+    with Server("--patient") as server:
+        device = open_device("kinect1://?streams=color", time.monotonic_ns)
+        listener = Listener()
+        device.start(listener)
+        listener.wait(lambda: len(listener.frames) >= 3)
+        server.tell("disturb 0")
+        assert eventually(lambda: device.counters["lost_packets"] >= 20)
+        device.close()
+        compare(listener.frames)
+        assert device.gauges["bayer.missing_packets"] >= 20
 
 
 def unplugging() -> None:
@@ -193,7 +207,8 @@ def nobody(root: Path):
 
 
 STORIES = {
-    story.__name__: story for story in (streams, infrared, loss, unplugging, kernel_driver, permission, in_use, two)
+    story.__name__: story
+    for story in (streams, infrared, loss, disturbance, unplugging, kernel_driver, permission, in_use, two)
 }
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ Says "ready"; then it takes a command a line and answers each:
 
   unplug N, plug N     the camera leaves and comes back
   driver N NAME        a kernel driver takes the camera; "driver N stubborn" one that does not let go
+  disturb N            the host reports errors of some of the packets of a camera from now on
   lose N SHARE         of the packets of a camera from now on
   play NS RATE         films once, from a moment of CLOCK_MONOTONIC on, with so many images per second
   cpu                  seconds of processor time that the server has used so far
@@ -106,6 +107,7 @@ def main() -> None:
         "unplug": lambda index: bus.plug(int(index), False),
         "plug": lambda index: bus.plug(int(index), True),
         "driver": lambda index, name: bus.hold(int(index), name),
+        "disturb": lambda index: setattr(bus.devices[int(index)], "disturbed", True),
         "lose": lambda index, share: bus.lose(int(index), float(share)),
         "late": lambda index: str(len(bus.devices[int(index)].late)),
         "play": lambda begin_ns, rate_hz: bus.play(int(begin_ns), int(rate_hz)),

@@ -6,9 +6,12 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from drivers.device import AddressError, ControlError, DeviceError, DeviceState
 from drivers.discovery import Availability
@@ -19,6 +22,7 @@ from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
+from tests.drivers.kinect1 import descriptors
 from tests.drivers.kinect1.emulator import EmulatedKinect, noise
 from tests.drivers.kinect1.fake_usb import FakeBackend, FakeDevice, FakeReader
 from tests.drivers.kinect1.listener import Listener
@@ -220,6 +224,22 @@ def test_two_cameras_are_told_apart_by_their_numbers(fake: FakeDevice) -> None:
 def test_an_address_that_is_none_says_what_is_allowed(uri: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         parse(uri)
+
+
+@given(st.text("abdehlmoprst:/?&=,%[]@0\n é", max_size=30))
+def test_whatever_follows_the_scheme_is_an_address_or_an_error_of_the_driver(rest: str) -> None:
+    try:
+        address = parse(f"kinect1://{rest}")
+    except AddressError:
+        return
+    assert address.streams
+
+
+@given(st.binary(max_size=40))
+def test_a_camera_that_tells_a_garbled_number_is_listed_all_the_same(garbled: bytes) -> None:
+    with mock.patch.object(descriptors, "string", return_value=garbled):
+        (found,) = find(lambda: FakeBackend([FakeDevice(EmulatedKinect({}), "")]))
+    assert found.info.serial.isalnum() or found.info.serial == ""
 
 
 def test_addresses() -> None:

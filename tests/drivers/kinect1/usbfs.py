@@ -62,6 +62,7 @@ class Socketed:
         serial: its serial number.
         driver: the kernel driver that holds it, "" if none does; a `stubborn` one does not let go.
         plugged: whether it is attached.
+        disturbed: whether one packet of each transfer comes with an error of the host, its bytes all there.
         claimed: by how many programs.
         late: images by pipe and number that cannot have been received whole, because nobody took a packet of them.
     """
@@ -71,6 +72,7 @@ class Socketed:
     driver: str = ""
     stubborn: bool = False
     plugged: bool = True
+    disturbed: bool = False
     claimed: int = 0
     late: set[tuple[int, int]] = field(default_factory=set)
 
@@ -222,6 +224,8 @@ class Connection:
         packets, lengths = self._device.kinect.microframes(endpoint, urb.first, urb.count)
         results = np.zeros((urb.count, 3), "<u4")
         results[:, 0], results[:, 1] = packets.shape[1], lengths
+        if self._device.disturbed:
+            results[urb.first * 7 % 64 :: 64, 2] = 2**32 - errno.EPROTO
         self._write(urb.buffer, packets.tobytes())
         self._write(urb.address + _PACKETS, results.tobytes())
         self._finish(urb.address, 0, packets.size)
