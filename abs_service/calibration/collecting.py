@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from abs_service.calibration.seeing import Seen
 from calib.board import coverage
 from calib.board.coverage import Wish
+from calib.board.mirrored import MirroredSensorError
 from calib.board.refusal import MovedError
 from calib.views import CornerView
 
@@ -53,6 +54,6 @@ class Collector:
         missing = [sensor for sensor in self.sizes if not any(view.sensor == sensor for view in self.views)]
         try:
             coverage.check(self.views)
-        except (coverage.TooFewViewsError, coverage.ViewsAlikeError) as error:
+        except (coverage.TooFewViewsError, coverage.ViewsAlikeError, MirroredSensorError) as error:
             return str(error)
         return f"{missing[0]} has not seen the board" if missing else ""

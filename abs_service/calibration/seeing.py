@@ -85,9 +85,7 @@ def _find(target: Target, look: Look) -> Detection:
     if look.before is not look.image and look.before.shape == look.image.shape:
         change = stillness.changed(grey(look.before), grey(look.image), found.pixels)
         if change > stillness.LARGEST_CHANGE:
-            raise refusal.MovedError(
-                f"the board moved: {change:.0%} of it changed since the image before. Hold it still for a moment"
-            )
+            raise refusal.MovedError("the board moved since the image before. Hold it still for a moment")
     return found
 
 

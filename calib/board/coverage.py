@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board import mirrored
 from calib.board.stance import Stance, differs, extent, stance
 from calib.views import CornerView
 
@@ -51,8 +52,9 @@ def check(views: Iterable[CornerView]) -> None:
     """Refuses a set of views of which no calibration can be made.
 
     Raises:
-        TooFewViewsError, ViewsAlikeError: names the sensor and what to do.
+        TooFewViewsError, ViewsAlikeError, MirroredSensorError: names the sensor and what to do.
     """
+    views = list(views)
     for sensor, seen in by_sensor(views).items():
         if len(seen) < LEAST_VIEWS:
             raise TooFewViewsError(
@@ -65,6 +67,7 @@ def check(views: Iterable[CornerView]) -> None:
                 f"{sensor}: all {len(seen)} views show the board in nearly the same pose, and so are as good as one. "
                 "Tilt it to all four sides by 20° to 40°, hold it near and far, and into the corners of the image"
             )
+    mirrored.check(views)
 
 
 def wishes(views: Sequence[CornerView], sizes: Mapping[str, tuple[int, int]]) -> list[Wish]:

@@ -1,13 +1,18 @@
 """Sets of views: what is refused, what is missing in words, and what a further view adds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calib import pose
 from calib.board import coverage
+from calib.board.mirrored import MirroredSensorError
 from calib.board.stance import stance
 from calib.board.target import Chessboard
 from calib.views import CornerView
+from drivers.simulated.address import parse
+from drivers.simulated.printed import TARGETS, board_pose
 from tests.calib.boards import VGA, centered
 
 BOARD = Chessboard(9, 6, 0.03)
@@ -89,3 +94,38 @@ def test_a_stance_tells_where_the_print_faces() -> None:
     assert left.tilt[0] == pytest.approx(-0.5, abs=0.1)
     assert left.tilt[1] == pytest.approx(0.0, abs=0.02)
     assert stance(view((0, 0, 0.3)), (640, 480)).roll == pytest.approx(0.3, abs=0.01)
+
+
+def rolled(sensor: str, mirror: bool, roll: float = 0.5) -> list[CornerView]:
+    """Many poses, rolled as well; mirrored as a driver does, and counted so that x and y are right-handed again."""
+    found = []
+    for n in range(8):
+        one = view((0.3 * np.sin(n), 0.3 * np.cos(n), roll * np.sin(2 * n)), 0.7, shot=n, sensor=sensor)
+        pixels = one.pixels * (-1, 1) + (639, 0) if mirror else one.pixels
+        lattice = pixels.reshape(6, 9, 2)
+        found.append(replace(one, pixels=(lattice[:, ::-1] if mirror else lattice).reshape(-1, 2)))
+    return found
+
+
+def test_a_sensor_whose_images_are_mirrored_is_noticed() -> None:
+    coverage.check([*rolled("color", mirror=False), *rolled("tof", mirror=False)])
+    with pytest.raises(MirroredSensorError, match="color or tof sees the board as in a mirror"):
+        coverage.check([*rolled("color", mirror=False), *rolled("tof", mirror=True)])
+
+
+def test_a_board_that_was_never_rolled_does_not_tell_about_mirrors() -> None:
+    coverage.check([*rolled("color", mirror=False, roll=0.02), *rolled("tof", mirror=True, roll=0.02)])
+
+
+def test_the_simulated_board_is_shown_in_all_poses_that_are_needed() -> None:
+    simulation = parse("simulated://target?sensors=tof,color").build()
+    target, surface = TARGETS["chessboard"], simulation.scene.surfaces[0]
+    sizes = {name: (head.camera.width, head.camera.height) for name, head in simulation.heads.items()}
+    views: list[CornerView] = []
+    for n in range(20):
+        T_rb = board_pose(surface, target, 2.0 * n + 0.5)
+        for name, head in simulation.heads.items():
+            pixels = head.camera.project(pose.transform(T_rb, target.points()))
+            if (pixels > 3).all() and (pixels < np.array(sizes[name]) - 4).all():
+                views.append(CornerView(name, n, 0.0, target.points(), pixels))
+    assert coverage.wishes(views, sizes) == []
