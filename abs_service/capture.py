@@ -125,6 +125,7 @@ class DeviceKeeper:
             device.close()
             self._earlier.update(device.counters)
             self._earlier["unwanted"] += watch.unwanted
+            self._health.count_up_to(self._earlier, f"device.{self._name}.")
         return watch.delivered, reason
 
     def _recognise(self, device: Device) -> None:

@@ -38,7 +38,9 @@ class ReplayBench:
         return open_device(f"replay://{self.folder}/second.mcap?loop=1", time.monotonic_ns)
 
     def _path(self, fault: Fault) -> Path:
-        return self.folder / f"{fault}.mcap"
+        # One name, by which a recording is known, in a folder for each fault.
+        (self.folder / fault).mkdir(exist_ok=True)
+        return self.folder / fault / "first.mcap"
 
 
 def _spoilt(item: Frame | Truth, fault: Fault) -> Frame | Truth:

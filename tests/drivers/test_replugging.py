@@ -1,0 +1,52 @@
+"""With every driver, what is unplugged and plugged in again comes back by itself: the same device in a later epoch."""
+
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+
+import pytest
+
+from abs_service import capture
+from abs_service.capture import DeviceKeeper
+from abs_service.health import Health
+from abs_service.stamps import Speaker, WallClock
+from drivers.device import Device
+from tests.drivers import benches
+from tests.drivers.conformance import Bench, Ear, Fault, eventually
+from tests.service.loopback import LoopbackBus
+
+
+@pytest.fixture(params=sorted(module.name for module in pkgutil.iter_modules(benches.__path__)))
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """The fake of each driver, one after the other."""
+    with import_module(f"tests.drivers.benches.{request.param}").bench() as bench:
+        yield bench
+
+
+def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(capture, "FIRST_PAUSE_S", 0.1)
+    opened: list[tuple[str, str]] = []
+    faults = iter([Fault.UNPLUG])
+
+    def open_device(uri: str) -> Device:
+        device = bench.open(next(faults, Fault.NONE))
+        opened.append((uri, device.info.uri))
+        heads.update({stream.sensor: stream.sensor for stream in device.capabilities.streams})
+        return device
+
+    heads: dict[str, str] = {}
+    ear, clock = Ear(), WallClock()
+    health = Health(LoopbackBus(), "capture", Speaker("demo", clock))
+    keeper = DeviceKeeper("cam", "any://", open_device, lambda device: None, ear, heads, health, clock.monotonic)
+    keeper.start()
+    try:
+        assert eventually(lambda: len({frame.epoch for frame in list(ear.frames)}) == 2)
+        assert ear.hears(2)
+    finally:
+        keeper.close(10)
+    epochs = [frame.epoch for frame in ear.frames]
+    assert epochs == sorted(epochs)
+    assert health._counters["device.cam.reconnects"] == 1
+    assert opened[0][0] == "any://"
+    assert opened[1][0] == opened[0][1], "by the address of this very device, whatever the first one left open"
+    assert health._counters["device.cam.frames"] >= len(ear.frames)
