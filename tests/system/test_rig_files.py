@@ -21,7 +21,11 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 #: Those that need recordings or images which are not in the repository.
 WITH_FILES = {"replay", "image_folder"}
 WITHOUT_TRACKER = {"record_only"}
-LIVE = sorted(path.stem for path in EXAMPLES.glob("*.toml") if path.stem not in WITH_FILES | WITHOUT_TRACKER)
+#: Those that need cameras; `test_kinects.py` has such a rig on emulated ones.
+WITH_CAMERAS = {"kinect"}
+LIVE = sorted(
+    path.stem for path in EXAMPLES.glob("*.toml") if path.stem not in WITH_FILES | WITHOUT_TRACKER | WITH_CAMERAS
+)
 
 
 @pytest.fixture
