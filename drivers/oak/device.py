@@ -122,9 +122,12 @@ class OakDevice:
         try:
             queue.clear()
             while not stop.is_set():
-                picture = queue.get(_LOOK_S)
-                if picture is not None and not stop.is_set():
-                    self._deliver(role, picture)
+                try:
+                    picture = queue.get(_LOOK_S)
+                    if picture is not None and not stop.is_set():
+                        self._deliver(role, picture)
+                except PictureError:
+                    self._delivery.drop("undecodable")
         except QueueClosed as error:
             with self._lock:
                 self._flowing -= 1
@@ -133,15 +136,14 @@ class OakDevice:
                 over = self._connection.ended
                 state = DeviceState.CLOSED if over else DeviceState.FAILED
                 self._delivery.report(state, over or f"the device is gone: {error}")
+        except Exception as error:
+            self._delivery.report(DeviceState.FAILED, f"{role.sensor}/{role.stream} broke: {error!r}")
+            raise
 
     def _deliver(self, role: Role, picture: Picture) -> None:
         t_arrival_ns = self._clock()
-        try:
-            filters = self._connection.filters.get(role, ())
-            made = frame(picture, role, self.cameras[role.sensor].calib_id, filters)
-        except PictureError:
-            self._delivery.drop("undecodable")
-            return
+        filters = self._connection.filters.get(role, ())
+        made = frame(picture, role, self.cameras[role.sensor].calib_id, filters)
         came_ns = self._connection.stamp(picture, t_arrival_ns) - picture.half_exposure_ns
         stamp = self._clocks[role].stamp(made.t_device_ticks, came_ns)
         if stamp.stepped:

@@ -25,10 +25,10 @@ TEMPERATURE_S = 5.0
 _LINKS = {"SUPER_PLUS": "USB 3, 10 Gbit/s", "SUPER": "USB 3, 5 Gbit/s", "HIGH": "USB 2, 480 Mbit/s"}
 
 
-def discover(timeout_s: float) -> list[Found]:
-    """What depthai finds; never raises."""
+def discover(timeout_s: float, network: bool = False) -> list[Found]:
+    """What depthai finds, on the network as well if that is wanted; never raises."""
     try:
-        dai = library.load(search_ms=max(round(timeout_s * 1000), 1))
+        dai = library.load(network, search_ms=max(round(timeout_s * 1000), 1))
     except SdkMissingError as error:
         return [Found(DeviceInfo("oak://", "OAK", ""), Availability.SDK_MISSING, error.reason, error.remedy)]
     try:
@@ -46,7 +46,7 @@ def connect(address: Address) -> Connection:
     """
     dai = library.load(address.network)
     # Without a name, the only device; with one, depthai finds it by itself, on the network as well.
-    name = address.name or choose(discover(library.SEARCH_MS / 1000), "oak", "").info.serial
+    name = address.name or choose(discover(library.SEARCH_MS / 1000, address.network), "oak", "").info.serial
     with library.naming(address.uri):
         device = dai.Device(dai.DeviceInfo(name))
     try:

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivers.oak.picture import Picture, number
+from drivers.oak.picture import Picture, PictureError, number
 
 _NS = timedelta(microseconds=1)
 
@@ -21,6 +21,7 @@ class Queue(Protocol):
         """The next image, None if there is none for so long.
 
         Raises:
+            PictureError: what came is no image.
             QueueClosed: there will be none.
         """
         ...
@@ -57,7 +58,18 @@ class OutputQueue:
 
 
 def from_img_frame(message: Any) -> Picture:
-    """The picture that a `dai.ImgFrame` is; its pixels stay where they are."""
+    """The picture that a `dai.ImgFrame` is; its pixels stay where they are.
+
+    Raises:
+        PictureError: it is none.
+    """
+    try:
+        return _picture(message)
+    except (AttributeError, RuntimeError, TypeError, ValueError) as error:  # all that depthai raises about contents
+        raise PictureError(f"{type(message).__name__} is no image: {error}") from error
+
+
+def _picture(message: Any) -> Picture:
     transformation = message.getTransformation()
     return Picture(
         type=message.getType().name,

@@ -21,7 +21,7 @@ from drivers.realsense.inbox import Inbox
 from drivers.realsense.library import naming
 from drivers.realsense.picture import CLOCK, HARDWARE, Picture, frame, from_frame
 from drivers.realsense.profiles import Stream, cameras
-from drivers.realsense.streams import Role, StreamError
+from drivers.realsense.streams import Role
 
 _log = logging.getLogger(__name__)
 
@@ -193,7 +193,7 @@ class RealsenseDevice:
         try:
             picture: Picture = from_frame(self._rs, image)
             made = frame(picture, role, self.cameras[role.sensor].calib_id)
-        except (StreamError, RuntimeError):
+        except (ValueError, RuntimeError):  # what librealsense raises about frames, and ours
             self._delivery.drop("undecodable")
             return
         if picture.domain != HARDWARE and not self._warned:

@@ -21,7 +21,10 @@ def discover(timeout_s: float) -> list[Found]:
         return [
             Found(DeviceInfo("realsense://", "RealSense", ""), Availability.SDK_MISSING, error.reason, error.remedy)
         ]
-    return [_found(rs, camera) for camera in rs.context().query_devices()]
+    try:
+        return [_found(rs, camera) for camera in rs.context().query_devices()]
+    except RuntimeError as error:
+        return [Found(DeviceInfo("realsense://", "RealSense", ""), Availability.FAULTY, f"librealsense says: {error}")]
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:

@@ -19,6 +19,8 @@ from drivers.oak import discover, eeprom, library, live, open_device, pipelines,
 from drivers.oak.address import parse
 from drivers.oak.controls import make
 from drivers.oak.device import OakDevice
+from drivers.oak.messages import Queue, from_img_frame
+from drivers.oak.picture import Picture
 from drivers.oak.recording import OakRecording
 from drivers.oak.roles import ROLES
 from drivers.simulated.address import parse as parse_simulated
@@ -110,6 +112,31 @@ def test_a_stream_that_never_delivers_is_named() -> None:
     connection = replace(connection, queues={**connection.queues, ROLES["tof_confidence"]: silent})
     with pytest.raises(DeviceError, match=r"tof/confidence delivers nothing for 0.1 s"):
         OakDevice(connection, time.monotonic_ns, first_s=0.1)
+
+
+def test_a_message_that_is_no_image_is_counted_and_the_stream_goes_on() -> None:
+    class Odd:
+        """A queue whose third message is no image."""
+
+        def __init__(self, queue: Queue) -> None:
+            self.queue, self.count = queue, 0
+
+        def get(self, timeout_s: float) -> Picture | None:
+            self.count += 1
+            return from_img_frame(dai.IMUData()) if self.count == 3 else self.queue.get(timeout_s)
+
+        def clear(self) -> None:
+            self.queue.clear()
+
+    connection = live_connection()
+    connection = replace(connection, queues={role: Odd(queue) for role, queue in connection.queues.items()})
+    device, receiver = OakDevice(connection, time.monotonic_ns), Receiver()
+    try:
+        device.start(receiver)
+        receiver.wait(lambda: len(receiver.frames) > 9)
+        assert device.counters["undecodable"] == len(connection.queues)
+    finally:
+        device.close()
 
 
 def test_the_calibration_is_depthais_own() -> None:
