@@ -334,7 +334,29 @@ def warped(
                     gain = [b * (normal @ own_rays[corner]) / (normal @ q) for b, corner in zip(share, face)]
                     noise = sum((g * sigma[corner]) ** 2 for g, corner in zip(gain, face))
                     spread[pixel] = np.sqrt(noise + sum(g * bend[corner] for g, corner in zip(gain, face)) ** 2)
+    frayed, undecided = _frayed(source, view, distance, best, largest_step)
+    best[frayed], spread[frayed], margin[undecided] = np.nan, np.nan, 0
     return np.where(np.isfinite(best), best, np.nan), spread, margin
+
+
+def _frayed(
+    source: Camera, view: Camera, distance: np.ndarray, best: np.ndarray, largest_step: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of a view that show something behind a rim within a pixel of the source, and those nearly so far off."""
+    frayed, undecided = np.zeros(best.shape, bool), np.zeros(best.shape, bool)
+    z = best * view.rays()[..., 2]
+    for r, c in np.ndindex(distance.shape[0] - 1, distance.shape[1] - 1):
+        for corner in ((r, c), (r, c + 1), (r + 1, c), (r + 1, c + 1)):
+            if np.nanmax(distance[r : r + 2, c : c + 2], initial=-1) - distance[corner] > largest_step:
+                point = source.unproject(distance)[corner]
+                here = (view.T_sr @ [*point, 1.0])[2]
+                there = distance[corner] * source.rays()[corner][2]
+                reach = 0.99 * max(view.fx / source.fx, view.fy / source.fy) * there / here
+                columns, rows = np.meshgrid(np.arange(best.shape[1]), np.arange(best.shape[0]))
+                off = np.abs(np.stack([columns, rows], axis=-1) - view.project(point)).max(axis=-1)
+                frayed |= (off <= reach) & (z > here + largest_step) & np.isfinite(best)
+                undecided |= np.abs(off - reach) < 1e-3
+    return frayed, undecided
 
 
 def _bend(distance: np.ndarray, sigma: np.ndarray, largest_step: float) -> np.ndarray:

@@ -16,6 +16,9 @@ Value = TypeVar("Value", bound=np.generic)
 #: Neighbours whose distances differ by more belong to different surfaces; nothing is rendered between them [m].
 LARGEST_STEP_M = 0.04
 
+#: What is nearer may reach so far from the centre of its outermost pixel towards the next pixel's centre [pixels].
+_REACH = 0.99
+
 
 class Each(Protocol):
     """What applies a function to all parts of an image: the built-in `map`, or `map` of a pool of threads."""
@@ -31,7 +34,8 @@ class MeshWarp:
     """Warps what a depth sensor measured into any other view; distances there are radial, from the view's own centre.
 
     Neighbouring pixels span a surface, which is exact where the scene is flat: a pixel of the view is not moved by half
-    a pixel of the source, whatever the slope. It ends at the outermost pixels' centres.
+    a pixel of the source, whatever the slope. It ends at the outermost pixels' centres, and what lies behind a rim is
+    unknown as near to it as a pixel of the source is wide.
     """
 
     def __init__(
@@ -57,6 +61,8 @@ class MeshWarp:
         self.geometry = Geometry(source, target)
         self.largest_step_m = largest_step_m
         self._ray_length = target.lookup.ray_length.astype(np.float32)
+        reach = _REACH * max(target.fx / source.fx, target.fy / source.fy) / source.lookup.ray_length
+        self._reach = reach.astype(np.float32)
         self._each = each
         self._bands = bands(target.height, parts)
 
@@ -72,13 +78,15 @@ class MeshWarp:
         face = np.full(self._ray_length.shape, -1, np.int32)
         warped = np.empty(self._ray_length.shape, np.float32)
 
+        measured = (points.place, points.inverse_z, points.distance)
+
         def work(rows: tuple[int, int]) -> None:
-            measured = (points.place, points.inverse_z, points.distance)
             raster.cover(*measured, self.largest_step_m, *rows, nearness, face)
             shading.measure(face, nearness, self._ray_length, *rows, warped)
 
         for _ in self._each(work, self._bands):
             pass
+        raster.fray(*measured, self.largest_step_m, self._reach, nearness, face, warped)
         if not (face >= 0).any():
             raise errors.nothing_seen(distance, points.inverse_z, self.geometry.target)
         return Warped(warped, points, self.geometry, self.largest_step_m, face, nearness)

@@ -158,6 +158,53 @@ def _fill(
 
 
 @kernel
+def fray(
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+    distance: NDArray[np.float32],
+    largest_step: float,
+    reach: NDArray[np.float32],
+    nearness: NDArray[np.float32],
+    face: NDArray[np.int32],
+    warped: NDArray[np.float32],
+) -> None:
+    """Forgets what is shown behind a rim, as near to it as a pixel of the source is wide.
+
+    What is nearer ends anywhere between its last pixel's centre and the next, so there either of the two may be seen.
+    `reach` (h, w) is that way in the view for a distance of 1 and a 1/z of 1 [px].
+    """
+    height, width = face.shape
+    step, one = np.float32(largest_step), np.float32(1)
+    for r in range(place.shape[0] - 1):
+        for c in range(place.shape[1] - 1):
+            d0, d1, d2, d3 = distance[r, c], distance[r, c + 1], distance[r + 1, c], distance[r + 1, c + 1]
+            if max(d0, d1, d2, d3) - min(d0, d1, d2, d3) <= step or not height_of_step(distance, r, c) > step:
+                continue
+            for k in range(4):
+                y, x = r + k // 2, c + k % 2
+                z = one / inverse_z[y, x]
+                if np.isnan(z) or not largest(distance, r, c) - distance[y, x] > step:
+                    continue
+                near, row, column = reach[y, x] * distance[y, x] / z, place[y, x, 1], place[y, x, 0]
+                for i in range(max(int(np.ceil(row - near)), 0), min(int(np.floor(row + near)), height - 1) + 1):
+                    left, right = max(int(np.ceil(column - near)), 0), min(int(np.floor(column + near)), width - 1)
+                    for j in range(left, right + 1):
+                        if face[i, j] >= 0 and one / nearness[i, j] > z + step:
+                            face[i, j] = -1
+                            warped[i, j] = np.nan
+
+
+@kernel
+def largest(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
+    """Largest distance of a quadrilateral's corners, as far as they are known [m]."""
+    far = np.float32(-np.inf)
+    for k in range(4):
+        d = distance[r + k // 2, c + k % 2]
+        far = d if d > far else far
+    return far
+
+
+@kernel
 def tear(
     place: NDArray[np.float32],
     inverse_z: NDArray[np.float32],
