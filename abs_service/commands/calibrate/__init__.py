@@ -7,4 +7,5 @@ COMMANDS = {
     "intrinsics": "cameras one by one, from images of a board",
     "rig": "a whole rig in one solve: cameras, poses, distances",
     "convert": "calibrations from and to the formats of other programs",
+    "verify": "whether a stored calibration still holds, and which sensor has moved if not",
 }

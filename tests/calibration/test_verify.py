@@ -1,0 +1,103 @@
+"""`abs-service calibrate verify` on recordings of a simulated board: no alarm without reason, and who moved."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abs_service import cli
+from abs_service.calibration import rig_file, target_file
+from abs_service.calibration.provenance import Provenance
+from abs_service.exits import Exit
+from calib.camera import Camera
+from drivers.replay import Recording
+from tests.calibration.simulated import Filmed, record, scene
+
+SCENE = scene("chessboard", "sensors=tof,structured_light,color", "rate=2", "seed=4", "color=640x480")
+SENSORS = ("tof", "structured_light", "color")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight poses of the board, two exposures of each."""
+    return record(Filmed(SCENE.simulation, 32), tmp_path_factory.mktemp("verify") / "board.mcap")
+
+
+@pytest.fixture
+def verify(recording: Path, tmp_path: Path, capsys):
+    """Verifies a calibration in which one sensor stands elsewhere than in truth."""
+
+    def verify(displaced: str = "", by: tuple[float, ...] = (0, 0, 0), *options: str) -> tuple[int, str, dict]:
+        cameras = dict(Recording(recording).cameras)
+        if displaced:
+            T_rs = cameras[displaced].T_rs.copy()
+            T_rs[:3, 3] += by
+            cameras[displaced] = dataclasses.replace(cameras[displaced], T_rs=T_rs)
+        path = tmp_path / "lab.calibration.toml"
+        rig_file.write(calibration(cameras), path)
+        target_file.write(SCENE.target, tmp_path / "board.toml")
+        given = [str(path), str(recording), "--target", str(tmp_path / "board.toml"), "--every", "1.9", *options]
+        code = cli.main(["calibrate", "verify", *given])
+        report = json.loads((tmp_path / "lab.calibration-verify.json").read_text(encoding="utf-8"))
+        return code, capsys.readouterr().out, report
+
+    return verify
+
+
+def calibration(cameras: dict[str, Camera]) -> rig_file.RigCalibration:
+    """As a solve would have stored it: to a tenth of a millimetre and a hundredth of a degree."""
+    names = [
+        f"{name}.{part}" for name in SENSORS[1:] for part in ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
+    ]
+    sigmas = np.tile([2e-4, 2e-4, 2e-4, 1e-4, 1e-4, 1e-4], 2)
+    residuals = rig_file.Residuals(corners_px=0.1)
+    sensors = {name: rig_file.SensorCalibration(cameras[name], residuals=residuals) for name in SENSORS}
+    covariance = rig_file.Covariance(tuple(names), np.diag(sigmas**2))
+    return rig_file.RigCalibration("lab", sensors, Provenance("x", "2026-11-21"), "good", covariance)
+
+
+@pytest.mark.slow
+def test_a_rig_that_is_as_it_was_is_good(verify, tmp_path: Path) -> None:
+    code, out, report = verify()
+    assert code == Exit.OK, out
+    assert report["verdict"] == "good"
+    assert "tof and color: stand as they were calibrated" in out
+    assert "color: still projects as it was calibrated" in out
+    assert {one["first"] + one["second"] for one in report["values"]["pairs"]} == {
+        "tofstructured_light", "tofcolor", "structured_lightcolor"
+    }  # fmt: skip
+    page = (tmp_path / "lab.calibration-verify.html").read_text(encoding="utf-8")
+    assert page.count("<img") == 2
+    assert "board.mcap" in page
+
+
+@pytest.mark.slow
+def test_the_sensor_that_moved_is_named(verify) -> None:
+    code, out, report = verify("color", (0.01, 0.0, 0.0), "--json")
+    assert code == 2
+    assert json.loads(out) == report
+    worst = report["verdicts"][0]
+    assert (worst["level"], worst["about"]) == ("bad", "color")
+    assert worst["text"].startswith("has moved, by 1")
+    assert report["values"]["explained_by"]["color"] > 0.9
+    moved = next(one for one in report["values"]["pairs"] if (one["first"], one["second"]) == ("tof", "color"))
+    np.testing.assert_allclose(moved["move_m"], (-0.01, 0, 0), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        (["none.mcap"], "none.mcap"),
+        (["a.mcap", "b.mcap"], "one recording at a time"),
+        (["a.mcap", "tof=*.png"], "not both"),
+        (["tof=none-*.png"], "no file matches"),
+    ],
+)
+def test_what_cannot_be_verified_is_said(tmp_path: Path, capsys, monkeypatch, source: list[str], said: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    target_file.write(SCENE.target, Path("board.toml"))
+    rig_file.write(calibration({name: Camera(64, 48, 50.0, 50.0, 32.0, 24.0) for name in SENSORS}), Path("x.toml"))
+    assert cli.main(["calibrate", "verify", "x.toml", *source, "--target", "board.toml"]) == Exit.USER
+    assert said in capsys.readouterr().err
