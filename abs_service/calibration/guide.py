@@ -117,7 +117,7 @@ def coverage_map(image: Image, views: Sequence[CornerView]) -> NDArray[np.uint8]
     size = (levels.shape[1], levels.shape[0])
     picture = np.repeat(levels[..., None], 3, axis=2)
     seen = coverage.counts(views, size, 3, 3)
-    for row, column in np.argwhere(seen == 0):
+    for row, column in np.argwhere(seen < coverage.LEAST_POINTS):
         part = (
             slice(row * size[1] // 3, (row + 1) * size[1] // 3),
             slice(column * size[0] // 3, (column + 1) * size[0] // 3),

@@ -20,6 +20,9 @@ ENOUGH_TILT = np.deg2rad(18)
 #: Part of the image's width or height that the largest view should fill, and how much smaller the smallest should be.
 ENOUGH_SIZE, ENOUGH_DEPTH = 0.4, 0.8
 
+#: Points with which a ninth of the image counts as seen.
+LEAST_POINTS = 6
+
 _PLACES = (
     ("top left corner", "top edge", "top right corner"),
     ("left edge", "middle", "right edge"),
@@ -100,8 +103,9 @@ def adds(view: CornerView, kept: Sequence[CornerView], size: tuple[int, int]) ->
     new = stance(view, size)
     if all(differs(new, stance(other, size)) for other in own):
         return True
-    empty = counts(own, size, 3, 3) == 0
-    return bool((counts([view], size, 3, 3)[empty] > 0).any())
+    seen = counts(own, size, 3, 3)
+    more = seen + counts([view], size, 3, 3)
+    return bool(((seen < LEAST_POINTS) & (more >= LEAST_POINTS)).any())
 
 
 def by_sensor(views: Iterable[CornerView]) -> dict[str, list[CornerView]]:
@@ -145,5 +149,5 @@ def _places(sensor: str, size: tuple[int, int], views: Sequence[CornerView]) -> 
     return [
         f"nobody has seen the {_PLACES[row][column]} of {sensor}"
         for row, column in np.ndindex(seen.shape)
-        if seen[row, column] == 0
+        if seen[row, column] < LEAST_POINTS
     ]

@@ -45,6 +45,7 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     "tilt": values.number(float, -70, 70),
     "board": values.one_of(*TARGETS),
     "hold": values.number(float, 0, 3600),
+    "reach": values.number(float, 0, 3),
     "lens_model": values.one_of("brown_conrady", "fisheye"),
     "order": values.one_of(*ORDERS),
     "blur": values.number(float, 0, 10),
@@ -67,6 +68,7 @@ SCENES_OF: Mapping[str, frozenset[str]] = {
     "tilt": frozenset({"wall"}),
     "board": frozenset({"target"}),
     "hold": frozenset({"target"}),
+    "reach": frozenset({"target"}),
     "speed": MOVING,
     "occluder": MOVING,
     "leave": MOVING,
@@ -102,6 +104,7 @@ class Address:
         tilt: of the bare wall, about the rig's y axis [degrees].
         board: what is printed on the calibration board, one of `printed.TARGETS`.
         hold: how long it is still in each pose [s].
+        reach: how far to the sides it is held: 1 is within the view of the time-of-flight head.
         texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
         lens: distortion of all heads; `lens=-0.2,0.05` is a barrel's k1 and k2.
         lens_model: what `lens` are coefficients of: `brown_conrady`, or `fisheye` with up to four.
@@ -134,6 +137,7 @@ class Address:
     tilt: float = 0.0
     board: str = "chessboard"
     hold: float = 1.0
+    reach: float = 1.0
     texture: str = "smooth"
     lens: tuple[float, ...] = (0.0,)
     lens_model: str = "brown_conrady"
@@ -162,6 +166,7 @@ class Address:
             tilt=math.radians(self.tilt),
             printed=self.board,
             hold_s=self.hold,
+            reach=self.reach,
         )
         equipment = Equipment(
             sizes=self.sizes,

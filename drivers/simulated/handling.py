@@ -24,12 +24,13 @@ class Handling:
     """A flat board in one pose after another; see `drivers.simulated.motion.Motion`.
 
     The first pose faces the rig from 0.7 m. The others are drawn so that the board is turned by up to 40° about an axis
-    in its plane, rolled by up to 20°, and still inside the view of the time-of-flight head when it faces it.
+    in its plane, rolled by up to 20°, and with `reach` 1 inside the view of the time-of-flight head if it faces it.
 
     Attributes:
         seed: of the poses.
         width, height: of the board [m].
         hold_s: how long it is still in each pose [s].
+        reach: how far to the sides it is held: 1 is within the view of the time-of-flight head.
         speed: factor on time; with 0 it stays in its first pose.
     """
 
@@ -37,6 +38,7 @@ class Handling:
     width: float
     height: float
     hold_s: float = 1.0
+    reach: float = 1.0
     speed: float = 1.0
 
     def at(self, t: float) -> Placement:
@@ -59,7 +61,7 @@ def _held(handling: Handling, number: int) -> Pose:
     axis, angle = generator.uniform(0, 2 * np.pi), TILT * np.sqrt(generator.uniform(0.05, 1))
     roll = Rotation.from_rotvec([0, 0, generator.uniform(-ROLL, ROLL)])
     turned = Rotation.from_rotvec(angle * np.array([np.cos(axis), np.sin(axis), 0])) * roll
-    room = np.array(_SEEN) * distance - 0.5 * np.array([handling.width, handling.height])
+    room = handling.reach * np.array(_SEEN) * distance - 0.5 * np.array([handling.width, handling.height])
     x, y = np.maximum(room, 0) * generator.uniform(-1, 1, 2)
     return pose.from_rotation_vector(turned.as_rotvec(), (x, y, distance))
 

@@ -37,6 +37,7 @@ class Choices:
         distance, reflectivity, tilt: of the bare wall [m], [rad].
         printed: what is printed on the calibration board, one of `TARGETS`.
         hold_s: how long it is still in each pose [s].
+        reach: how far to the sides it is held.
     """
 
     seed: int = 1
@@ -52,6 +53,7 @@ class Choices:
     tilt: float = 0.0
     printed: str = "chessboard"
     hold_s: float = 1.0
+    reach: float = 1.0
 
 
 def sheet(choices: Choices) -> Scene:
@@ -132,7 +134,7 @@ def target(choices: Choices) -> Scene:
     """A calibration board, `choices.printed`, that is held still in one pose after another."""
     board_ = TARGETS[choices.printed]
     width, height = paper(board_)
-    handling = Handling(choices.seed, width, height, choices.hold_s, choices.speed)
+    handling = Handling(choices.seed, width, height, choices.hold_s, choices.reach, choices.speed)
     return _scene(choices, Rectangle(width, height, handling, printed(board_), choices.excursion))
 
 

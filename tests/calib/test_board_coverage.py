@@ -118,11 +118,11 @@ def test_a_board_that_was_never_rolled_does_not_tell_about_mirrors() -> None:
 
 
 def test_the_simulated_board_is_shown_in_all_poses_that_are_needed() -> None:
-    simulation = parse("simulated://target?sensors=tof,color").build()
+    simulation = parse("simulated://target?sensors=tof,color&reach=1.5").build()
     target, surface = TARGETS["chessboard"], simulation.scene.surfaces[0]
     sizes = {name: (head.camera.width, head.camera.height) for name, head in simulation.heads.items()}
     views: list[CornerView] = []
-    for n in range(20):
+    for n in range(30):
         T_rb = board_pose(surface, target, 2.0 * n + 0.5)
         for name, head in simulation.heads.items():
             pixels = head.camera.project(pose.transform(T_rb, target.points()))
