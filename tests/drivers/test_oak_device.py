@@ -36,25 +36,30 @@ SAMPLE = Path(__file__).parents[2] / "recordings" / "sample_oak"
 URI = f"oak://?recording={SAMPLE}"
 
 
-def test_what_depthai_plays_is_what_it_recorded() -> None:
-    recorded = {(frame.key, frame.seq): frame for frame in OakRecording(SAMPLE).frames()}
+def test_what_depthai_plays_is_what_it_recorded(tmp_path: Path) -> None:
+    simulation = parse_simulated("simulated://sheet?sensors=tof&tof=32x24&rate=15").build()
+    camera = simulation.heads["tof"].camera
+    depths = [frame for k in range(30) for frame in simulation.frames(k) if frame.kind == Kind.DEPTH]
+    oak.record(tmp_path / "tof_depth.mcap", [oak.message(frame, camera, 0) for frame in depths])
+    recorded = {frame.seq: frame for frame in OakRecording(tmp_path).frames()}
     receiver = Receiver()
-    device = open_device(f"{URI}&loop=0", time.monotonic_ns)
+    device = open_device(f"oak://?recording={tmp_path}&loop=0", time.monotonic_ns)
     try:
         assert device.state == DeviceState.CLOSED
-        assert {stream.key for stream in device.capabilities.streams} == {key for key, _ in recorded}
+        assert [stream.key for stream in device.capabilities.streams] == [("tof", "depth")]
         device.start(receiver)
         receiver.wait(lambda: receiver.states[-1] == (DeviceState.CLOSED, "the recording has ended"))
     finally:
         device.close()
     assert [state for state, _ in receiver.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
-    assert len(receiver.frames) == device.counters["frames"] >= 9
+    assert len(recorded) == 30
+    assert len(receiver.frames) == device.counters["frames"] > 10
     for frame in receiver.frames:
-        same = recorded[frame.key, frame.seq]
+        same = recorded[frame.seq]
         np.testing.assert_array_equal(frame.data, same.data)
         assert (frame.t_device_ticks, frame.exposure_s) == (same.t_device_ticks, same.exposure_s)
         assert frame.calib_id == same.calib_id
-        assert abs(frame.t_host_ns - frame.t_arrival_ns) < 1e9
+        assert frame.t_host_ns <= frame.t_arrival_ns
 
 
 def test_streams_of_one_exposure_have_one_time_and_starting_again_is_a_new_epoch() -> None:
