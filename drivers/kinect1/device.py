@@ -115,7 +115,15 @@ class Kinect1Device:
         counted = dict.fromkeys(CAUSES, 0)
         losses = LossWatch(self._clock, self._delivery.warn)
         delivered = 0
+
+        def count() -> None:
+            for cause in CAUSES:
+                total = sum(channel.dropped[cause] for channel in channels.values())
+                self._delivery.drop(cause, total - counted[cause])
+                counted[cause] = total
+
         with ExitStack() as ending:
+            ending.callback(count)
             reader = ending.enter_context(self._port.reading(tuple(channels)))
             for stream in self._streams:
                 ending.callback(self._end, stream)
@@ -130,10 +138,7 @@ class Kinect1Device:
                             self._delivery.begin_epoch()
                         self._delivery.frame(stamped.frame)
                         delivered += 1
-                for cause in CAUSES:
-                    total = sum(channel.dropped[cause] for channel in channels.values())
-                    self._delivery.drop(cause, total - counted[cause])
-                    counted[cause] = total
+                count()
                 losses.see(delivered, sum(counted.values()))
 
     def _end(self, stream: Stream) -> None:
