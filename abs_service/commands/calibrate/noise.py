@@ -1,0 +1,196 @@
+"""Learns the noise of a depth sensor from recordings of things at rest, and writes it as a table for the rig file.
+
+  abs-service calibrate noise white.mcap grey.mcap dark.mcap --distance-m 1.2    a flat target, 1.2 m away
+  abs-service calibrate noise d*.mcap --distance-m 0.8 0.8 1.2 1.2 1.6 1.6       a distance for each recording
+  abs-service calibrate noise desk.mcap --out desk                               whatever stands still
+  abs-service calibrate noise oak://1944301 --distance-m 0.9                     live
+  abs-service calibrate noise frames/ --camera camera.toml --depth 'd*.png'      a folder of images
+
+Best are five distances over the range that you use and three materials (white, grey, dark), 60 frames of each: a flat
+target that fills the image, its distance measured along the optical axis. Its tilt is found, and should be small. What
+moves is left out. Without distances, planes are fitted; without planes, only the scatter in time is learnt; what could not
+be determined is said.
+
+Writes OUT.toml (a table [sensors.NAME.noise] to copy into the rig file), OUT.npz (maps of pixels, if they are worth it),
+OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
+"""
+
+import argparse
+import json
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+
+from abs_service import plugins
+from abs_service.calibration import claims, noise, noise_report, page, provenance, sequences, toml_text
+from abs_service.calibration.report import Report, to_json
+from abs_service.commands import camera_file
+from abs_service.exits import Exit
+from calib.noise.per_pixel import PerPixel
+from drivers.frame import Geometry
+from drivers.image_folder.images import DepthImages, in_order
+from drivers.image_folder.listing import by_number
+
+#: Seed of what is random: the same recordings give the same model.
+SEED = 0
+
+#: Metres per unit of the depth images of a folder whose camera file does not tell.
+DEPTH_SCALE = 0.001
+
+
+class NoiseOptionError(Exception):
+    """Options that do not go together."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service calibrate noise`."""
+    parser.add_argument("sources", metavar="SOURCE", nargs="+", help="recording, folder of images or device address")
+    parser.add_argument(
+        "--distance-m", metavar="M", nargs="+", type=_distance, default=[math.nan],
+        help="from the sensor to the target along the optical axis: one for all sources, or one for each",
+    )  # fmt: skip
+    parser.add_argument("--sensor", metavar="NAME", default="", help="depth sensor (default: the only one)")
+    parser.add_argument("--box", metavar="PX", nargs=4, type=int, help="left, top, right, bottom of the target [px]")
+    parser.add_argument("--mask", metavar="FILE", type=Path, help="image, black where the target is not")
+    parser.add_argument("--frames", metavar="N", type=int, default=120, help="most frames of a source (%(default)d)")
+    parser.add_argument("--camera", metavar="FILE", type=Path, help="camera file of a folder, as for import")
+    parser.add_argument("--depth", metavar="GLOB", default="depth_*.png", help="depth images of a folder (%(default)s)")
+    parser.add_argument("--out", metavar="PATH", type=Path, help="files to write, without suffix (default: noise-NAME)")
+    parser.add_argument("--json", action="store_true", help="print the report as one JSON object")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Reads the sources, learns, writes and says what was found."""
+    depths = _depths(arguments.distance_m, len(arguments.sources))
+    console = Console(stderr=True)
+    groups: dict[str, list[tuple[sequences.Sequence, float]]] = {}
+    with console.status("reading"):
+        for source, depth in zip(arguments.sources, depths):
+            for one in _read(source, arguments):
+                groups.setdefault(one.exposure, []).append((one, depth))
+    paths = [Path(source) for source in arguments.sources if "://" not in source]
+    trace = provenance.trace(["calibrate", "noise", *_said(arguments)], paths)
+    worst = Exit.OK
+    for number, (setting, group) in enumerate(groups.items()):
+        with console.status("learning") as status:
+            found = noise.calibrate(
+                [one for one, _ in group],
+                [depth for _, depth in group],
+                _region(arguments, group[0][0].lengths.shape[1:]),
+                np.random.default_rng(SEED),
+                status.update,
+            )
+        sensor = group[0][0].sensor
+        out = _out(arguments.out, sensor, number)
+        made = noise_report.report(sensor, found, tuple(c for one, _ in group for c in claims.of_sequence(one)), trace)
+        written = [*_write_model(found, sensor, out), *page.write(made, out)]
+        _say(made, setting if len(groups) > 1 else "", written, arguments.json)
+        worst = max(worst, int(made.level))
+    return worst
+
+
+def _depths(given: Sequence[float], sources: int) -> list[float]:
+    if len(given) not in (1, sources):
+        raise NoiseOptionError(f"--distance-m: {len(given)} distances for {sources} sources; give one, or one for each")
+    return list(given) if len(given) == sources else list(given) * sources
+
+
+def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence]:
+    if arguments.frames < 2:
+        raise NoiseOptionError(f"--frames {arguments.frames}: must be 2 at least")
+    path = Path(source)
+    if "://" in source:
+        return sequences.of_device(source, arguments.sensor, arguments.frames, time.monotonic_ns)
+    if not path.is_dir():
+        return sequences.of_recording(path, arguments.sensor, arguments.frames)
+    if arguments.camera is None:
+        raise NoiseOptionError(f"{source}: --camera has to say which camera took the images of a folder")
+    depth = camera_file.load(arguments.camera).depth
+    images = DepthImages(
+        by_number(path, arguments.depth, 30.0), depth.camera(), depth.depth_scale or DEPTH_SCALE,
+        Geometry(depth.geometry), depth.invalid,
+    )  # fmt: skip
+    return sequences.of_frames(path.name, in_order([images]), {"depth": images.camera}, "depth", arguments.frames)
+
+
+def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.bool_]:
+    """Pixels that may show the target."""
+    height, width = shape
+    region = np.ones((height, width), np.bool_)
+    if arguments.box is not None:
+        left, top, right, bottom = arguments.box
+        region[:] = False
+        region[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = True
+    if arguments.mask is not None:
+        mask = cv2.imread(str(arguments.mask), cv2.IMREAD_GRAYSCALE)
+        if mask is None or mask.shape != (height, width):
+            raise NoiseOptionError(f"--mask {arguments.mask}: must be an image of {width} × {height} pixels")
+        region &= mask > 0
+    if not region.any():
+        raise NoiseOptionError(f"--box, --mask: they leave nothing of the image of {width} × {height} pixels")
+    return region
+
+
+def _write_model(found: noise.Found, sensor: str, out: Path) -> list[Path]:
+    """The table for the rig file, and the maps that it names."""
+    toml, written, model = out.with_suffix(".toml"), [], found.model
+    try:
+        if isinstance(model, PerPixel):
+            maps = out.with_suffix(".npz")
+            model.save(maps)
+            written.append(maps)
+            table = {"type": "per_pixel", "file": maps.name, "law": plugins.table(model.law)}
+        else:
+            table = plugins.table(model)
+        text = toml_text.table(("sensors", sensor, "noise"), table, "written by abs-service calibrate noise")
+        toml.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise NoiseOptionError(f"--out {out}: cannot be written: {error.strerror}") from error
+    return [toml, *written]
+
+
+def _out(given: Path | None, sensor: str, number: int) -> Path:
+    """Where to write: a name without suffix, numbered from the second exposure setting on."""
+    out = given or Path(f"noise-{sensor}")
+    # A suffix is added, never put in the place of what looks like one: noise-1.2 is a name.
+    name = f"{out.name}-{number + 1}" if number else out.name
+    return out.with_name(f"{name}.x")
+
+
+def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> None:
+    if as_json:
+        print(json.dumps(to_json(made), ensure_ascii=False))
+    else:
+        print(f"exposure {setting}:" if setting else made.title)
+        for verdict in made.verdicts:
+            about = f"{verdict.about}: " if verdict.about else ""
+            print(f"  {str(verdict.level):8} {about}{verdict.text} {verdict.advice}".rstrip())
+    print(f"wrote {', '.join(map(str, written))}", file=sys.stderr if as_json else sys.stdout)
+
+
+def _said(arguments: argparse.Namespace) -> list[str]:
+    """The command line that these arguments are."""
+    said = list(arguments.sources)
+    if not math.isnan(arguments.distance_m[0]):
+        said += ["--distance-m", *(f"{depth:g}" for depth in arguments.distance_m)]
+    for name in ("sensor", "mask", "camera", "out"):
+        if value := getattr(arguments, name):
+            said += [f"--{name}", str(value)]
+    return said + (["--box", *map(str, arguments.box)] if arguments.box else [])
+
+
+def _distance(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.01 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a distance in metres, such as 1.2")
+    return value

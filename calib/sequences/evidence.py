@@ -1,0 +1,77 @@
+"""What a sequence says of a sensor's noise: single measurements, and means of all that a pixel measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.noise.base import NoiseError
+from calib.noise.samples import Samples
+from calib.noise.shrinkage import Repeats
+from calib.sequences.reference import Reference
+from calib.sequences.static import Static
+
+#: Deviations beyond which a measurement is an outlier of its pixel.
+_CUT = 5.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """Measurements and means of the same frames.
+
+    Attributes:
+        samples: single measurements; outliers among them.
+        means: mean distance and amplitude of every pixel that has any, without its outliers.
+        repeats: of the means.
+    """
+
+    samples: Samples
+    means: Samples
+    repeats: Repeats
+
+
+def gather(static: Static, reference: Reference, kept: slice = slice(None)) -> Evidence:
+    """The evidence of some of the frames that a sequence has kept.
+
+    Raises:
+        NoiseError: they hold no measurement of a known distance.
+    """
+    samples = static.samples(reference.distance, kept)
+    if not len(samples):
+        raise NoiseError(f"{static.name}: no static pixel has a known distance")
+    limit = np.maximum(_CUT * np.sqrt(static.variance), static.steps.at(static.mean))
+    near = np.abs(samples.measured - static.mean[samples.pixels]) <= limit[samples.pixels]
+    return Evidence(samples, *_averaged(samples.take(near), static.mean.shape))
+
+
+def together(parts: Sequence[Evidence]) -> Evidence:
+    """All evidence of several parts."""
+    times, variance = (np.concatenate([getattr(part.repeats, name) for part in parts]) for name in Repeats._fields)
+    samples, means = (_joined([getattr(part, name) for part in parts]) for name in ("samples", "means"))
+    return Evidence(samples, means, Repeats(times, variance))
+
+
+def thinned(samples: Samples, most: int, generator: np.random.Generator) -> Samples:
+    """At most so many of the samples, drawn at random."""
+    return samples if len(samples) <= most else samples.take(generator.choice(len(samples), most, replace=False))
+
+
+def _joined(parts: Sequence[Samples]) -> Samples:
+    return Samples(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Samples)))
+
+
+def _averaged(samples: Samples, shape: tuple[int, ...]) -> tuple[Samples, Repeats]:
+    """Means of the samples of each pixel, whose real distance is one."""
+    place = samples.row * shape[1] + samples.column
+    n = np.bincount(place, minlength=shape[0] * shape[1])
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.bincount(place, values, len(n)) / n.clip(1)
+
+    measured = mean(samples.measured)
+    variance = mean(np.square(samples.measured - measured[place]))
+    some = np.nonzero(n)[0]
+    true, amplitude = mean(samples.true), mean(samples.amplitude)
+    means = Samples(measured[some], true[some], amplitude[some], some // shape[1], some % shape[1])
+    return means, Repeats(n[some].astype(np.float64), variance[some])
