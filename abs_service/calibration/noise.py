@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from calib.sequences.candidates import Candidate, of_image, of_places
 from calib.sequences.evidence import Evidence, gather, together
 from calib.sequences.parts import Parts
 from calib.sequences.reference import Kind, Reference
-from calib.sequences.selection import FOLDS, Trial, attempt, choose, lean
+from calib.sequences.selection import FOLDS, THOROUGH, Trial, attempt, choose, lean
 from calib.sequences.static import Static, reduce
 from calib.sequences.steps import Steps
 
@@ -24,7 +25,7 @@ from calib.sequences.steps import Steps
 _KEPT, _LARGEST = 30, 40_000_000
 
 #: A plane is the target if it covers this share of what is static; otherwise there is none.
-_TARGET = 0.5
+_TARGET = 0.85
 
 #: Times that targets are turned anew with the mean offsets that the model tells by then.
 _TURNS = 2
@@ -105,7 +106,7 @@ def calibrate(
     if offsets:
         references = _turned(statics, references, law.candidate, generator)
         evidence = _evidence(statics, references)
-    everything = lean(together(evidence), generator)
+    everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
     own_degree = int(len(statics) >= FOLDS and distances[1] > _SEVERAL * distances[0])
     places = of_places(law.candidate, statics[0].mean.shape, own_degree)
@@ -182,7 +183,7 @@ def _evidence(statics: Sequence[Static], references: Sequence[Reference]) -> lis
     found = []
     for static, one in pairs:
         edges = np.linspace(0, len(static.distance), FOLDS + 1).astype(int)
-        found += [gather(static, one, slice(first, last)) for first, last in zip(edges, edges[1:]) if last > first]
+        found += [gather(static, one, slice(first, last)) for first, last in pairwise(edges) if last > first]
     return found
 
 
@@ -213,7 +214,7 @@ def _rows(statics: Sequence[Static], references: Sequence[Reference], law: Depth
     found = []
     for static, one in pairs:
         edges = np.geomspace(np.nanmin(one.distance), np.nanmax(one.distance) * (1 + 1e-9), _BINS + 1)
-        for near, far in zip(edges, edges[1:]):
+        for near, far in pairwise(edges):
             inside = static.still & (one.distance >= near) & (one.distance < far)
             if inside.sum() >= _FEW:
                 name = f"{near:.2f} to {far:.2f} m"

@@ -1,4 +1,4 @@
-"""Pictures of a sensor's noise: over distance and amplitude as in Fig. 8 of the paper, over the image, and residuals."""
+"""Pictures of a sensor's noise: over distance and amplitude as in Fig. 8 of the paper, and residuals."""
 
 from typing import TYPE_CHECKING
 
@@ -47,14 +47,13 @@ def _maps(found: Found) -> "Figure":
     sigma, mu = _middle(found.model, found, x.ravel(), a.ravel())
     rows = [row for _, row in found.rows]
     dots = [(row.distance, row.amplitude, np.hypot(row.temporal, _known(row.fixed)), row.offset) for row in rows]
-    shown = [("σ [mm]", sigma, [dot[2] for dot in dots], "viridis", None)]
+    shown = [("σ [mm]", sigma, [dot[2] for dot in dots], "viridis", (0.0, float(sigma.max()) * 1e3))]
     if found.kind is Kind.KNOWN:
         reach = float(np.abs(mu).max()) * 1e3 or 1.0
-        shown.append(("μ [mm]", mu, [dot[3] for dot in dots], "RdBu_r", reach))
+        shown.append(("μ [mm]", mu, [dot[3] for dot in dots], "RdBu_r", (-reach, reach)))
     figure = _figure(5.5 * len(shown), 4.2)
-    for axes, (label, values, measured, colors, limit) in zip(_row(figure, len(shown)), shown):
+    for axes, (label, values, measured, colors, (low, high)) in zip(_row(figure, len(shown)), shown):
         image = values.reshape(x.shape) * 1e3
-        low, high = (-limit, limit) if limit else (0.0, float(image.max()))
         mesh = axes.pcolormesh(x, a, image, cmap=colors, vmin=low, vmax=high, shading="gouraud", rasterized=True)
         axes.scatter(
             [dot[0] for dot in dots], [dot[1] for dot in dots], c=np.array(measured) * 1e3,

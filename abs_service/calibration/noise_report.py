@@ -40,7 +40,7 @@ def report(sensor: str, found: Found, claims: tuple[Claim, ...], provenance: Pro
 
 
 _WHAT = (
-    "Temporal is what changes from frame to frame. Fixed is what the mean of each pixel differs by from what all pixels "
+    "Temporal is what changes from frame to frame. Fixed is what each pixel's mean differs by from what all pixels "
     "share. Offset is the mean difference from the real distance. A dash says that the sequence does not tell."
 )
 
@@ -65,9 +65,11 @@ def values(found: Found) -> dict[str, object]:
 
 def _models(found: Found) -> Table:
     columns = (
-        Column("model"), Column("coefficients of", "", ""), Column("number"), Column("log-likelihood held out", "", ".3f"),
+        Column("model"), Column("coefficients of", "", ""), Column("number"),
+        Column("log-likelihood held out", "", ".3f"),
         Column("behind the best", "", ".3f"), Column("±", "", ".3f"), Column("within σ", "", ".3f"),
-        Column("within 1.96 σ", "", ".3f"), Column("variance", "", ".2f"), Column("outliers", "", ".3f"), Column("remark"),
+        Column("within 1.96 σ", "", ".3f"), Column("variance", "", ".2f"), Column("outliers", "", ".3f"),
+        Column("remark"),
     )  # fmt: skip
     best = max((trial for trial in found.trials if trial.scores), key=lambda trial: trial.score)
     rows = []
@@ -107,9 +109,9 @@ def _maps(found: Found) -> list[str | Picture]:
         return ["Without a flat target, what a pixel errs by for ever cannot be told from what it looks at."]
     shown: list[str | Picture] = []
     pattern, deviation = found.pattern
-    both = f"known to {np.nanmedian(deviation) * 1e3:.2g} mm; their own deviation is {_pattern_deviation(found) * 1e3:.2g} mm."
+    size = f"deviation {_pattern_deviation(found) * 1e3:.2g} mm, known to {np.nanmedian(deviation) * 1e3:.2g} mm."
     figure = figures.difference_map(pattern * 1e3, "pixel's own offset [mm]")
-    shown.append(drawing(figure, f"What each pixel errs by in all sequences alike, {both}", "map of the fixed pattern"))
+    shown.append(drawing(figure, f"What each pixel errs by in all sequences alike: {size}", "map of the fixed pattern"))
     if isinstance(found.model, PerPixel):
         figure = figures.image_map(found.model.factor, "pixel's own factor on σ")
         shown.append(drawing(figure, "How the pixels' σ differ from the law of the image.", "map of factors on σ"))

@@ -85,15 +85,16 @@ def _undetermined(found: Found) -> list[Verdict]:
         )
     near, far = found.distances
     if far < _SPREAD * near:
-        text = f"How the noise changes with the distance is not determined: all distances lie in {near:.2f} to {far:.2f} m."
+        text = f"How noise changes with distance is not determined: all distances lie in {near:.2f} to {far:.2f} m."
         said.append(Verdict(Level.DOUBTFUL, text, "Record at five distances over the range that you use."))
     if found.amplitudes[1] < 2 * found.amplitudes[0]:
         text = "How the noise changes with the amplitude is not determined: all amplitudes are of one size."
         said.append(Verdict(Level.DOUBTFUL, text, "Record three materials: white, grey and dark."))
     if not found.by_sequence:
+        number = len(found.statics)
         text = (
-            f"{len(found.statics)} sequence{'s are' * (len(found.statics) > 1) or ' is'} too few to hold out a whole one: "
-            "models were compared on other frames of the same sequences, which share their targets' flaws."
+            f"{number} sequence{'s are' if number > 1 else ' is'} too few to hold out a whole one: models were "
+            "compared on other frames of the same sequences, which share their targets' flaws."
         )
         said.append(Verdict(Level.DOUBTFUL, text, "Record at least three sequences."))
     return said
@@ -112,7 +113,7 @@ def _places(found: Found) -> Verdict:
 
 def _gain(law: Trial, trial: Trial) -> str:
     gain, deviation = law.behind(trial)
-    if gain <= max(deviation, NOTHING):
+    if gain <= NOTHING:
         return f"say no more than noise here (log-likelihood {gain:+.3f} ± {deviation:.3f} per measurement)"
     return f"gain {gain:.3f} ± {deviation:.3f} log-likelihood per measurement"
 
@@ -145,11 +146,11 @@ def _steps(found: Found) -> list[Verdict]:
     step = float(found.steps.at(np.array(far)))
     if found.steps.growth > 0:
         text = (
-            f"Distances come in steps of {found.steps.growth:.3g} x² (a disparity), {step * 1e3:.2g} mm at {far:.2f} m; "
-            "σ contains their share, step²/12."
+            f"Distances come in steps of {found.steps.growth:.3g} x² (a disparity), {step * 1e3:.2g} mm at {far:.2f} m;"
+            " σ contains their share, step²/12."
         )
         return [Verdict(Level.GOOD, text)]
-    text = f"Distances come in steps of {found.steps.digit * 1e3:.2g} mm at every distance; σ contains their share."
+    text = f"Distances come in steps of {found.steps.digit * 1e3:.2g} mm; σ contains their share."
     return [Verdict(Level.GOOD, text)] if found.steps.digit > 0 else []
 
 

@@ -82,7 +82,7 @@ def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> lis
     """
     device = open_device(uri, clock)
     try:
-        collected = _Collected(most * max(1, len(device.streams)))
+        collected = _Collected(most * max(1, len(device.capabilities.streams)))
         device.start(collected)
         collected.wait()
         device.stop()

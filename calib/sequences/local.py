@@ -13,7 +13,7 @@ _RIM = 0.03
 def normalized(
     distance: NDArray[np.floating], claimed: NDArray[np.floating], rays: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """Residuals of one image from local planes over what the sensor claims (height, width); NaN where there is no plane.
+    """Residuals of one image from local planes over claimed deviations (height, width); NaN where there is no plane.
 
     A plane is put through the 25 pixels around each one, itself included; that it bends the plane towards itself is
     taken into account by its leverage. On a curved surface the residuals are too large, never too small.

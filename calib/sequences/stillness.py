@@ -8,12 +8,16 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from calib.noise.base import NoiseError
+from calib.noise.fitting import MAD_TO_SIGMA
 
 #: Frames that are judged together, and the fewest that anything can be said of.
 SEGMENT, LEAST_FRAMES = 30, 8
 
 #: Share of a segment's frames in which a static pixel has a return, and share of these that are no outlier.
 _RETURNS, _INLIERS = 0.8, 0.9
+
+#: Deviation of a normal distribution over the median size of the difference between two of its values.
+_PER_CHANGE = MAD_TO_SIGMA / np.sqrt(2)
 
 #: Deviations beyond which a value is an outlier of its pixel.
 _CUT = 4.0
@@ -78,9 +82,9 @@ def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: 
         step: of the distances (height, width) [m].
     """
     centre = median(distance)
-    fast = _fast(distance)
-    kept = _near(distance, centre, fast, step)
-    fast = _fast(np.where(kept, distance, np.nan))  # without the outliers, among which there may be more
+    usual_change = median(np.abs(np.diff(distance, axis=0)))  # outliers do not make it larger
+    kept = _near(distance, centre, np.square(_PER_CHANGE * usual_change), step)
+    fast = _fast(np.where(kept, distance, np.nan))
     kept = _near(distance, centre, fast, step)
     mean, variance, count = _moments(distance, kept)
     seen = np.isfinite(distance).sum(axis=0)

@@ -8,11 +8,11 @@
 
 Best are five distances over the range that you use and three materials (white, grey, dark), 60 frames of each: a flat
 target that fills the image, its distance measured along the optical axis. Its tilt is found, and should be small. What
-moves is left out. Without distances, planes are fitted; without planes, only the scatter in time is learnt; what could not
-be determined is said.
+moves is left out. Without distances, planes are fitted; without planes, only the scatter in time is learnt; what could
+not be determined is said.
 
-Writes OUT.toml (a table [sensors.NAME.noise] to copy into the rig file), OUT.npz (maps of pixels, if they are worth it),
-OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
+Writes OUT.toml (a table [sensors.NAME.noise] to copy into the rig file), OUT.npz (maps of pixels, if they are worth
+it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
 """
 
 import argparse
@@ -35,7 +35,7 @@ from abs_service.commands import camera_file
 from abs_service.exits import Exit
 from calib.noise.per_pixel import PerPixel
 from drivers.frame import Geometry
-from drivers.image_folder.images import DepthImages, in_order
+from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 
 #: Seed of what is random: the same recordings give the same model.
@@ -117,7 +117,8 @@ def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence
         by_number(path, arguments.depth, 30.0), depth.camera(), depth.depth_scale or DEPTH_SCALE,
         Geometry(depth.geometry), depth.invalid,
     )  # fmt: skip
-    return sequences.of_frames(path.name, in_order([images]), {"depth": images.camera}, "depth", arguments.frames)
+    folder = ImageFolder({"depth": images})
+    return sequences.of_frames(path.name, folder.frames(), folder.cameras, "depth", arguments.frames)
 
 
 def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.bool_]:
@@ -171,7 +172,7 @@ def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> 
         print(f"exposure {setting}:" if setting else made.title)
         for verdict in made.verdicts:
             about = f"{verdict.about}: " if verdict.about else ""
-            print(f"  {str(verdict.level):8} {about}{verdict.text} {verdict.advice}".rstrip())
+            print(f"  {verdict.level!s:8} {about}{verdict.text} {verdict.advice}".rstrip())
     print(f"wrote {', '.join(map(str, written))}", file=sys.stderr if as_json else sys.stdout)
 
 
