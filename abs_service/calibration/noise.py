@@ -106,31 +106,35 @@ def calibrate(
     if offsets:
         references = _turned(statics, references, law.candidate, generator)
         evidence = _evidence(statics, references)
+    again = attempt(law.candidate, evidence, generator)
     everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
-    own_degree = int(len(statics) >= FOLDS and distances[1] > _SEVERAL * distances[0])
-    places = of_places(law.candidate, statics[0].mean.shape, own_degree)
-    trials += _tried(places, evidence, generator, say)
-    again = attempt(law.candidate, evidence, generator)
-    chosen = choose([again, *trials[-len(places) :]])
+    own_degree = int(_by_sequence(statics) and distances[1] > _SEVERAL * distances[0])
+    places = _tried(of_places(law.candidate, statics[0].mean.shape, own_degree), evidence, generator, say)
+    chosen = choose([again, *places])
     say(f"fitting {chosen.candidate.name} to everything")
-    model = chosen.candidate.fit(everything)
-    bright = everything.samples.amplitude
+    of_all = law.candidate.fit(everything)
     return Found(
         tuple(statics),
         tuple(references),
-        model,
+        chosen.candidate.fit(everything),
         chosen,
         again,
-        tuple(trials),
+        (*trials, *places),
         _by_sequence(statics),
-        _rows(statics, references, law.candidate.fit(everything)),
-        parts.pattern(statics, references, law.candidate.fit(everything)),
+        _rows(statics, references, of_all),
+        parts.pattern(statics, references, of_all),
         _held_out(chosen.candidate, evidence, generator),
         distances,
-        domain(bright[np.isfinite(bright)]) if amplitudes else (math.nan, math.nan),
+        _amplitudes(everything.samples.amplitude),
         steps,
     )
+
+
+def _amplitudes(values: NDArray[np.float64]) -> Span:
+    """Domain of the amplitudes; NaN without any."""
+    known = values[np.isfinite(values)]
+    return domain(known) if known.size else (math.nan, math.nan)
 
 
 def _reduced(sequences: Sequence[recorded.Sequence], say: Callable[[str], None]) -> list[Static]:

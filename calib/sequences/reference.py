@@ -95,11 +95,6 @@ def mean(static: Static, region: NDArray[np.bool_], generator: np.random.Generat
     return Reference(Kind.MEAN, np.where(where, static.mean + dither, np.nan), np.zeros(3))
 
 
-def largest_share(static: Static, reference: Reference) -> float:
-    """Share of the static pixels whose real distance a reference tells."""
-    return float(np.isfinite(reference.distance).sum() / static.still.sum())
-
-
 def _tolerance(static: Static) -> NDArray[np.float64]:
     wide = _DEVIATIONS * np.sqrt(static.variance) + static.steps.at(static.mean) / 2 + _SHARE * static.mean
     return np.where(static.still, wide, 1.0)

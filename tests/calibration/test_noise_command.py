@@ -123,14 +123,21 @@ def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path
     assert "--distance-m 0.8 1.2 1.6" in page
 
 
-def test_a_folder_of_images_is_read_with_its_camera(tmp_path: Path, capsys) -> None:
+def test_a_folder_of_images_is_read_with_its_camera_and_so_is_a_recording(tmp_path: Path, capsys) -> None:
     taken, head = frames("simulated://wall?sensors=structured_light&structured_light=64x48&distance=1.1", 0, 12)
     for number, frame in enumerate(taken):
         cv2.imwrite(str(tmp_path / f"depth_{number:03}.png"), np.asarray(frame.data, np.uint16))
     camera = head.camera
     keys = f"fx = {camera.fx}\nfy = {camera.fy}\ncx = {camera.cx}\ncy = {camera.cy}\n"
     (tmp_path / "camera.toml").write_text(f"[depth]\nwidth = 64\nheight = 48\n{keys}")
-    options = ["--camera", str(tmp_path / "camera.toml"), "--out", str(tmp_path / "noise")]
+    described = ["--camera", str(tmp_path / "camera.toml")]
+    recording = tmp_path / "wall.mcap"
+    assert main(["import", str(tmp_path), "--layout", "pairs", *described, "--out", str(recording)]) == Exit.OK
+    (recorded,) = sequences.of_recording(recording, "", 8)
+    np.testing.assert_allclose(recorded.lengths, [frame.si() for frame in taken[:8]])
+    assert recorded.digit == pytest.approx(0.001)
+    capsys.readouterr()
+    options = [*described, "--out", str(tmp_path / "noise")]
     assert main(["calibrate", "noise", str(tmp_path), *options]) == 1
     said = capsys.readouterr().out
     assert "The mean offset is not determined" in said
