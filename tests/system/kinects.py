@@ -46,7 +46,7 @@ def write_rig(path: Path, endpoint: str) -> None:
             f'[sensors.{name}_depth]\ndevice = "{name}"\nhead = "depth"\ncamera = {{ T_rs = {T_rs.tolist()} }}',
             'noise = { type = "structured_light", noise = 1.425e-3, step = 2.89e-3 }\n',
             f'[sensors.{name}_color]\ndevice = "{name}"\nhead = "color"\ncamera = {{ T_rs = {T_rc.tolist()} }}',
-            'noise = { type = "bayer", sigma = 8.0 }\n',
+            'noise = { type = "bayer", sigma = 12.0 }\n',
         ]
     sensors = ["tof", *(f"{name}_{head}" for name in POSES for head in ("depth", "color"))]
     parts += [
