@@ -1,8 +1,8 @@
 """Looks whether a stored calibration still holds, in a new recording of a board, and which sensor has moved if not.
 
-  abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml
-  abs-service calibrate verify lab.calibration.toml tof='shots/tof-*.png' color='shots/color-*.png' --target board.toml
-  abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml --json
+  abs-service calibrate verify rig.toml recordings/board.mcap --board board.toml
+  abs-service calibrate verify lab.calibration.toml --images tof='tof-*.png' --images color='c-*.png' --board board.toml
+  abs-service calibrate verify rig.toml recordings/board.mcap --board board.toml --json
 
 Exit code 0 if everything is as it was, 1 if something is doubtful, 2 if the calibration should not be used any more or
 could not be verified. The report is an HTML page with pictures, and a JSON file beside it.
@@ -32,11 +32,12 @@ class VerifyOptionError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate verify`."""
     parser.add_argument("calibration", metavar="RIG_OR_CALIBRATION", type=Path, help="TOML file of either kind")
+    parser.add_argument("source", metavar="SOURCE", nargs="?", type=Path, help="recording of the board (.mcap)")
     parser.add_argument(
-        "source", metavar="SOURCE", nargs="+", help="recording, or SENSOR=PATTERN for every sensor's images"
+        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
     )
     parser.add_argument(
-        "--target", metavar="BOARD", type=Path, required=True, help="TOML file that describes the board"
+        "--board", "--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML"
     )
     parser.add_argument("--every", metavar="S", type=float, default=0.5, help="seconds between shots (default: 0.5)")
     parser.add_argument(
@@ -48,10 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Verifies, reports and judges."""
     known = calibrations.load(arguments.calibration)
-    target = target_file.read(arguments.target)
+    target = target_file.read(arguments.board)
     shots, files = _source(arguments, known)
     seen = _see(target, shots, known)
-    origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.target, *files])
+    origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.board, *files])
     report = verification.verify(known, seen, origin)
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     page_path, _ = page.write(report, path)
@@ -61,17 +62,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _source(arguments: argparse.Namespace, known: RigCalibration) -> tuple[Iterable[Shot], list[Path]]:
     """The shots, and the files that they come from."""
-    patterns = dict(one.split("=", 1) for one in arguments.source if "=" in one and not Path(one).is_file())
-    if patterns and len(patterns) < len(arguments.source):
-        raise VerifyOptionError("SOURCE must be one recording, or SENSOR=PATTERN for each sensor, not both")
-    if patterns:
-        files = [path for pattern in patterns.values() for path in Path(pattern).parent.glob(Path(pattern).name)]
-        return FolderShots(patterns), sorted(files)
-    if len(arguments.source) > 1:
-        raise VerifyOptionError(f"SOURCE: one recording at a time, not {len(arguments.source)}")
-    path = Path(arguments.source[0])
+    if (arguments.source is None) == (not arguments.images):
+        raise VerifyOptionError("give either a recording as SOURCE, or --images NAME=GLOB for each sensor")
+    if arguments.images:
+        patterns = dict(one.partition("=")[::2] for one in arguments.images)
+        if not all(patterns.values()):
+            raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
+        return FolderShots(patterns), [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
     cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
-    return RecordingShots(Recording(path), arguments.every, cameras=cameras), [path]
+    return RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras), [arguments.source]
 
 
 def _see(target: Target, shots: Iterable[Shot], known: RigCalibration) -> Seen:
@@ -95,5 +94,7 @@ def _text(report: Report, path: Path) -> str:
 
 
 def _said(arguments: argparse.Namespace) -> list[str]:
-    given = ["calibrate", "verify", str(arguments.calibration), *arguments.source, "--target", str(arguments.target)]
+    images = [word for one in arguments.images for word in ("--images", one)]
+    source = [] if arguments.source is None else [str(arguments.source)]
+    given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--board", str(arguments.board)]
     return [*given, "--every", f"{arguments.every:g}"]
