@@ -108,7 +108,7 @@ def _half(solution: Solution, shots: Sequence[int], note: Callable[[str], None])
 def _image(solution: Solution, first: Solution, second: Solution, name: str, distance: float) -> Agreement:
     camera = solution.cameras[name]
     layout = solution.adjustment.layout
-    changes = projection.implied_changes(camera, layout, name, projection.reach(solution, name), distance)
+    changes = projection.implied_changes(solution, name, distance)
     columns = layout.columns(name, layout.freedoms[name].intrinsics)
     pixels = projection.grid(camera)
     inside = supported(solution, name, pixels.reshape(-1, 2))

@@ -69,27 +69,27 @@ def in_image(solution: Solution, sensor: str, distance: float) -> Field:
     camera = solution.cameras[sensor]
     pixels = grid(camera)
     layout = solution.adjustment.layout
-    changes = implied_changes(camera, layout, sensor, reach(solution, sensor), distance)
+    changes = implied_changes(solution, sensor, distance)
     inside = supported(solution, sensor, pixels.reshape(-1, 2)).reshape(pixels.shape[:2])
     columns = layout.columns(sensor, layout.freedoms[sensor].intrinsics)
     deviations = spread(changes, solution.covariance[np.ix_(columns, columns)])
     return Field(pixels, deviations.reshape(inside.shape), inside)
 
 
-def implied_changes(
-    camera: Camera, layout: Layout, sensor: str, near_far: tuple[float, float], distance: float
-) -> NDArray[np.float64]:
+def implied_changes(solution: Solution, sensor: str, distance: float) -> NDArray[np.float64]:
     """Derivatives (n, 2, k) of projections on the grid, at a distance [m], by a sensor's free intrinsics."""
-    freedom = layout.freedoms[sensor]
+    camera = solution.cameras[sensor]
+    freedom = solution.adjustment.layout.freedoms[sensor]
     order = [*MATRIX, *freedom.kind.coefficients]
     wanted = [order.index(name) for name in freedom.intrinsics]
-    volume = _points(camera, (*near_far, float(np.mean(near_far))))
-    volume = volume[np.isfinite(volume).all(axis=1)]
-    undone = Undone(camera, volume)
+    near, far = reach(solution, sensor)
+    volume = _points(camera, (near, 0.5 * (near + far), far))
+    seen = np.tile(supported(solution, sensor, grid(camera).reshape(-1, 2)), 3)
+    volume = volume[seen & np.isfinite(volume).all(axis=1)]
     changes = by_intrinsics(camera, volume[:, :2] / volume[:, 2:])[:, :, wanted]
     points = _points(camera, (distance,))
     own = by_intrinsics(camera, points[:, :2] / points[:, 2:])[:, :, wanted]
-    return undone.at(points, changes, own)
+    return Undone(camera, volume).at(points, changes, own)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from tests.calib.board_views import Head
 
 SEEDS = 50
 PLANE_SEEDS = 6
-SHOTS = 10
+SHOTS = 12
 INTRINSICS = 9
 
 #: Deviation of corners in the amplitudes of a coarse time-of-flight camera, which are noisy and blurred [px].
@@ -45,7 +45,7 @@ def solved(seed: int) -> tuple[Mapping[str, Head], Solution]:
     generator = np.random.default_rng(seed)
     heads = board_views.three_heads()
     heads["tof"] = replace(heads["tof"], depth_offset=0.012)
-    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=30)
+    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=40)
     sensors = {
         name: SensorTask(
             head.camera.width,
@@ -65,10 +65,10 @@ def tof_errors(seed: int, corner_sigma: float = COARSE_PX) -> tuple[float, float
     coarse = Camera(160, 120, 131.0, 130.7, 79.2, 60.4, heads["tof"].camera.lens, heads["color"].camera.T_rs)
     heads["tof"] = Head(coarse, corner_sigma=corner_sigma, depth_sigma=0.004)
     heads["color"] = replace(heads["color"], camera=replace(heads["color"].camera, T_rs=np.eye(4)))
-    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=1000)
+    seen = board_views.look(heads, board_views.random_boards(SHOTS, generator), generator, points=500)
     sensors = {
         "color": SensorTask(1280, 720),
-        "tof": SensorTask(160, 120, factory=(coarse,), keeps_intrinsics=True),
+        "tof": SensorTask(160, 120, factory=(_nominal(coarse),)),
     }
     task = Task(sensors, seen.corners, seen.planes, "color")
     found = [calibrate(replace(task, planes=planes)).cameras["tof"] for planes in ((), task.planes)]

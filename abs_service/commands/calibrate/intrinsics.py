@@ -1,8 +1,8 @@
 """Calibrates cameras one by one, each in a frame of its own: focal lengths, principal point, lens.
 
-  abs-service calibrate intrinsics take.mcap --board board.toml --out lab.calibration.toml
-  abs-service calibrate intrinsics --images color='shots/color_*.png' --board board.toml --out color.calibration.toml
-  abs-service calibrate intrinsics --images wide='shots/*.jpg' --lens wide=fisheye --board board.toml --out w.toml
+  abs-service calibrate intrinsics take.mcap --target target.toml --out lab.calibration.toml
+  abs-service calibrate intrinsics --images color='shots/color_*.png' --target target.toml --out color.calibration.toml
+  abs-service calibrate intrinsics --images wide='shots/*.jpg' --lens wide=fisheye --target target.toml --out w.toml
 
 Images are of a recording, of folders, or live of the rig that SOURCE describes. Kinds of lenses: pinhole,
 brown-conrady (five coefficients; the default), rational (eight) and fisheye (Kannala and Brandt). Beside the

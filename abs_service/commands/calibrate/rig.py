@@ -1,9 +1,9 @@
 """Calibrates a whole rig in one solve: cameras, where they stand to each other, and what depth sensors measure.
 
-  abs-service calibrate rig take.mcap --board board.toml --out lab.calibration.toml
-  abs-service calibrate rig take.mcap --board board.toml --keep tof --depth-terms tof=offset --out lab.calibration.toml
-  abs-service calibrate rig rig.toml --board board.toml --out lab.calibration.toml          live, 30 different views
-  abs-service calibrate rig --images left='l*.png' --images right='r*.png' --board board.toml --out p.toml
+  abs-service calibrate rig take.mcap --target target.toml --out lab.calibration.toml
+  abs-service calibrate rig take.mcap --target target.toml --keep tof --depth-terms tof=offset --out l.toml
+  abs-service calibrate rig rig.toml --target target.toml --out lab.calibration.toml          live, 30 different views
+  abs-service calibrate rig --images left='l*.png' --images right='r*.png' --target target.toml --out p.toml
 
 Corners in colour, infrared and amplitude images and the distances that depth sensors measure on the board are explained
 together. Sensors named with --keep keep the intrinsics of the device or of --start. With --depth-terms an offset, a

@@ -14,12 +14,13 @@ from pathlib import Path
 
 from abs_service import config
 from abs_service.calibration import page, provenance, rig_file, seeing, solve_report, target_file
-from abs_service.calibration.live_shots import LiveShots, Wired
+from abs_service.calibration.live_shots import LiveShots
 from abs_service.calibration.rig_file import SensorCalibration
 from abs_service.calibration.seeing import Seen
 from abs_service.calibration.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots import Shot
 from abs_service.commands import calibrations
+from abs_service.commands.calibrate.capture import opened
 from abs_service.exits import Exit
 from abs_service.problems import none_of
 from calib.board import coverage
@@ -29,7 +30,6 @@ from calib.solve.lenses import KINDS, kind_of
 from calib.solve.tasks import SensorTask, Task
 from calib.solve.verdict import assess
 from calib.solve.weights import shared
-from drivers.opening import open_device
 from drivers.replay.recording import Recording
 
 
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
     )
-    parser.add_argument("--board", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
+    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
     parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")
     parser.add_argument(
@@ -93,7 +93,7 @@ def material(arguments: argparse.Namespace) -> Material:
         raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
     if (arguments.source is None) == (not arguments.images):
         raise SolveOptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
-    target = target_file.read(arguments.board)
+    target = target_file.read(arguments.target)
     known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
     with ExitStack() as stack:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
@@ -125,19 +125,10 @@ def _shots(
         known = {**recording.cameras, **cameras}
         return RecordingShots(recording, arguments.every, cameras=known), known, (arguments.source,)
     rig = config.load(arguments.source)
-    devices = {
-        name: Wired(open_device(table.uri, time.monotonic_ns), rig.heads(name)) for name, table in rig.devices.items()
-    }
-    given = {
-        wired.heads[head]: rig.sensors[wired.heads[head]].camera.applied_to(camera)
-        for wired in devices.values()
-        for head, camera in wired.device.cameras.items()
-        if head in wired.heads
-    }
+    devices, given = stack.enter_context(opened(rig))
     known = {**given, **cameras}
-    live = stack.enter_context(
-        LiveShots(devices, known, int(rig.synchronisation.tolerance_ms * 1e6), time.monotonic_ns)
-    )
+    tolerance_ns = round(rig.synchronisation.tolerance_ms * 1e6)
+    live = stack.enter_context(LiveShots(devices, known, tolerance_ns, time.monotonic_ns))
     return live, known, (arguments.source,)
 
 
@@ -165,7 +156,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     solution = calibrate(task, say)
     distance = arguments.distance or _usual(solution.task.reference, solution)
     assessment = assess(solution, distance, arguments.needed, say)
-    data = [path for path in (*found.data, arguments.board) if path.exists()]
+    data = [path for path in (*found.data, arguments.target) if path.exists()]
     origin = provenance.trace(sys.argv[1:], data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
     made = solve_report.calibration(name, origin, solution, assessment.trusted, found.known)
