@@ -68,7 +68,7 @@ class Shot:
     Attributes:
         number: of the moment.
         looks: what each sensor saw, by sensor name; a sensor that saw nothing is missing.
-        frames: what it was made of, the frames before them included; empty if it was made of files.
+        frames: what it was made of, with those shortly before that tell what moved; empty if it was made of files.
     """
 
     number: int

@@ -46,13 +46,13 @@ def files(tmp_path: Path) -> list[str]:
 def test_a_capture_that_ends_early_says_what_is_missing_and_can_be_read_again(
     files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = cli.main(["calibrate", "capture", *files, "--limit-s", "12", "--json"])
+    code = cli.main(["calibrate", "capture", *files, "--limit-s", "8", "--json"])
     said = json.loads(capsys.readouterr().out)
     assert code == said["exit_code"] in (1, 2)
-    assert said["shots"] >= 2
+    assert said["shots"] >= 1
     assert {wish["sensor"] for wish in said["missing"]} == {"depth_camera", "color"}
     recording = Recording(tmp_path / "board.mcap")
-    seen = see_all(TARGETS["chessboard"], RecordingShots(recording, every_s=0.0), recording.cameras)
+    seen = see_all(TARGETS["chessboard"], RecordingShots(recording, every_s=0.5), recording.cameras)
     assert {name: sum(v.sensor == name for v in seen.corners) for name in said["views"]} == said["views"]
     assert {plane.sensor for plane in seen.planes} == {"depth_camera"}
     for name, size in (("depth_camera", (144, 176)), ("color", (480, 640))):

@@ -39,6 +39,9 @@ from calib.board.target import Target
 from calib.camera import Camera
 from drivers.opening import open_device
 
+#: Least time between two kept shots [ns]; nobody changes a pose faster, and recordings are read at this pace.
+PAUSE_NS = 600_000_000
+
 
 class HeadError(Exception):
     """A configuration that names a head which its device does not have."""
@@ -112,9 +115,13 @@ def _collect(
     guide: Guide,
     out: Path,
 ) -> None:
+    kept_ns: int | None = None
     for shot in shots:
+        if kept_ns is not None and shot.t_ns - kept_ns < PAUSE_NS:
+            continue
         is_kept = collector.take(see(target, shot, cameras))
         if is_kept:
+            kept_ns = shot.t_ns
             recording.write(shot)
             _picture(shot, collector, out)
         guide.update(collector, is_kept)
