@@ -77,6 +77,7 @@ def test_where_pixels_do_not_differ_maps_of_them_are_not_used() -> None:
     assert {trial.candidate.level for trial in result.trials} == {"image", "region", "pixel"}
 
 
+@pytest.mark.slow
 def test_one_sequence_before_anything_tells_the_scatter_in_time_and_no_more() -> None:
     taken, head = frames("simulated://sheet?sensors=structured_light&speed=0&structured_light=96x72", 0, 30)
     (one,) = sequences.of_frames("desk", taken, {"structured_light": head.camera}, "", 30)
@@ -105,6 +106,7 @@ def test_exposure_settings_are_kept_apart_and_sequences_need_one_sensor() -> Non
         learnt([both[0], *second], [math.nan] * 2)
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path, capsys) -> None:
     sources = [f"simulated://wall?sensors=tof&tof=32x24&rate=200&distance={d}&pattern=0.006" for d in (0.8, 1.2, 1.6)]
     options = ["--frames", "12", "--out", str(tmp_path / "lab-1.2"), "--json"]
@@ -123,6 +125,7 @@ def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path
     assert "--distance-m 0.8 1.2 1.6" in page
 
 
+@pytest.mark.slow
 def test_a_folder_of_images_is_read_with_its_camera_and_so_is_a_recording(tmp_path: Path, capsys) -> None:
     taken, head = frames("simulated://wall?sensors=structured_light&structured_light=64x48&distance=1.1", 0, 12)
     for number, frame in enumerate(taken):
