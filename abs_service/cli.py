@@ -106,7 +106,7 @@ def _group_parser(name: str, module: ModuleType, commands: Mapping[str, str]) ->
     parser = argparse.ArgumentParser(
         prog=f"abs-service {name}",
         usage=f"abs-service {name} [--help] COMMAND …",
-        description=f"{module.__doc__}\n{_listed(commands)}",
+        description=f"{(module.__doc__ or '').strip()}\n\n{_listed(commands)}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("command", type=partial(_command, commands), help=argparse.SUPPRESS)

@@ -38,7 +38,7 @@ def verify(recording: Path, tmp_path: Path, capsys):
         path = tmp_path / "lab.calibration.toml"
         rig_file.write(calibration(cameras), path)
         target_file.write(SCENE.target, tmp_path / "board.toml")
-        given = [str(path), str(recording), "--board", str(tmp_path / "board.toml"), "--every", "1.9", *options]
+        given = [str(path), str(recording), "--target", str(tmp_path / "board.toml"), "--every", "1.9", *options]
         code = cli.main(["calibrate", "verify", *given])
         report = json.loads((tmp_path / "lab.calibration-verify.json").read_text(encoding="utf-8"))
         return code, capsys.readouterr().out, report
@@ -100,5 +100,5 @@ def test_what_cannot_be_verified_is_said(tmp_path: Path, capsys, monkeypatch, so
     monkeypatch.chdir(tmp_path)
     target_file.write(SCENE.target, Path("board.toml"))
     rig_file.write(calibration({name: Camera(64, 48, 50.0, 50.0, 32.0, 24.0) for name in SENSORS}), Path("x.toml"))
-    assert cli.main(["calibrate", "verify", "x.toml", *source, "--board", "board.toml"]) == Exit.USER
+    assert cli.main(["calibrate", "verify", "x.toml", *source, "--target", "board.toml"]) == Exit.USER
     assert said in capsys.readouterr().err

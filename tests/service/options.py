@@ -132,6 +132,7 @@ OPTIONS = {
         _option("depth.tof_amplitude", "sigma = [0.0015, 0.0005], sigma_amplitude = 9.0"),
         _option("depth.pixel_polynomial", 'file = "pixels.npz"'),
         _option("depth.region_polynomial", 'file = "regions.npz"'),
+        _option("depth.per_pixel", 'file = "own.npz", law = { type = "constant", sigma = 0.0045 }'),
         _option("depth.structured_light", "noise = 1.425e-3, step = 2.85e-3", **STRUCTURED_LIGHT),
         _option("picture.color", "sigma = 20.0"),
         _option("picture.grey", "sigma = 15.0"),

@@ -12,6 +12,8 @@ from abs_service import cli, config, plugins
 from abs_service.commands import plans
 from abs_service.exits import Exit
 from abs_service.warmup import warm_up
+from calib.noise.constant import Constant
+from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial, blocks
 from drivers.simulated.address import parse
@@ -36,6 +38,8 @@ def folder(tmp_path_factory):
     RegionPolynomial(labels, tables, 0 * tables, *domain).save(made / "regions.npz")
     maps = np.tile(sigma[..., None, None], (1, 1, HEIGHT, WIDTH))
     PixelPolynomial(maps, 0 * maps, *domain).save(made / "pixels.npz")
+    own = np.zeros((1, HEIGHT, WIDTH)), np.ones((HEIGHT, WIDTH))
+    PerPixel(Constant(0.0045), *own, domain[0]).save(made / "own.npz")
     depth = parse(f"simulated://sheet?seed=3&sensors=tof&tof={WIDTH}x{HEIGHT}").build().frames(28)[0]
     cv2.imwrite(str(made / "mask.png"), np.where(depth.si() < 1.2, 255, 0).astype(np.uint8))
     return made

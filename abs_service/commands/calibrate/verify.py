@@ -1,8 +1,8 @@
 """Looks whether a stored calibration still holds, in a new recording of a board, and which sensor has moved if not.
 
-  abs-service calibrate verify rig.toml recordings/board.mcap --board board.toml
-  abs-service calibrate verify lab.calibration.toml --images tof='tof-*.png' --images color='c-*.png' --board board.toml
-  abs-service calibrate verify rig.toml recordings/board.mcap --board board.toml --json
+  abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml
+  abs-service calibrate verify lab.toml --images tof='t-*.png' --images color='c-*.png' --target board.toml
+  abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml --json
 
 Exit code 0 if everything is as it was, 1 if something is doubtful, 2 if the calibration should not be used any more or
 could not be verified. The report is an HTML page with pictures, and a JSON file beside it.
@@ -36,9 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
     )
-    parser.add_argument(
-        "--board", "--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML"
-    )
+    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
     parser.add_argument("--every", metavar="S", type=float, default=0.5, help="seconds between shots (default: 0.5)")
     parser.add_argument(
         "--report", metavar="PATH", type=Path, help="page to write (default: RIG_OR_CALIBRATION-verify.html)"
@@ -49,10 +47,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Verifies, reports and judges."""
     known = calibrations.load(arguments.calibration)
-    target = target_file.read(arguments.board)
+    target = target_file.read(arguments.target)
     shots, files = _source(arguments, known)
     seen = _see(target, shots, known)
-    origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.board, *files])
+    origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.target, *files])
     report = verification.verify(known, seen, origin)
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     page_path, _ = page.write(report, path)
@@ -96,5 +94,5 @@ def _text(report: Report, path: Path) -> str:
 def _said(arguments: argparse.Namespace) -> list[str]:
     images = [word for one in arguments.images for word in ("--images", one)]
     source = [] if arguments.source is None else [str(arguments.source)]
-    given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--board", str(arguments.board)]
+    given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--target", str(arguments.target)]
     return [*given, "--every", f"{arguments.every:g}"]
