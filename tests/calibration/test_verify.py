@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,8 @@ import pytest
 from abs_service import cli
 from abs_service.calibration import rig_file, target_file
 from abs_service.calibration.provenance import Provenance
+from abs_service.calibration.seeing import Seen, see
+from abs_service.commands.calibrate import verify as command
 from abs_service.exits import Exit
 from calib.camera import Camera
 from drivers.replay import Recording
@@ -86,11 +90,86 @@ def test_the_sensor_that_moved_is_named(verify) -> None:
     np.testing.assert_allclose(moved["move_m"], (-0.01, 0, 0), atol=2e-3)
 
 
+RIG = """
+version = 1
+name = "bench"
+[devices.sim]
+uri = "simulated://target?board=chessboard&sensors=tof,color&rate=10&hold=0.5&seed=4&color=640x480&speed=2"
+[sensors.tof]
+device = "sim"
+[sensors.color]
+device = "sim"
+"""
+
+
+@pytest.fixture
+def live(tmp_path: Path) -> Iterator[list[str]]:
+    """Arguments that verify a rig by its running devices; the colour camera of which stands 15 mm off in truth."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
+    target_file.write(SCENE.target, tmp_path / "board.toml")
+    heads = SCENE.simulation.heads
+    T_rs = heads["color"].camera.T_rs.copy()
+    T_rs[0, 3] += 0.015
+    cameras = {name: head.camera for name, head in heads.items()}
+    cameras["color"] = dataclasses.replace(cameras["color"], T_rs=T_rs)
+    rig_file.write(calibration(cameras), tmp_path / "lab.calibration.toml")
+    names = ("lab.calibration.toml", "rig.toml", "board.toml")
+    stored, rig, board = (str(tmp_path / name) for name in names)
+    yield ["calibrate", "verify", stored, rig, "--target", board]
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.slow
+def test_running_devices_are_verified_by_views_that_differ(live: list[str], tmp_path: Path, capsys) -> None:
+    code = cli.main([*live, "--shots", "4"])
+    said = capsys.readouterr()
+    assert code == Exit.USER, said.out
+    assert "4 of 4 views" in said.err
+    report = json.loads((tmp_path / "lab.calibration-verify.json").read_text(encoding="utf-8"))
+    (pair,) = report["values"]["pairs"]
+    np.testing.assert_allclose(pair["move_m"], (-0.015, 0, 0), atol=4e-3)
+    assert "structured_light: did not see the board" in said.out
+    assert "rig.toml" in {file["name"] for file in report["provenance"]["data"]}
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_the_looking_and_what_was_seen_counts(live: list[str], capsys, monkeypatch) -> None:
+    seen = Seen()
+
+    def see_and_stop(*arguments) -> Seen:
+        nonlocal seen
+        seen += (new := see(*arguments))
+        if len({view.shot for view in seen.corners}) == 3:
+            signal.raise_signal(signal.SIGINT)
+        return new
+
+    monkeypatch.setattr(command, "see", see_and_stop)
+    code = cli.main([*live, "--shots", "1000"])
+    assert code in (Exit.FAILED, Exit.USER)
+    said = capsys.readouterr()
+    assert "of 1000 views" in said.err
+    assert "wrote" in said.out
+
+
+def test_a_rig_without_any_sensor_of_the_calibration_is_refused(live: list[str], tmp_path: Path, capsys) -> None:
+    other = RIG.replace("sensors.tof", "sensors.left").replace("sensors.color", "sensors.right")
+    heads = [f'[sensors.{name}]\ndevice = "sim"\n' for name in ("left", "right")]
+    for old, head in zip(heads, ("tof", "color")):
+        other = other.replace(old, f'{old}head = "{head}"\n')
+    (tmp_path / "rig.toml").write_text(other, encoding="utf-8")
+    assert cli.main(live) == Exit.USER
+    assert "left, right: none of its sensors is one of" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("source", "said"),
     [
         (["none.mcap"], "none.mcap"),
         ([], "either a recording"),
+        (["none.toml"], "none.toml"),
+        (["none.toml", "--shots", "0"], "must be 1 at least"),
         (["a.mcap", "--images", "tof=*.png"], "either a recording"),
         (["--images", "tof"], "must be NAME=GLOB"),
         (["--images", "tof=none-*.png"], "no file matches"),

@@ -6,21 +6,18 @@ import json
 import math
 import re
 import sys
-import time
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from abs_service import config
 from abs_service.calibration import page, provenance, rig_file, seeing, solve_report, target_file
-from abs_service.calibration.live_shots import LiveShots
 from abs_service.calibration.rig_file import SensorCalibration
 from abs_service.calibration.seeing import Seen
 from abs_service.calibration.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots import Shot
 from abs_service.commands import calibrations
-from abs_service.commands.calibrate.capture import opened
+from abs_service.commands.calibrate import live
 from abs_service.exits import Exit
 from abs_service.problems import none_of
 from calib.board import coverage
@@ -98,15 +95,15 @@ def material(arguments: argparse.Namespace) -> Material:
     with ExitStack() as stack:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
-        live = arguments.source is not None and arguments.source.suffix == ".toml"
+        is_live = live.is_live(arguments.source)
         seen = Seen()
         for shot in shots:
             new = seeing.see(target, shot, cameras)
-            if live and not any(coverage.adds(view, seen.corners, new.sizes[view.sensor]) for view in new.corners):
+            if is_live and not live.adds(new, seen):
                 continue
             seen += new
             say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
-            if live and len({view.shot for view in seen.corners}) >= arguments.shots:
+            if is_live and live.views(seen) >= arguments.shots:
                 break
     coverage.check(view for view in seen.corners)
     return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
@@ -120,16 +117,12 @@ def _shots(
         patterns = named(arguments.images, "--images")
         folders = dict.fromkeys(Path(pattern).parent for pattern in patterns.values())
         return FolderShots(patterns), cameras, tuple(folders)
-    if arguments.source.suffix != ".toml":
+    if not live.is_live(arguments.source):
         recording = Recording(arguments.source)
         known = {**recording.cameras, **cameras}
         return RecordingShots(recording, arguments.every, cameras=known), known, (arguments.source,)
-    rig = config.load(arguments.source)
-    devices, given = stack.enter_context(opened(rig))
-    known = {**given, **cameras}
-    tolerance_ns = round(rig.synchronisation.tolerance_ms * 1e6)
-    live = stack.enter_context(LiveShots(devices, known, tolerance_ns, time.monotonic_ns))
-    return live, known, (arguments.source,)
+    shots, known = stack.enter_context(live.streaming(arguments.source, cameras))
+    return shots, known, (arguments.source,)
 
 
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:

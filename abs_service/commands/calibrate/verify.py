@@ -1,8 +1,12 @@
-"""Looks whether a stored calibration still holds, in a new recording of a board, and which sensor has moved if not.
+"""Looks whether a stored calibration still holds, in new views of a board, and which sensor has moved if not.
 
   abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml
+  abs-service calibrate verify lab.calibration.toml rig.toml --target board.toml            live, 15 different views
   abs-service calibrate verify lab.toml --images tof='t-*.png' --images color='c-*.png' --target board.toml
   abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml --json
+
+Live, hold the board still for a moment, change its pose, hold it still again; it ends after so many views, or with
+Ctrl-C: then what was seen until then counts.
 
 Exit code 0 if everything is as it was, 1 if something is doubtful, 2 if the calibration should not be used any more or
 could not be verified. The report is an HTML page with pictures, and a JSON file beside it.
@@ -11,7 +15,7 @@ could not be verified. The report is an HTML page with pictures, and a JSON file
 import argparse
 import json
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from abs_service.calibration import page, provenance, target_file, verification
@@ -20,8 +24,10 @@ from abs_service.calibration.rig_file import RigCalibration
 from abs_service.calibration.seeing import Seen, see
 from abs_service.calibration.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots import Shot
-from abs_service.commands import calibrations
+from abs_service.commands import calibrations, participant
+from abs_service.commands.calibrate import live
 from calib.board.target import Target
+from calib.camera import Camera
 from drivers.replay import Recording
 
 
@@ -32,12 +38,19 @@ class VerifyOptionError(Exception):
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service calibrate verify`."""
     parser.add_argument("calibration", metavar="RIG_OR_CALIBRATION", type=Path, help="TOML file of either kind")
-    parser.add_argument("source", metavar="SOURCE", nargs="?", type=Path, help="recording of the board (.mcap)")
+    parser.add_argument(
+        "source", metavar="SOURCE", nargs="?", type=Path, help="recording of the board (.mcap), or rig (.toml): live"
+    )
     parser.add_argument(
         "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
     )
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
-    parser.add_argument("--every", metavar="S", type=float, default=0.5, help="seconds between shots (default: 0.5)")
+    parser.add_argument(
+        "--every", metavar="S", type=float, default=0.5, help="seconds between shots of a recording (default: 0.5)"
+    )
+    parser.add_argument(
+        "--shots", metavar="N", type=int, default=15, help="different views to wait for, live (default: 15)"
+    )
     parser.add_argument(
         "--report", metavar="PATH", type=Path, help="page to write (default: RIG_OR_CALIBRATION-verify.html)"
     )
@@ -48,8 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Verifies, reports and judges."""
     known = calibrations.load(arguments.calibration)
     target = target_file.read(arguments.target)
-    shots, files = _source(arguments, known)
-    seen = _see(target, shots, known)
+    seen, files = _look(arguments, target, known)
     origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.target, *files])
     report = verification.verify(known, seen, origin)
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
@@ -58,28 +70,60 @@ def run(arguments: argparse.Namespace) -> int:
     return int(report.level)
 
 
-def _source(arguments: argparse.Namespace, known: RigCalibration) -> tuple[Iterable[Shot], list[Path]]:
-    """The shots, and the files that they come from."""
+def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) -> tuple[Seen, list[Path]]:
+    """What the sensors saw of the board, and the files that it comes from."""
     if (arguments.source is None) == (not arguments.images):
-        raise VerifyOptionError("give either a recording as SOURCE, or --images NAME=GLOB for each sensor")
+        raise VerifyOptionError("give either a recording or a rig as SOURCE, or --images NAME=GLOB for each sensor")
+    cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
     if arguments.images:
         patterns = dict(one.partition("=")[::2] for one in arguments.images)
         if not all(patterns.values()):
             raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
-        return FolderShots(patterns), [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
-    cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
-    return RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras), [arguments.source]
+        folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
+        return _see_all(target, FolderShots(patterns), cameras), folders
+    if live.is_live(arguments.source):
+        return _see_live(arguments, target, cameras), [arguments.source]
+    shots = RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras)
+    return _see_all(target, shots, cameras), [arguments.source]
 
 
-def _see(target: Target, shots: Iterable[Shot], known: RigCalibration) -> Seen:
-    """What the sensors of the calibration saw of the board; tells on standard error how it goes."""
-    cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
+def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
+    """What all shots show; tells on standard error how it goes."""
     seen = Seen()
     for number, shot in enumerate(shots, start=1):
-        seen += see(target, Shot(shot.number, {k: look for k, look in shot.looks.items() if k in cameras}), cameras)
+        seen += see(target, _of(cameras, shot), cameras)
         print(f"\r{number} shots, {len(seen.corners)} images show the board", end="", file=sys.stderr)
     print(file=sys.stderr)
     return seen
+
+
+def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> Seen:
+    """What shots of running devices show that differ, until there are enough of them or a signal says to stop."""
+    if arguments.shots < 1:
+        raise VerifyOptionError(f"--shots {arguments.shots}: must be 1 at least")
+    stop = participant.stop_on_signals()
+    seen = Seen()
+    with live.streaming(arguments.source, cameras, stop.is_set) as (shots, there):
+        if not set(there) & set(cameras):
+            raise VerifyOptionError(
+                f"{arguments.source}: {', '.join(there)}: none of its sensors is one of "
+                f"{arguments.calibration}: {', '.join(cameras)}"
+            )
+        for shot in shots:
+            new = see(target, _of(cameras, shot), cameras)
+            if not live.adds(new, seen):
+                continue
+            seen += new
+            sensors = ", ".join(view.sensor for view in new.corners)
+            print(f"{live.views(seen)} of {arguments.shots} views: {sensors}", file=sys.stderr)
+            if live.views(seen) >= arguments.shots:
+                break
+    return seen
+
+
+def _of(cameras: Mapping[str, Camera], shot: Shot) -> Shot:
+    """A shot without the sensors that the calibration does not know."""
+    return Shot(shot.number, {name: look for name, look in shot.looks.items() if name in cameras})
 
 
 def _text(report: Report, path: Path) -> str:
@@ -95,4 +139,5 @@ def _said(arguments: argparse.Namespace) -> list[str]:
     images = [word for one in arguments.images for word in ("--images", one)]
     source = [] if arguments.source is None else [str(arguments.source)]
     given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--target", str(arguments.target)]
-    return [*given, "--every", f"{arguments.every:g}"]
+    pace = ["--shots", str(arguments.shots)] if live.is_live(arguments.source) else ["--every", f"{arguments.every:g}"]
+    return [*given, *pace]
