@@ -16,6 +16,7 @@ from calib.sequences import parts, reference
 from calib.sequences.candidates import Candidate, of_image, of_places
 from calib.sequences.evidence import Evidence, gather, together
 from calib.sequences.parts import Parts
+from calib.sequences.placed import Placed
 from calib.sequences.reference import Kind, Reference
 from calib.sequences.selection import FOLDS, THOROUGH, Trial, attempt, choose, lean
 from calib.sequences.static import Static, reduce
@@ -55,6 +56,7 @@ class Found:
         z: residuals over deviations of a third of the parts, by a model that was fitted to the others.
         distances, amplitudes: domain; the latter NaN without amplitudes.
         steps: that the distances come in.
+        boards: that the real distances are those of, for every sequence; empty if they come from elsewhere.
     """
 
     statics: tuple[Static, ...]
@@ -70,6 +72,7 @@ class Found:
     distances: Span
     amplitudes: Span
     steps: Steps
+    boards: tuple[Placed, ...]
 
     @property
     def kind(self) -> Kind:
@@ -79,7 +82,7 @@ class Found:
 
 def calibrate(
     sequences: Sequence[recorded.Sequence],
-    depths: Sequence[float],
+    targets: Sequence[float | Placed],
     region: NDArray[np.bool_],
     generator: np.random.Generator,
     say: Callable[[str], None],
@@ -88,7 +91,7 @@ def calibrate(
 
     Args:
         sequences: of one sensor.
-        depths: where the target of each meets the optical axis [m]; NaN if that is not known.
+        targets: of each, where it meets the optical axis [m], NaN if that is not known; or a board whose pose is.
         region: pixels (height, width) that may show a target.
         generator: draws what is random in the search for planes, and thins measurements.
         say: takes what is being done, for people.
@@ -97,15 +100,14 @@ def calibrate(
         NoiseError: nothing can be learnt; says why.
     """
     statics = _reduced(sequences, say)
-    references = _references(statics, depths, region, generator)
-    offsets, steps = references[0].kind is Kind.KNOWN, _steps(statics)
+    references = _references(statics, targets, region, generator)
+    offsets, steps = references[0].kind.tells_offset, _steps(statics)
     amplitudes = all(np.isfinite(static.brightness[static.still]).any() for static in statics)
     evidence = _evidence(statics, references)
     trials = _tried(of_image(offsets, amplitudes, steps), evidence, generator, say)
     law = choose(trials)
-    if offsets:
-        references = _turned(statics, references, law.candidate, generator)
-        evidence = _evidence(statics, references)
+    references = _turned(statics, references, law.candidate, generator)
+    evidence = _evidence(statics, references)
     again = attempt(law.candidate, evidence, generator)
     everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
@@ -128,6 +130,7 @@ def calibrate(
         distances,
         _amplitudes(everything.samples.amplitude),
         steps,
+        tuple(one for one in targets if isinstance(one, Placed)),
     )
 
 
@@ -150,9 +153,16 @@ def _reduced(sequences: Sequence[recorded.Sequence], say: Callable[[str], None])
 
 
 def _references(
-    statics: Sequence[Static], depths: Sequence[float], region: NDArray[np.bool_], generator: np.random.Generator
+    statics: Sequence[Static],
+    targets: Sequence[float | Placed],
+    region: NDArray[np.bool_],
+    generator: np.random.Generator,
 ) -> list[Reference]:
-    """Known distances if there are any, else planes if every sequence has a large one, else the means."""
+    """Boards or known distances if there are any, else planes if every sequence has a large one, else the means."""
+    boards = [one for one in targets if isinstance(one, Placed)]
+    if len(boards) == len(statics):
+        return [reference.on_board(static, one, region) for static, one in zip(statics, boards)]
+    depths = [math.nan if isinstance(one, Placed) else one for one in targets]
     if all(map(math.isfinite, depths)):
         return [reference.known(static, depth, region, generator) for static, depth in zip(statics, depths)]
     try:
@@ -169,7 +179,7 @@ def _turned(
     statics: Sequence[Static], references: list[Reference], law: Candidate, generator: np.random.Generator
 ) -> list[Reference]:
     """Known distances' targets, turned with the mean offsets that a law tells: the law is fitted anew each time."""
-    for _ in range(_TURNS):
+    for _ in range(_TURNS if references[0].kind is Kind.KNOWN else 0):
         model = law.fit(lean(together(_evidence(statics, references)), generator))
         references = [reference.without_offset(one, static, model) for static, one in zip(statics, references)]
     return references

@@ -48,7 +48,7 @@ def _maps(found: Found) -> "Figure":
     rows = [row for _, row in found.rows]
     dots = [(row.distance, row.amplitude, np.hypot(row.temporal, _known(row.fixed)), row.offset) for row in rows]
     shown = [("σ [mm]", sigma, [dot[2] for dot in dots], "viridis", (0.0, float(sigma.max()) * 1e3))]
-    if found.kind is Kind.KNOWN:
+    if found.kind.tells_offset:
         reach = float(np.abs(mu).max()) * 1e3 or 1.0
         shown.append(("μ [mm]", mu, [dot[3] for dot in dots], "RdBu_r", (-reach, reach)))
     figure = _figure(5.5 * len(shown), 4.2)
@@ -68,7 +68,7 @@ def _curves(found: Found) -> "Figure":
     """σ and μ over distance where there is no amplitude."""
     x = np.linspace(*found.distances, _FINE)
     sigma, mu = _middle(found.model, found, x, np.zeros(_FINE))
-    known = found.kind is Kind.KNOWN
+    known = found.kind.tells_offset
     figure = _figure(5.5 * (1 + known), 4.2)
     axes = _row(figure, 1 + known)
     distance = [row.distance for _, row in found.rows]

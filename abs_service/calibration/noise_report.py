@@ -28,6 +28,7 @@ def report(sensor: str, found: Found, claims: tuple[Claim, ...], provenance: Pro
     sections = [
         Section("Models", (_models(found),)),
         Section("Parts of the error", (_WHAT, _parts(found))),
+        *_boards(found),
         Section("Distance and amplitude", (_over(found),)),
         Section("Pixels", tuple(_maps(found))),
         Section("Residuals", (_residuals(found),)),
@@ -50,6 +51,7 @@ def values(found: Found) -> dict[str, object]:
     return {
         "model": found.chosen.candidate.name,
         "reference": str(found.kind),
+        "reference_deviation_m": max((board.uncertainty for board in found.boards), default=None),
         "distances_m": list(found.distances),
         "amplitudes": list(found.amplitudes),
         "log_likelihood": found.chosen.score,
@@ -61,6 +63,22 @@ def values(found: Found) -> dict[str, object]:
         "step_digit_m": found.steps.digit,
         "step_growth_per_m": found.steps.growth,
     }
+
+
+def _boards(found: Found) -> tuple[Section, ...]:
+    """Where the boards were, if the real distances are theirs."""
+    if found.kind is not Kind.BOARD:
+        return ()
+    columns = (
+        Column("sequence"), Column("seen by"), Column("points"), Column("miss, rms", "px", ".3f"),
+        Column("distance", "m", ".4f"), Column("known to", "mm", ".2f"),
+    )  # fmt: skip
+    rows = tuple(
+        (static.name, board.seen_by, board.corners, board.rms_px, float(np.nanmean(one.distance)),
+         board.uncertainty * 1e3)
+        for static, one, board in zip(found.statics, found.references, found.boards)
+    )  # fmt: skip
+    return (Section("Boards", (Table("Where the board was, by the mean images of the sequences", columns, rows),)),)
 
 
 def _models(found: Found) -> Table:

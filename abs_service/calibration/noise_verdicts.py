@@ -19,6 +19,9 @@ _SPREAD = 1.3
 #: Share of the image that may move before somebody should look at it.
 _MOVING = 0.3
 
+#: Real distances that are known worse than this tell no offset that is worth having [m].
+_WELL_KNOWN = 2e-3
+
 #: How far outside the domain a model is checked, as a factor on either end.
 _OUTSIDE = 10.0
 
@@ -28,6 +31,7 @@ def verdicts(found: Found) -> tuple[Verdict, ...]:
     return (
         _use(found),
         _agreement(found),
+        *_boards(found),
         *_undetermined(found),
         _places(found),
         _outside(found),
@@ -62,6 +66,24 @@ def _agreement(found: Found) -> Verdict:
     )
 
 
+def _boards(found: Found) -> list[Verdict]:
+    """How well the real distances are known that the poses of boards tell."""
+    if found.kind is not Kind.BOARD:
+        return []
+    worst = max(board.uncertainty for board in found.boards)
+    seers = sorted({board.seen_by for board in found.boards})
+    near, far = found.distances
+    share = f"{near:.1f} to {far:.1f} mm" if f"{near:.1f}" != f"{far:.1f}" else f"{far:.1f} mm"
+    text = (
+        f"The reference is known to {worst * 1e3:.2g} mm: the real distances are those of the board, whose pose its "
+        f"corners tell in the images of {' and '.join(seers)}. The offset cannot be known better. An error of 0.1 % in "
+        f"the focal length or the size of the squares would add {share}."
+    )
+    if worst < _WELL_KNOWN:
+        return [Verdict(Level.GOOD, text)]
+    return [Verdict(Level.DOUBTFUL, text, "Take a larger board, tilt it by 20° or so, or come closer.")]
+
+
 def _undetermined(found: Found) -> list[Verdict]:
     """What the sequences cannot tell."""
     said = []
@@ -71,7 +93,7 @@ def _undetermined(found: Found) -> list[Verdict]:
                 Level.DOUBTFUL,
                 "Only the temporal part of the noise is determined: no distance was given and no flat target fills the "
                 "image. The mean offset and the fixed pattern are unknown, and taken as zero.",
-                "Record a flat target at known distances, and give them with --distance-m.",
+                "Record a flat target at known distances, and give them with --distance-m, or a board, with --target.",
             )
         )
     if found.kind is Kind.PLANE:
@@ -80,7 +102,8 @@ def _undetermined(found: Found) -> list[Verdict]:
                 Level.DOUBTFUL,
                 "The mean offset is not determined, and taken as zero: no distance was given, so planes were fitted "
                 "where the sensor sees them. σ contains what pixels differ from these planes by.",
-                "Measure the target's distance along the optical axis, and give it with --distance-m.",
+                "Measure the target's distance along the optical axis, and give it with --distance-m, or record a "
+                "calibration board, and describe it with --target.",
             )
         )
     near, far = found.distances

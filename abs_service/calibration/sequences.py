@@ -2,12 +2,14 @@
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.calibration.mean_looks import MeanLooks
+from abs_service.calibration.shots import Look
 from calib.camera import Camera
 from drivers.device import Device, DeviceState, Truth
 from drivers.frame import Frame, Geometry, Kind
@@ -37,6 +39,8 @@ class Sequence:
         digit: smallest difference that they can have [m]; 0 if they are no whole numbers.
         exposure: the setting, for people; "" if the frames do not tell.
         filters: that the device says it applied.
+        looks: what this and other sensors saw on average, by sensor, if they make images that can show a board.
+        cameras: of all sensors, by name.
     """
 
     name: str
@@ -49,11 +53,30 @@ class Sequence:
     digit: float
     exposure: str
     filters: tuple[str, ...]
+    looks: Mapping[str, Look]
+    cameras: Mapping[str, Camera]
 
     @property
     def along(self) -> NDArray[np.float64]:
         """Radial distance per unit of the lengths (height, width)."""
         return np.ones(self.lengths.shape[1:]) if self.radial else 1 / self.camera.rays()[..., 2]
+
+
+def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
+    """The same with other cameras of some sensors; those of sensors that it does not have do not count.
+
+    Raises:
+        SequenceError: the depth sensor's new camera has images of another size.
+    """
+    known = {name: cameras.get(name, camera) for name, camera in sequence.cameras.items()}
+    camera = known[sequence.sensor]
+    if (camera.height, camera.width) != sequence.lengths.shape[1:]:
+        height, width = sequence.lengths.shape[1:]
+        raise SequenceError(
+            f"{sequence.name}: {sequence.sensor} has images of {width} × {height} pixels, but was calibrated with "
+            f"{camera.width} × {camera.height}"
+        )
+    return replace(sequence, camera=camera, cameras=known)
 
 
 def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
@@ -98,6 +121,7 @@ def of_frames(
 ) -> list[Sequence]:
     """Sorts frames into sequences, one for every exposure setting; arguments and errors as of `of_recording`."""
     gathered: dict[str, _Gathered] = {}
+    others = MeanLooks()
     chosen = sensor
     for frame in frames:
         if frame.kind is Kind.DEPTH and not chosen:
@@ -106,6 +130,8 @@ def of_frames(
             raise SequenceError(f"{name}: there are several depth sensors, {chosen} and {frame.sensor}; choose one")
         if frame.sensor == chosen or not chosen:
             gathered.setdefault(_setting(frame), _Gathered()).add(frame)
+        else:
+            others.add(frame)
         if sum(len(one.depth) for one in gathered.values()) > most:
             break
     gathered = {setting: one for setting, one in gathered.items() if one.depth}
@@ -113,7 +139,8 @@ def of_frames(
         raise SequenceError(f"{name}: there is no depth image" + (f" of a sensor {sensor!r}" if sensor else ""))
     if chosen not in cameras:
         raise SequenceError(f"{name}: nothing says which camera sensor {chosen!r} has")
-    return [one.sequence(name, setting, cameras[chosen], most) for setting, one in gathered.items()]
+    seen = others.looks()
+    return [one.sequence(name, setting, cameras, seen, most) for setting, one in gathered.items()]
 
 
 @dataclass(eq=False)
@@ -123,13 +150,17 @@ class _Gathered:
     depth: dict[tuple[int, int], Frame] = field(default_factory=dict)
     amplitude: dict[tuple[int, int], Frame] = field(default_factory=dict)
     claimed: dict[tuple[int, int], Frame] = field(default_factory=dict)
+    looks: MeanLooks = field(default_factory=MeanLooks)
 
     def add(self, frame: Frame) -> None:
         """Takes a frame, whatever it is of."""
         places = {Kind.DEPTH: self.depth, Kind.AMPLITUDE: self.amplitude, Kind.DEVIATION: self.claimed}
         places.get(frame.kind, {})[frame.epoch, frame.seq] = frame
+        self.looks.add(frame)
 
-    def sequence(self, name: str, setting: str, camera: Camera, most: int) -> Sequence:
+    def sequence(
+        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, Look], most: int
+    ) -> Sequence:
         """The sequence of the first so many depth images; without amplitudes if one of them has none."""
         numbers = list(self.depth)[:most]
         first = self.depth[numbers[0]]
@@ -140,7 +171,7 @@ class _Gathered:
         return Sequence(
             f"{name} ({setting})" if setting else name,
             first.sensor,
-            camera,
+            cameras[first.sensor],
             lengths,
             amplitude,
             claimed.mean(axis=0),
@@ -148,6 +179,8 @@ class _Gathered:
             first.scale if first.data.dtype.kind in "ui" else 0.0,
             setting,
             first.filters,
+            {**others, **self.looks.looks()},
+            cameras,
         )
 
     @staticmethod

@@ -19,7 +19,7 @@ SOUGHT = (Kind.COLOR, Kind.BAYER, Kind.AMPLITUDE, Kind.IR, Kind.INTENSITY)
 USED = frozenset({*SOUGHT, Kind.DEPTH, Kind.DEVIATION})
 
 #: Images of the sensor's own light: where it is saturated, distances are wrong.
-_OWN_LIGHT = frozenset({Kind.AMPLITUDE, Kind.IR})
+OWN_LIGHT = frozenset({Kind.AMPLITUDE, Kind.IR})
 
 #: What changed within this time moved; what changed in a longer time may have been moved and held still again [ns].
 _CLOSE_NS = 250_000_000
@@ -115,9 +115,9 @@ class Assembler:
         if sought is None:
             first = depth if depth is not None else next(iter(now.values()))
             return Look(first.t_host_ns, NO_IMAGE, NO_IMAGE, distance=distance, sigma=sigma)
-        image = _pixels(now[sought])
-        former = _pixels(earlier.get(sought, now[sought]))
-        return Look(now[sought].t_host_ns, image, former, sought in _OWN_LIGHT, distance, sigma)
+        image = pixels(now[sought])
+        former = pixels(earlier.get(sought, now[sought]))
+        return Look(now[sought].t_host_ns, image, former, sought in OWN_LIGHT, distance, sigma)
 
     def _radial(self, depth: Frame) -> NDArray[np.float32]:
         distance = depth.si()
@@ -167,8 +167,8 @@ def _by_kind(sensor: str, frames: FrameSet) -> dict[Kind, Frame]:
     return {frame.kind: frame for (name, _), frame in frames.frames.items() if name == sensor}
 
 
-def _pixels(frame: Frame) -> Array:
-    """The image as numbers that a board is sought in; a mosaic of colours becomes grey."""
+def pixels(frame: Frame) -> Array:
+    """The image of a frame as numbers that a board is sought in; a mosaic of colours becomes grey."""
     if frame.kind == Kind.BAYER:
         return cv2.cvtColor(np.ascontiguousarray(frame.data, np.uint8), _GREY_OF_BAYER[frame.encoding])
     return frame.data.view(ENCODINGS[frame.encoding][0].type)

@@ -63,7 +63,7 @@ def separate(static: Static, reference: Reference, model: DepthNoise, where: NDA
         float(np.mean(a)),
         float(np.sqrt(np.mean(variance))),
         float(fixed),
-        float(np.median(off)) if reference.kind is Kind.KNOWN else np.nan,
+        float(np.median(off)) if reference.kind.tells_offset else np.nan,
         float(np.mean(step)),
     )
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from calib.noise.base import DepthNoise, NoiseError, pixels_where
 from calib.sequences import plane
+from calib.sequences.placed import Placed
 from calib.sequences.static import Static
 
 #: How far a pixel's mean may be from its plane: so many of its own deviations, and so much of its distance.
@@ -18,8 +19,14 @@ class Kind(StrEnum):
     """Where real distances come from."""
 
     KNOWN = "known distance"  # everything can be told
+    BOARD = "board pose"  # likewise, as well as the board's corners tell its pose
     PLANE = "fitted plane"  # all but a mean offset that is common to a plane, or makes one of it
     MEAN = "temporal mean"  # only how distances scatter in time
+
+    @property
+    def tells_offset(self) -> bool:
+        """Whether the mean offset of all pixels can be told."""
+        return self in (Kind.KNOWN, Kind.BOARD)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +70,26 @@ def without_offset(reference: Reference, static: Static, model: DepthNoise) -> R
     depth = 1 / float(reference.plane[2])
     q = plane.through(depth, static.mean[pixels] - offset, static.rays[pixels], _tolerance(static)[pixels])
     return _of(Kind.KNOWN, q, static, pixels)
+
+
+def on_board(static: Static, board: Placed, region: NDArray[np.bool_]) -> Reference:
+    """A board whose pose its corners told.
+
+    Args:
+        static: the sequence.
+        board: where it is.
+        region: pixels (height, width) that count; of these, those on the board are taken, without what stands before
+            it.
+
+    Raises:
+        NoiseError: nothing of the board is static.
+    """
+    pixels = static.still & region & board.inside
+    off = static.mean - plane.radial(board.plane, static.rays)
+    if not pixels.any():
+        raise NoiseError(f"{static.name}: no distance on the board is static")
+    pixels &= np.abs(off - np.median(off[pixels])) < _tolerance(static)
+    return _of(Kind.BOARD, board.plane, static, pixels)
 
 
 def fitted(static: Static, region: NDArray[np.bool_], generator: np.random.Generator) -> Reference:

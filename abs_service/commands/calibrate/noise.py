@@ -2,6 +2,7 @@
 
   abs-service calibrate noise white.mcap grey.mcap dark.mcap --distance-m 1.2    a flat target, 1.2 m away
   abs-service calibrate noise d*.mcap --distance-m 0.8 0.8 1.2 1.2 1.6 1.6       a distance for each recording
+  abs-service calibrate noise b*.mcap --target board.toml                        a calibration board, anywhere
   abs-service calibrate noise desk.mcap --out desk                               whatever stands still
   abs-service calibrate noise oak://1944301 --distance-m 0.9                     live
   abs-service calibrate noise frames/ --camera camera.toml --depth 'd*.png'      a folder of images
@@ -10,6 +11,10 @@ Best are five distances over the range that you use and three materials (white, 
 target that fills the image, its distance measured along the optical axis. Its tilt is found, and should be small. What
 moves is left out. Without distances, planes are fitted; without planes, only the scatter in time is learnt; what could
 not be determined is said.
+
+With --target, a calibration board at rest is looked for in the mean image of each source: the sensor's own amplitude or
+infrared image, or that of another sensor whose camera and pose are known. Its pose tells the real distances, as well as
+the report says.
 
 Writes OUT.toml (a table [sensors.NAME.noise] to copy into the rig file), OUT.npz (maps of pixels, if they are worth
 it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
@@ -29,11 +34,23 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from abs_service import plugins
-from abs_service.calibration import claims, noise, noise_report, page, provenance, sequences, toml_text
+from abs_service.calibration import (
+    claims,
+    noise,
+    noise_report,
+    page,
+    placing,
+    provenance,
+    sequences,
+    target_file,
+    toml_text,
+)
 from abs_service.calibration.report import Report, to_json
-from abs_service.commands import camera_file
+from abs_service.commands import calibrations, camera_file
 from abs_service.exits import Exit
+from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
+from calib.sequences.placed import Placed
 from drivers.frame import Geometry
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
@@ -56,6 +73,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--distance-m", metavar="M", nargs="+", type=_distance, default=[math.nan],
         help="from the sensor to the target along the optical axis: one for all sources, or one for each",
     )  # fmt: skip
+    parser.add_argument("--target", metavar="FILE", type=Path, help="board that tells its own distance, TOML")
+    parser.add_argument(
+        "--calibration", metavar="FILE", type=Path, help="calibration or rig file: cameras in place of the sources' own"
+    )
     parser.add_argument("--sensor", metavar="NAME", default="", help="depth sensor (default: the only one)")
     parser.add_argument("--box", metavar="PX", nargs=4, type=int, help="left, top, right, bottom of the target [px]")
     parser.add_argument("--mask", metavar="FILE", type=Path, help="image, black where the target is not")
@@ -68,21 +89,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Reads the sources, learns, writes and says what was found."""
-    depths = _depths(arguments.distance_m, len(arguments.sources))
     console = Console(stderr=True)
-    groups: dict[str, list[tuple[sequences.Sequence, float]]] = {}
     with console.status("reading"):
-        for source, depth in zip(arguments.sources, depths):
-            for one in _read(source, arguments):
-                groups.setdefault(one.exposure, []).append((one, depth))
+        groups = _groups(arguments)
     paths = [Path(source) for source in arguments.sources if "://" not in source]
+    paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
     trace = provenance.trace(["calibrate", "noise", *_said(arguments)], paths)
     worst = Exit.OK
     for number, (setting, group) in enumerate(groups.items()):
         with console.status("learning") as status:
             found = noise.calibrate(
                 [one for one, _ in group],
-                [depth for _, depth in group],
+                [where for _, where in group],
                 _region(arguments, group[0][0].lengths.shape[1:]),
                 np.random.default_rng(SEED),
                 status.update,
@@ -96,10 +114,31 @@ def run(arguments: argparse.Namespace) -> int:
     return worst
 
 
+def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Sequence, float | Placed]]]:
+    """The sequences of all sources by their exposure setting, each with where its target is."""
+    depths = _depths(arguments.distance_m, len(arguments.sources))
+    if arguments.target is not None and not math.isnan(depths[0]):
+        raise NoiseOptionError("--target, --distance-m: give only one of them; a board tells its own distance")
+    target = None if arguments.target is None else target_file.read(arguments.target)
+    cameras = _cameras(arguments.calibration)
+    groups: dict[str, list[tuple[sequences.Sequence, float | Placed]]] = {}
+    for source, depth in zip(arguments.sources, depths):
+        for one in _read(source, arguments):
+            seen = sequences.with_cameras(one, cameras)
+            where = depth if target is None else placing.placed(target, seen)
+            groups.setdefault(seen.exposure, []).append((seen, where))
+    return groups
+
+
 def _depths(given: Sequence[float], sources: int) -> list[float]:
     if len(given) not in (1, sources):
         raise NoiseOptionError(f"--distance-m: {len(given)} distances for {sources} sources; give one, or one for each")
     return list(given) if len(given) == sources else list(given) * sources
+
+
+def _cameras(path: Path | None) -> dict[str, Camera]:
+    """Cameras of a calibration or rig file, by sensor."""
+    return {} if path is None else {name: each.camera for name, each in calibrations.load(path).sensors.items()}
 
 
 def _read(source: str, arguments: argparse.Namespace) -> list[sequences.Sequence]:
@@ -181,7 +220,7 @@ def _said(arguments: argparse.Namespace) -> list[str]:
     said = list(arguments.sources)
     if not math.isnan(arguments.distance_m[0]):
         said += ["--distance-m", *(f"{depth:g}" for depth in arguments.distance_m)]
-    for name in ("sensor", "mask", "camera", "out"):
+    for name in ("target", "calibration", "sensor", "mask", "camera", "out"):
         if value := getattr(arguments, name):
             said += [f"--{name}", str(value)]
     return said + (["--box", *map(str, arguments.box)] if arguments.box else [])
