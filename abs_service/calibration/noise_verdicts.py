@@ -76,8 +76,9 @@ def _boards(found: Found) -> list[Verdict]:
     share = f"{near:.1f} to {far:.1f} mm" if f"{near:.1f}" != f"{far:.1f}" else f"{far:.1f} mm"
     text = (
         f"The reference is known to {worst * 1e3:.2g} mm: the real distances are those of the board, whose pose its "
-        f"corners tell in the images of {' and '.join(seers)}. The offset cannot be known better. An error of 0.1 % in "
-        f"the focal length or the size of the squares would add {share}."
+        f"corners tell in the images of {' and '.join(seers)}. The offset cannot be known better, and "
+        f"errors of the cameras, of their poses in the rig and of the squares' size come on top: 0.1 % of focal length "
+        f"or size is {share}."
     )
     if worst < _WELL_KNOWN:
         return [Verdict(Level.GOOD, text)]
