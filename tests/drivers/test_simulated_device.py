@@ -161,7 +161,7 @@ def test_defaults_are_the_demonstration_rig() -> None:
 @pytest.mark.parametrize(
     ("uri", "complaint"),
     [
-        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'pair', 'sheet', 'strip', 'wall'\]"),
+        ("simulated://sofa", r"scene 'sofa' is none of \['board', 'pair', 'sheet', 'strip', 'target', 'wall'\]"),
         ("simulated://", r"scene '' is none of"),
         ("simulated://sheet?sead=1", r"unknown key 'sead'; allowed are \[.*'seed'"),
         ("simulated://sheet?seed=one", r"seed = 'one' must be a number from 0 to"),
