@@ -18,7 +18,7 @@ from calib.sequences.evidence import Evidence, gather, together
 from calib.sequences.parts import Parts
 from calib.sequences.placed import Placed
 from calib.sequences.reference import Kind, Reference
-from calib.sequences.selection import FOLDS, THOROUGH, Trial, attempt, choose, lean
+from calib.sequences.selection import FOLDS, THOROUGH, Trial, alike_from, attempt, choose, lean
 from calib.sequences.static import Static, reduce
 from calib.sequences.steps import Steps
 
@@ -103,16 +103,16 @@ def calibrate(
     references = _references(statics, targets, region, generator)
     offsets, steps = references[0].kind.tells_offset, _steps(statics)
     amplitudes = all(np.isfinite(static.brightness[static.still]).any() for static in statics)
-    evidence = _evidence(statics, references)
-    trials = _tried(of_image(offsets, amplitudes, steps), evidence, generator, say)
+    alike = alike_from(generator)
+    trials = _tried(of_image(offsets, amplitudes, steps), _evidence(statics, references), alike, say)
     law = choose(trials)
     references = _turned(statics, references, law.candidate, generator)
     evidence = _evidence(statics, references)
-    again = attempt(law.candidate, evidence, generator)
     everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
     own_degree = int(_by_sequence(statics) and distances[1] > _SEVERAL * distances[0])
-    places = _tried(of_places(law.candidate, statics[0].mean.shape, own_degree), evidence, generator, say)
+    maps = of_places(law.candidate, statics[0].mean.shape, own_degree)
+    again, *places = _tried([law.candidate, *maps], evidence, alike, say)
     chosen = choose([again, *places])
     say(f"fitting {chosen.candidate.name} to everything")
     of_all = law.candidate.fit(everything)
@@ -204,13 +204,13 @@ def _evidence(statics: Sequence[Static], references: Sequence[Reference]) -> lis
 def _tried(
     candidates: Sequence[Candidate],
     evidence: Sequence[Evidence],
-    generator: np.random.Generator,
+    alike: Callable[[], np.random.Generator],
     say: Callable[[str], None],
 ) -> list[Trial]:
     found = []
     for number, candidate in enumerate(candidates, start=1):
         say(f"trying {candidate.name} ({number} of {len(candidates)})")
-        found.append(attempt(candidate, evidence, generator))
+        found.append(attempt(candidate, evidence, alike()))
     return found
 
 

@@ -158,7 +158,7 @@ def trial(coefficients: int, *scores: float) -> Trial:
 
 
 def test_the_simplest_model_is_chosen_that_none_is_clearly_better_than() -> None:
-    poor, fair, rich = trial(1, 2.0, 2.1, 2.2), trial(3, 3.0, 3.1, 3.2), trial(9, 3.0, 3.101, 3.202)
+    poor, fair, rich = trial(1, 2.0, 2.1, 2.2), trial(3, 3.0, 3.1, 3.2), trial(9, 3.0, 3.1001, 3.2002)
     assert choose([poor, trial(2), fair, rich]) is fair
     assert choose([poor, fair, trial(9, 3.1, 3.2, 3.3)]).candidate.coefficients == 9
     with pytest.raises(NoiseError, match="varies too little"):

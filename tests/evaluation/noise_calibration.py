@@ -31,10 +31,10 @@ DISTANCES, MATERIALS, FRAMES = (0.7, 1.0, 1.3, 1.6, 1.9), (0.9, 0.5, 0.3), 30
 
 #: What the simulated time-of-flight heads err by systematically.
 HEADS = {
-    "tof, no systematic error": "sensors=tof&tof=44x36",
-    "tof, offset, dark and wiggling": "sensors=tof&tof=44x36&offset=0.02&dark=-8&wiggle=0.002",
-    "tof, and a fixed pattern of 3 mm": "sensors=tof&tof=44x36&offset=0.02&dark=-8&wiggle=0.002&pattern=0.003",
-    "structured light": "sensors=structured_light&structured_light=80x60",
+    "tof, no systematic error": "sensors=tof&tof=176x144",
+    "tof, offset, dark and wiggling": "sensors=tof&tof=176x144&offset=0.02&dark=-8&wiggle=0.002",
+    "tof, and a fixed pattern of 3 mm": "sensors=tof&tof=176x144&offset=0.02&dark=-8&wiggle=0.002&pattern=0.003",
+    "structured light": "sensors=structured_light&structured_light=320x240",
 }
 
 #: Bins of distance [mm] and the deviations [mm] that were measured in them with everything that moves left in.
