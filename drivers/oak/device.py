@@ -1,7 +1,7 @@
 """An OAK as a device: takes images out of queues, each in a thread of ours, and delivers them."""
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from calib.camera import Camera
@@ -82,8 +82,11 @@ class OakDevice:
         if stop is None:
             return
         self._clocks = {role: self._connection.host_times() for role in self._connection.queues}
+        before = self._threads
         self._threads = [
-            threading.Thread(target=self._pump, args=(role, stop), name=f"oak {role.sensor}/{role.stream}", daemon=True)
+            threading.Thread(
+                target=self._pump, args=(role, stop, before), name=f"oak {role.sensor}/{role.stream}", daemon=True
+            )
             for role in self._connection.queues
         ]
         self._flowing = len(self._threads)
@@ -94,9 +97,9 @@ class OakDevice:
     def stop(self) -> None:
         """See `drivers.device.Device.stop`."""
         self._delivery.end("stopped")
-        for thread in self._threads:
-            if thread.is_alive() and thread is not threading.current_thread():
-                thread.join()
+        # From within the sink it would wait for threads that wait for the sink; they end by themselves.
+        if threading.current_thread() not in self._threads:
+            _join(self._threads)
 
     def close(self) -> None:
         """See `drivers.device.Device.close`."""
@@ -116,8 +119,9 @@ class OakDevice:
             raise DeviceError(f"{self.info.uri}: {role.sensor}/{role.stream} delivers nothing for {timeout_s:g} s")
         return picture
 
-    def _pump(self, role: Role, stop: threading.Event) -> None:
+    def _pump(self, role: Role, stop: threading.Event, before: Sequence[threading.Thread]) -> None:
         """Delivers one stream until it is told to stop, or until nothing can come any more."""
+        _join(before)
         queue = self._connection.queues[role]
         try:
             queue.clear()
@@ -150,6 +154,12 @@ class OakDevice:
             self._delivery.begin_epoch()
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
         self._delivery.frame(replace(made, **times, epoch=self._delivery.epoch))
+
+
+def _join(threads: Sequence[threading.Thread]) -> None:
+    for thread in threads:
+        if thread.is_alive():
+            thread.join()
 
 
 def _stream(role: Role, picture: Picture, rate_hz: float) -> StreamInfo:
