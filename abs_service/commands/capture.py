@@ -15,26 +15,17 @@ from abs_service import announcements, config, keys, plugins
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
 from abs_service.capture import DeviceKeeper
-from abs_service.commands import participant
+from abs_service.commands import participant, rig_devices
 from abs_service.envelope import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from abs_service.exits import Exit
 from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
 from calib.camera import Camera
-from drivers.controls import Value
-from drivers.device import ControlError, Device
+from drivers.device import Device
 from drivers.opening import open_device
 
 #: Time that the devices have to close [s].
 CLOSE_S = 1.0
-
-
-class HeadError(Exception):
-    """A configuration that names a head which its device does not have."""
-
-
-class SettingError(Exception):
-    """A configuration that sets a control which its device does not have, or to what it does not take."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +66,7 @@ def _keeper(
     name: str, rig: config.ServiceConfig, source: str, crier: "Crier", publisher: FramePublisher, health: Health
 ) -> DeviceKeeper:
     def on_open(device: Device) -> None:
-        set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
+        rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
         crier.add_device(name, device)
 
     return DeviceKeeper(
@@ -88,25 +79,6 @@ def _keeper(
         health,
         time.monotonic_ns,
     )
-
-
-def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> None:
-    """Sets controls of an opened device.
-
-    Args:
-        device: the device.
-        controls: values by name.
-        where: file and table that they stand in, for messages.
-
-    Raises:
-        SettingError: an unknown control or a value that it does not take; names file, key, value and what is allowed.
-        DeviceError: the device does not answer.
-    """
-    for name, value in controls.items():
-        try:
-            device.controls.set(name, value)
-        except ControlError as error:
-            raise SettingError(f"{where}.{error}") from None
 
 
 def _watch(stop: threading.Event, keepers: list[DeviceKeeper], tick: Callable[[], None]) -> None:
@@ -164,13 +136,9 @@ class Crier:
         Raises:
             HeadError: the configuration names a head that the device does not have.
         """
-        for head, sensor in self._rig.heads(name).items():
-            if head not in device.cameras:
-                there_are = ", ".join(sorted(device.cameras))
-                raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
+        cameras = rig_devices.cameras(self._rig, name, device)
         with self._lock:
-            for head, sensor in self._rig.heads(name).items():
-                self._cameras[sensor] = self._rig.sensors[sensor].camera.applied_to(device.cameras[head])
+            self._cameras |= cameras
         self.cry()
 
     def cry(self) -> None:

@@ -17,7 +17,9 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from abs_service import announcements, capture, config, keys, watch
 from abs_service.capture import DeviceKeeper
 from abs_service.commands import capture as command
-from abs_service.commands.capture import Crier, HeadError, SettingError
+from abs_service.commands import rig_devices
+from abs_service.commands.capture import Crier
+from abs_service.commands.rig_devices import HeadError, SettingError
 from abs_service.envelope import MESSAGES
 from abs_service.health import Health, Level
 from abs_service.stamps import Speaker, WallClock
@@ -221,13 +223,13 @@ def test_a_control_is_set_at_every_opening_and_a_wrong_one_is_explained():
     info = ControlInfo("exposure_s", ControlKind.NUMBER, "s", 1e-5, 0.03)
     device = FakeDevice()
     device.controls = Controls([Control(info, lambda: 0.0, lambda value: held.update(exposure_s=value))])
-    command.set_controls(device, {"exposure_s": 0.01}, "rig.toml: devices.cam.controls")
+    rig_devices.set_controls(device, {"exposure_s": 0.01}, "rig.toml: devices.cam.controls")
     assert held == {"exposure_s": 0.01}
     expected = r"^rig\.toml: devices\.cam\.controls\.exposure_s = 5: must be a number from 1e-05 to 0\.03 s$"
     with pytest.raises(SettingError, match=expected):
-        command.set_controls(device, {"exposure_s": 5}, "rig.toml: devices.cam.controls")
+        rig_devices.set_controls(device, {"exposure_s": 5}, "rig.toml: devices.cam.controls")
     with pytest.raises(SettingError, match=r"controls\.gain: the device has no such control, it has: exposure_s"):
-        command.set_controls(device, {"gain": 5}, "rig.toml: devices.cam.controls")
+        rig_devices.set_controls(device, {"gain": 5}, "rig.toml: devices.cam.controls")
 
 
 def test_a_device_that_does_not_answer_when_it_is_set_is_tried_again(keep):

@@ -33,7 +33,7 @@ from abs_service.calibration.report import Level
 from abs_service.calibration.seeing import see
 from abs_service.calibration.shot_recording import ShotFileError, ShotRecording
 from abs_service.calibration.shots import SOUGHT, Shot
-from abs_service.commands import participant
+from abs_service.commands import participant, rig_devices
 from abs_service.stamps import Speaker, WallClock
 from calib.board.target import Target
 from calib.camera import Camera
@@ -41,10 +41,6 @@ from drivers.opening import open_device
 
 #: Least time between two kept shots [ns]; nobody changes a pose faster, and recordings are read at this pace.
 PAUSE_NS = 600_000_000
-
-
-class HeadError(Exception):
-    """A configuration that names a head which its device does not have."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -98,11 +94,7 @@ def opened(rig: config.ServiceConfig) -> Iterator[tuple[dict[str, Wired], dict[s
             device = open_device(rig.devices[name].uri, time.monotonic_ns)
             stack.callback(device.close)
             devices[name] = Wired(device, rig.heads(name))
-            for head, sensor in rig.heads(name).items():
-                if head not in device.cameras:
-                    there_are = ", ".join(sorted(device.cameras))
-                    raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
-                cameras[sensor] = rig.sensors[sensor].camera.applied_to(device.cameras[head])
+            cameras |= rig_devices.cameras(rig, name, device)
         yield devices, cameras
 
 

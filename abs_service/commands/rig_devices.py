@@ -1,0 +1,50 @@
+"""The opened devices of a rig as its configuration wants them: their controls, and the cameras of their sensors."""
+
+from collections.abc import Mapping
+
+from abs_service import config
+from calib.camera import Camera
+from drivers.controls import Value
+from drivers.device import ControlError, Device
+
+
+class HeadError(Exception):
+    """A configuration that names a head which its device does not have."""
+
+
+class SettingError(Exception):
+    """A configuration that sets a control which its device does not have, or to what it does not take."""
+
+
+def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> None:
+    """Sets controls of an opened device.
+
+    Args:
+        device: the device.
+        controls: values by name.
+        where: file and table that they stand in, for messages.
+
+    Raises:
+        SettingError: an unknown control or a value that it does not take; names file, key, value and what is allowed.
+        DeviceError: the device does not answer.
+    """
+    for name, value in controls.items():
+        try:
+            device.controls.set(name, value)
+        except ControlError as error:
+            raise SettingError(f"{where}.{error}") from None
+
+
+def cameras(rig: config.ServiceConfig, name: str, device: Device) -> dict[str, Camera]:
+    """The cameras of a device's sensors, by their names in the rig: the device's own with what the rig file says.
+
+    Raises:
+        HeadError: the configuration names a head that the device does not have.
+    """
+    found = {}
+    for head, sensor in rig.heads(name).items():
+        if head not in device.cameras:
+            there_are = ", ".join(sorted(device.cameras))
+            raise HeadError(f'sensors.{sensor}: device "{name}" has no head "{head}"; it has: {there_are}')
+        found[sensor] = rig.sensors[sensor].camera.applied_to(device.cameras[head])
+    return found
