@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = participant.stop_on_signals()
     end_ns = time.monotonic_ns() + arguments.limit_s * 1e9
     console = Console(stderr=True)
-    with opened(rig) as (devices, cameras):
+    with opened(rig, arguments.config) as (devices, cameras):
         speaker = Speaker(rig.name, WallClock())
         shots = LiveShots(
             devices,
@@ -80,12 +80,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def opened(rig: config.ServiceConfig) -> Iterator[tuple[dict[str, Wired], dict[str, Camera]]]:
-    """The devices of a rig, opened, and the camera of every sensor; closes them afterwards.
+def opened(rig: config.ServiceConfig, path: Path) -> Iterator[tuple[dict[str, Wired], dict[str, Camera]]]:
+    """The devices of a rig file, opened and set as it says, and the camera of every sensor; closes them afterwards.
 
     Raises:
         DeviceError: one cannot be opened.
-        HeadError: the configuration names a head that a device does not have.
+        SettingError, HeadError: the file names a control or a head that a device does not have.
     """
     devices: dict[str, Wired] = {}
     cameras: dict[str, Camera] = {}
@@ -93,6 +93,7 @@ def opened(rig: config.ServiceConfig) -> Iterator[tuple[dict[str, Wired], dict[s
         for name in rig.devices:
             device = open_device(rig.devices[name].uri, time.monotonic_ns)
             stack.callback(device.close)
+            rig_devices.set_controls(device, rig.devices[name].controls, f"{path}: devices.{name}.controls")
             devices[name] = Wired(device, rig.heads(name))
             cameras |= rig_devices.cameras(rig, name, device)
         yield devices, cameras

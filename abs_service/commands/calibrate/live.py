@@ -31,11 +31,11 @@ def streaming(
 
     Raises:
         ConfigError: the rig file cannot be used.
-        DeviceError, HeadError: a device cannot be opened, or lacks a head.
+        DeviceError, HeadError, SettingError: a device cannot be opened, or lacks a head or a control.
         ShotsError: no sensor makes images in which a board can be seen.
     """
     rig = config.load(path)
-    with opened(rig) as (devices, given):
+    with opened(rig, path) as (devices, given):
         known = {name: cameras.get(name, camera) for name, camera in given.items()}
         tolerance_ns = round(rig.synchronisation.tolerance_ms * 1e6)
         with LiveShots(devices, known, tolerance_ns, time.monotonic_ns, is_over) as shots:
