@@ -11,6 +11,9 @@ from enum import StrEnum
 from drivers.device import DeviceInfo
 from drivers.errors import DeviceError
 
+#: What to do when a user may not open a device on USB.
+UDEV_REMEDY = "abs-service devices --udev | sudo tee /etc/udev/rules.d/60-abs-service.rules  and plug it in again"
+
 
 class Availability(StrEnum):
     """Whether a device could be opened now, and if not, what kind of obstacle there is."""

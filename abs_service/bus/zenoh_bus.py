@@ -1,10 +1,8 @@
 """The bus between processes: zenoh."""
 
-import threading
 from collections.abc import Callable
-from concurrent.futures import Future
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 import zenoh
 from zenoh import ext
@@ -12,12 +10,11 @@ from zenoh import ext
 from abs_service import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
 from abs_service.bus.session import Role, open_session
+from drivers.callbacks import outside_daemons
 
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
 HEARTBEAT_S = 0.5
-
-T = TypeVar("T")
 
 _PRIORITIES = {
     Priority.REAL_TIME: zenoh.Priority.REAL_TIME,
@@ -78,7 +75,7 @@ class ZenohBus:
         def on_query(query: zenoh.Query) -> None:
             query.reply(key, payload(), encoding=f"{ENCODING};{message}")
 
-        return self._keep(_outside_daemons(lambda: self._session.declare_queryable(key, on_query)))
+        return self._keep(outside_daemons(lambda: self._session.declare_queryable(key, on_query)))
 
     def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.ask`."""
@@ -93,7 +90,7 @@ class ZenohBus:
             on_sample(self._sample(sample))
 
         key = self._key(pattern)
-        return self._keep(_outside_daemons(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
+        return self._keep(outside_daemons(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
 
     def show_alive(self, component: str) -> Subscription:
         """See `contract.Bus.show_alive`."""
@@ -108,7 +105,7 @@ class ZenohBus:
             on_change(component, sample.kind == zenoh.SampleKind.PUT)
 
         tokens, key = self._session.liveliness(), self._key(keys.live("**"))
-        return self._keep(_outside_daemons(lambda: tokens.declare_subscriber(key, on_token, history=True)))
+        return self._keep(outside_daemons(lambda: tokens.declare_subscriber(key, on_token, history=True)))
 
     def close(self) -> None:
         """Ends the session; may be called again."""
@@ -158,7 +155,7 @@ class _Announcement:
         self._key = key
         self._message = message
         self._last: bytes | None = None
-        self._queryable = _outside_daemons(lambda: session.declare_queryable(key, self._on_query))
+        self._queryable = outside_daemons(lambda: session.declare_queryable(key, self._on_query))
 
     def put(self, payload: bytes, attachment: bytes = b"") -> None:
         self._last = payload
@@ -177,25 +174,6 @@ class _Declared:
         # zenoh refuses to take back twice what it may do once.
         undeclare, self._undeclare = self._undeclare, _nothing
         undeclare()
-
-
-def _outside_daemons(declare: Callable[[], T]) -> T:
-    """Declares something with a callback, from a thread that is no daemon.
-
-    The thread in which zenoh calls back is a daemon if the declaring thread is one. The interpreter does not wait for
-    daemons when it ends: such a thread, awakened by the session's close, would return from Rust to an interpreter that
-    is gone, and abort the process ("FATAL: exception not rethrown").
-    """
-    declared: Future[T] = Future()
-
-    def run() -> None:
-        try:
-            declared.set_result(declare())
-        except Exception as error:
-            declared.set_exception(error)
-
-    threading.Thread(target=run, name="declare", daemon=False).start()
-    return declared.result()
 
 
 def _nothing() -> None:

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from drivers.device import DeviceError, SdkMissingError
+from drivers.discovery import UDEV_REMEDY
 
 #: Time to look for a device [ms]; depthai's own is ten seconds.
 SEARCH_MS = 1500
@@ -66,7 +67,3 @@ def _advice(message: str) -> str:
     if "x_link" in lower or "already" in lower or "booted" in lower:
         return f"the device does not answer or another program uses it ({message})"
     return message
-
-
-#: What lets people at this machine open the device.
-UDEV_REMEDY = "abs-service devices --udev | sudo tee /etc/udev/rules.d/60-abs-service.rules  and plug it in again"

@@ -9,7 +9,7 @@ from urllib.parse import urlsplit, urlunsplit
 from drivers.capabilities import SyncRole
 from drivers.clock import DeviceClock
 from drivers.device import DeviceError, DeviceInfo, SdkMissingError
-from drivers.discovery import Availability, Found, choose
+from drivers.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.oak import eeprom, library
 from drivers.oak.address import Address
 from drivers.oak.connection import CLOCK, Connection, synchronised
@@ -135,7 +135,7 @@ def _found(dai: Any, info: Any) -> Found:
     link = "network" if info.protocol == dai.XLinkProtocol.X_LINK_TCP_IP else "USB"
     who = DeviceInfo(f"oak://{serial}", "OAK", serial, link=link)
     if info.status == dai.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS:
-        return Found(who, Availability.NO_PERMISSION, "this user may not open it", library.UDEV_REMEDY)
+        return Found(who, Availability.NO_PERMISSION, "this user may not open it", UDEV_REMEDY)
     if info.state == dai.XLinkDeviceState.X_LINK_BOOTED:
         return Found(who, Availability.BUSY, "another program uses it", "end that program")
     return Found(who)

@@ -6,9 +6,6 @@ from typing import Any
 
 from drivers.device import DeviceError, SdkMissingError
 
-#: What lets people at this machine open the camera.
-UDEV_REMEDY = "abs-service devices --udev | sudo tee /etc/udev/rules.d/60-abs-service.rules  and plug it in again"
-
 
 def load() -> Any:
     """The module `pyrealsense2`.

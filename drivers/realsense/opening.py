@@ -6,7 +6,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from drivers.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
-from drivers.discovery import Availability, Found, choose
+from drivers.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.realsense import library
 from drivers.realsense.address import Address, parse
 from drivers.realsense.device import RealsenseDevice, Used
@@ -104,7 +104,7 @@ def _found(rs: Any, camera: Any) -> Found:
         camera.query_sensors()
     except RuntimeError as error:
         who = DeviceInfo("realsense://", "RealSense", "")
-        return Found(who, Availability.NO_PERMISSION, f"it cannot be read: {error}", library.UDEV_REMEDY)
+        return Found(who, Availability.NO_PERMISSION, f"it cannot be read: {error}", UDEV_REMEDY)
     return Found(info)
 
 

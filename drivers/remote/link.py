@@ -6,11 +6,11 @@ Keys are those of docs/subscribing.md: `abs/RIG/TOPIC`.
 import json
 import threading
 from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Any, TypeVar
+from typing import Any
 
 import zenoh
 
+from drivers.callbacks import outside_daemons
 from drivers.device import DeviceError
 from drivers.remote.address import Address
 
@@ -21,8 +21,6 @@ ANSWER_S = 3.0
 
 #: Takes topic, payload and attachment of a message, from a thread of zenoh's; must be quick.
 OnMessage = Callable[[str, bytes, bytes], None]
-
-T = TypeVar("T")
 
 
 class Link:
@@ -81,7 +79,7 @@ class Link:
             self._session.close()
 
     def _keep(self, declare: Callable[[], Any]) -> None:
-        declared = _outside_daemons(declare)
+        declared = outside_daemons(declare)
         with self._lock:
             self._declared.append(declared)
 
@@ -110,17 +108,3 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
             f"nothing answers at {address.endpoint} within {timeout_s:g} s; is `abs-service run` running there, or "
             "`abs-service capture` with --listen?"
         ) from error
-
-
-def _outside_daemons(declare: Callable[[], T]) -> T:
-    """Declares a callback from a thread that is no daemon: zenoh's thread would be one, too, and abort at the end."""
-    declared: Future[T] = Future()
-
-    def run() -> None:
-        try:
-            declared.set_result(declare())
-        except Exception as error:
-            declared.set_exception(error)
-
-    threading.Thread(target=run, name="declare", daemon=False).start()
-    return declared.result()
