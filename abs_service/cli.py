@@ -27,6 +27,7 @@ COMMANDS = {
     "devices": "what is attached, and what to do about what cannot be used",
     "calibrate": "where the sensors of a rig are, how they project and how they err",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
+    "evaluate": "measure how well it all works: the experiments of the paper and more, with reports",
     "import": "turn a folder of images into a recording",
     "recover": "repair recordings that were cut short",
     "capture": "only the devices: publish their images",

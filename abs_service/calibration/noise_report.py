@@ -2,11 +2,12 @@
 
 import numpy as np
 
-from abs_service.calibration import figures, noise_plots, noise_verdicts
+from abs_service.calibration import noise_plots, noise_verdicts
 from abs_service.calibration.claims import Claim
 from abs_service.calibration.noise import Found
-from abs_service.calibration.provenance import Provenance
-from abs_service.calibration.report import Column, Picture, Report, Section, Table, drawing, photo
+from abs_service.report import figures
+from abs_service.report.content import Column, Picture, Report, Section, Table, drawing, photo
+from abs_service.report.provenance import Provenance
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.reference import Kind
 

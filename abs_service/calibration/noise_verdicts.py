@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from abs_service.calibration.noise import Found
-from abs_service.calibration.report import Level, Verdict
+from abs_service.report.content import Level, Verdict
 from calib.sequences.candidates import Level as Places
 from calib.sequences.reference import Kind
 from calib.sequences.selection import NOTHING, Trial, extremes

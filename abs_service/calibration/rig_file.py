@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.calibration import toml_text
-from abs_service.calibration.provenance import Provenance
+from abs_service.report.provenance import Provenance
 from calib import pose
 from calib.camera import Camera
 

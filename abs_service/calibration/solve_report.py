@@ -4,10 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from abs_service.calibration import figures, solve_figures
-from abs_service.calibration.provenance import Provenance
-from abs_service.calibration.report import Column, Level, Picture, Report, Section, Table, Verdict, drawing
+from abs_service.calibration import solve_figures
 from abs_service.calibration.rig_file import Covariance, Residuals, RigCalibration, SensorCalibration
+from abs_service.report import figures
+from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
+from abs_service.report.provenance import Provenance
 from calib.solve.solution import Solution, ViewFit
 from calib.solve.support import coverage
 from calib.solve.verdict import Assessment

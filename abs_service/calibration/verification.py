@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from abs_service.calibration import verification_tables as tables
-from abs_service.calibration.provenance import Provenance
-from abs_service.calibration.report import Level, Report, Verdict
 from abs_service.calibration.rig_file import RigCalibration
 from abs_service.calibration.seeing import Seen
+from abs_service.report.content import Level, Report, Verdict
+from abs_service.report.provenance import Provenance
 from calib.recheck.changes import PairChange, pair_changes
 from calib.recheck.hypotheses import DistanceBias, Explanation, OwnFit, distance_bias, explained, own_fit, suspects
 from calib.recheck.stored import Stored, Views, usable

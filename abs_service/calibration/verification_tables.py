@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from abs_service.calibration import figures
-from abs_service.calibration.report import Column, Section, Table, drawing
 from abs_service.calibration.rig_file import RigCalibration
 from abs_service.calibration.seeing import Seen
+from abs_service.report import figures
+from abs_service.report.content import Column, Section, Table, drawing
 from calib.recheck.changes import PairChange
 from calib.recheck.hypotheses import DistanceBias, Explanation, OwnFit
 

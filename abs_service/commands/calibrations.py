@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from abs_service import config, plugins
-from abs_service.calibration.provenance import DataFile, Provenance
 from abs_service.calibration.rig_file import Covariance, Residuals, RigCalibration, SensorCalibration, read_covariance
 from abs_service.config.calibration import CovarianceTable, ProvenanceTable, SensorEvidence
+from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera
 
 #: What a camera table is put on when all of it is there.

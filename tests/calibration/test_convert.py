@@ -8,9 +8,9 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration import rig_file
-from abs_service.calibration.provenance import Provenance
 from abs_service.commands import calibrations
 from abs_service.exits import Exit
+from abs_service.report.provenance import Provenance
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from abs_service import config
 from abs_service.calibration import toml_text
-from abs_service.calibration.provenance import DataFile, Provenance
 from abs_service.calibration.rig_file import (
     Covariance,
     Residuals,
@@ -22,6 +21,7 @@ from abs_service.calibration.rig_file import (
     write,
 )
 from abs_service.commands import calibrations, plans
+from abs_service.report.provenance import DataFile, Provenance
 from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt

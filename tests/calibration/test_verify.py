@@ -11,10 +11,10 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration import rig_file, target_file
-from abs_service.calibration.provenance import Provenance
 from abs_service.calibration.seeing import Seen, see
 from abs_service.commands.calibrate import verify as command
 from abs_service.exits import Exit
+from abs_service.report.provenance import Provenance
 from calib.camera import Camera
 from drivers.replay import Recording
 from tests.calibration.simulated import Filmed, record, scene

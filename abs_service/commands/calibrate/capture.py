@@ -29,11 +29,11 @@ from abs_service.calibration import target_file
 from abs_service.calibration.collecting import Collector
 from abs_service.calibration.guide import Guide, LineGuide, LiveGuide, coverage_map
 from abs_service.calibration.live_shots import LiveShots, Wired
-from abs_service.calibration.report import Level
 from abs_service.calibration.seeing import see
 from abs_service.calibration.shot_recording import ShotFileError, ShotRecording
 from abs_service.calibration.shots import SOUGHT, Shot
 from abs_service.commands import participant, rig_devices
+from abs_service.report.content import Level
 from abs_service.stamps import Speaker, WallClock
 from calib.board.target import Target
 from calib.camera import Camera

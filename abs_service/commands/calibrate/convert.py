@@ -20,10 +20,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from abs_service import keys
-from abs_service.calibration import exchange, provenance, rig_file
+from abs_service.calibration import exchange, rig_file
 from abs_service.commands import calibrations
 from abs_service.exits import Exit
 from abs_service.problems import none_of
+from abs_service.report import provenance
 from calib.camera import Camera
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized

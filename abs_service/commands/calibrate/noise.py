@@ -34,20 +34,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from abs_service import plugins
-from abs_service.calibration import (
-    claims,
-    noise,
-    noise_report,
-    page,
-    placing,
-    provenance,
-    sequences,
-    target_file,
-    toml_text,
-)
-from abs_service.calibration.report import Report, to_json
+from abs_service.calibration import claims, noise, noise_report, placing, sequences, target_file, toml_text
 from abs_service.commands import calibrations, camera_file
 from abs_service.exits import Exit
+from abs_service.report import page, provenance
+from abs_service.report.content import Report, to_json
 from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.placed import Placed

@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from abs_service.calibration import page, provenance, rig_file, seeing, solve_report, target_file
+from abs_service.calibration import rig_file, seeing, solve_report, target_file
 from abs_service.calibration.rig_file import SensorCalibration
 from abs_service.calibration.seeing import Seen
 from abs_service.calibration.shot_sources import FolderShots, RecordingShots
@@ -20,6 +20,7 @@ from abs_service.commands import calibrations
 from abs_service.commands.calibrate import live
 from abs_service.exits import Exit
 from abs_service.problems import none_of
+from abs_service.report import page, provenance
 from calib.board import coverage
 from calib.camera import Camera
 from calib.solve.calibrate import calibrate

@@ -18,14 +18,15 @@ import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from abs_service.calibration import page, provenance, target_file, verification
-from abs_service.calibration.report import Report, to_json
+from abs_service.calibration import target_file, verification
 from abs_service.calibration.rig_file import RigCalibration
 from abs_service.calibration.seeing import Seen, see
 from abs_service.calibration.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots import Shot
 from abs_service.commands import calibrations, participant
 from abs_service.commands.calibrate import live
+from abs_service.report import page, provenance
+from abs_service.report.content import Report, to_json
 from calib.board.target import Target
 from calib.camera import Camera
 from drivers.replay import Recording
@@ -132,7 +133,7 @@ def _text(report: Report, path: Path) -> str:
         about = f"{verdict.about}: " if verdict.about else ""
         lines.append(f"{verdict.level!s:<9}{about}{verdict.text}")
         lines += [f"{'':<9}{verdict.advice}"] if verdict.advice else []
-    return "\n".join([*lines, f"wrote {path}", page.HEADLINES[report.level]])
+    return "\n".join([*lines, f"wrote {path}", report.wording.headlines[report.level]])
 
 
 def _said(arguments: argparse.Namespace) -> list[str]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service.calibration import figures, page, provenance
-from abs_service.calibration.report import Column, Level, Report, Section, Table, Verdict, drawing, photo, to_json
+from abs_service.report import figures, page, provenance
+from abs_service.report.content import Column, Level, Report, Section, Table, Verdict, drawing, photo, to_json
 
 NOON = 1_795_262_400_000_000_000
 ORIGIN = provenance.Provenance("abs-service calibrate rig x.toml", "2026-11-21T12:00:00Z")

@@ -7,17 +7,11 @@ from html import escape
 from importlib import resources
 from pathlib import Path
 
-from abs_service.calibration.provenance import Provenance
-from abs_service.calibration.report import Cell, Column, Level, Picture, Report, Section, Table, Verdict, to_json
+from abs_service.report.content import Cell, Column, Level, Picture, Report, Section, Table, Verdict, Wording, to_json
+from abs_service.report.provenance import Provenance
 
 #: A mark beside the word, so that nobody depends on seeing its colour.
 MARKS = {Level.GOOD: "✓", Level.DOUBTFUL: "!", Level.BAD: "✗"}
-
-HEADLINES = {
-    Level.GOOD: "Good: this can be relied on.",
-    Level.DOUBTFUL: "Doubtful: read what follows before you rely on this.",
-    Level.BAD: "Bad: do not use this.",
-}
 
 # The policy makes browsers refuse whatever would be fetched from elsewhere.
 _PAGE = """\
@@ -73,7 +67,7 @@ def write(report: Report, path: Path) -> tuple[Path, Path]:
 
 def to_html(report: Report) -> str:
     """The report as an HTML page."""
-    style = resources.files("abs_service.calibration").joinpath("page.css").read_text(encoding="utf-8")
+    style = resources.files("abs_service.report").joinpath("page.css").read_text(encoding="utf-8")
     parts = [
         _verdicts(report),
         _contents(report.sections),
@@ -92,15 +86,17 @@ def to_html(report: Report) -> str:
 def _verdicts(report: Report) -> str:
     if not report.verdicts:
         return ""
-    items = "\n".join(map(_verdict, report.verdicts))
-    headline = f'<p class="headline {report.level}">{_mark(report.level)} {HEADLINES[report.level]}</p>'
+    items = "\n".join(_verdict(verdict, report.wording) for verdict in report.verdicts)
+    headline = (
+        f'<p class="headline {report.level}">{_mark(report.level)} {escape(report.wording.headlines[report.level])}</p>'
+    )
     return f'<section aria-label="Verdict">\n{headline}\n<ul class="verdicts">\n{items}\n</ul>\n</section>'
 
 
-def _verdict(verdict: Verdict) -> str:
+def _verdict(verdict: Verdict, wording: Wording) -> str:
     about = f"<strong>{escape(verdict.about)}</strong> " if verdict.about else ""
     advice = f'<p class="advice">{escape(verdict.advice)}</p>' if verdict.advice else ""
-    word = f'<span class="word">{_mark(verdict.level)} {verdict.level}</span>'
+    word = f'<span class="word">{_mark(verdict.level)} {escape(wording.words[verdict.level])}</span>'
     return f'<li class="{verdict.level}">{word}<div><p>{about}{escape(verdict.text)}</p>{advice}</div></li>'
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import shlex
+import subprocess
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -66,6 +67,18 @@ def trace(
     date = datetime.fromtimestamp(clock() // 1_000_000_000, UTC).isoformat().replace("+00:00", "Z")
     command = " ".join(["abs-service", *map(_quoted, said)])
     return Provenance(command, date, data=tuple(fingerprint(path) for path in data))
+
+
+def commit(folder: Path) -> str:
+    """The commit that a folder is a checkout of, with a + if files were changed; "" if it is none."""
+    try:
+        said = [
+            subprocess.run(["git", *what], cwd=folder, capture_output=True, text=True, check=True).stdout.strip()
+            for what in (("rev-parse", "--short", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
+        ]
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return f"{said[0]}+" if said[1] else said[0]
 
 
 def fingerprint(path: Path) -> DataFile:

@@ -1,6 +1,6 @@
-"""What a calibration command found out, for people and programs: text, tables, pictures and verdicts.
+"""What a command found out, for people and programs: text, tables, pictures and verdicts.
 
-`abs_service.calibration.page` writes a report as an HTML page and as JSON with the same numbers.
+`abs_service.report.page` writes a report as an HTML page and as JSON with the same numbers.
 """
 
 import math
@@ -13,14 +13,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.calibration.provenance import Provenance
+from abs_service.report.provenance import Provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 class Level(IntEnum):
-    """How far a result can be relied on. The worst of a report is the exit code of its command."""
+    """How far a result can be relied on. The worst of a report is mostly the exit code of its command."""
 
     GOOD = 0
     DOUBTFUL = 1
@@ -28,6 +28,30 @@ class Level(IntEnum):
 
     def __str__(self) -> str:
         return self.name.lower()
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """What the levels are called.
+
+    Attributes:
+        words: one for each level, beside a verdict.
+        headlines: one sentence for each level that the worst of all verdicts may have.
+    """
+
+    words: Mapping[Level, str]
+    headlines: Mapping[Level, str]
+
+
+#: Of a calibration, which is for use.
+RELIANCE = Wording(
+    {level: str(level) for level in Level},
+    {
+        Level.GOOD: "Good: this can be relied on.",
+        Level.DOUBTFUL: "Doubtful: read what follows before you rely on this.",
+        Level.BAD: "Bad: do not use this.",
+    },
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +121,8 @@ class Report:
         verdicts: judgements, the most important first.
         sections: the evidence.
         values: what only programs want, by name; goes into the JSON form as it is.
+        wording: what the levels of the verdicts are called.
+        exit_code: of the command; None for the worst level of the verdicts.
     """
 
     title: str
@@ -104,10 +130,12 @@ class Report:
     verdicts: tuple[Verdict, ...]
     sections: tuple[Section, ...]
     values: Mapping[str, Any] = field(default_factory=dict)
+    wording: Wording = RELIANCE
+    exit_code: int | None = None
 
     @property
     def level(self) -> Level:
-        """The worst of all verdicts, which is also the exit code of the command; good if there are none."""
+        """The worst of all verdicts, which is mostly the exit code of the command, too; good if there are none."""
         return max((verdict.level for verdict in self.verdicts), default=Level.GOOD)
 
 
@@ -134,9 +162,9 @@ def to_json(report: Report) -> dict[str, Any]:
     """The report as plain data for `json.dumps`, numbers in full precision; NaN, which JSON lacks, is null."""
     return {
         "title": report.title,
-        "verdict": str(report.level),
-        "exit_code": int(report.level),
-        "verdicts": [_plain(asdict(verdict)) for verdict in report.verdicts],
+        "verdict": report.wording.words[report.level],
+        "exit_code": int(report.level if report.exit_code is None else report.exit_code),
+        "verdicts": [_verdict(verdict, report.wording) for verdict in report.verdicts],
         "values": _plain(report.values),
         "sections": [
             {"title": section.title, "blocks": [_block(block) for block in section.blocks]}
@@ -144,6 +172,10 @@ def to_json(report: Report) -> dict[str, Any]:
         ],
         "provenance": asdict(report.provenance),
     }
+
+
+def _verdict(verdict: Verdict, wording: Wording) -> dict[str, str]:
+    return asdict(verdict) | {"level": wording.words[verdict.level]}
 
 
 def _block(block: str | Table | Picture) -> dict[str, Any]:
