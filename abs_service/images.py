@@ -15,7 +15,8 @@ class DepthImage:
 
     Attributes:
         distance: radial distances (height, width) [m], NaN without return.
-        amplitude: amplitudes (height, width) in the sensor's unit; NaN where there is none.
+        amplitude: amplitudes (height, width) in the sensor's unit, or in their place what the sensor's noise model is
+            about: its own deviations [m] (`calib.noise.measured`); NaN where there is none.
     """
 
     distance: NDArray[np.float32]

@@ -13,6 +13,8 @@ from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
+from calib.noise.measured import Measured
+from calib.noise.per_pixel import PerPixel
 from calib.rig import Noise, Sensor
 from drivers.frame import Frame, Geometry, Kind
 
@@ -44,7 +46,7 @@ def kinds(noise: Noise) -> tuple[Kind, ...]:
     """What frames a sensor needs; the image is of the first one's exposure."""
     match noise:
         case DepthNoise():
-            return (Kind.DEPTH, Kind.AMPLITUDE) if noise.uses_amplitude else (Kind.DEPTH,)
+            return (Kind.DEPTH, *_beside(noise))
         case GaussianColor() | GaussianGrey():
             return (Kind.COLOR,)
         case GaussianBayer():
@@ -55,11 +57,21 @@ def kinds(noise: Noise) -> tuple[Kind, ...]:
             return (Kind.BINARY,)
 
 
+def _beside(noise: DepthNoise) -> tuple[Kind, ...]:
+    """What a depth noise model has to know of a measurement besides its distance."""
+    match noise:
+        case PerPixel():
+            return _beside(noise.law)
+        case Measured():
+            return (Kind.DEVIATION,)
+    return (Kind.AMPLITUDE,) if noise.uses_amplitude else ()
+
+
 def reader(sensor: Sensor) -> Reader:
     """The reader for what a sensor's noise model is about."""
     match sensor.noise:
-        case DepthNoise():
-            return _DepthReader(sensor)
+        case DepthNoise() as noise:
+            return _DepthReader(sensor, _beside(noise))
         case GaussianColor():
             return _ColorReader()
         case GaussianGrey():
@@ -73,7 +85,8 @@ def reader(sensor: Sensor) -> Reader:
 
 
 class _DepthReader:
-    def __init__(self, sensor: Sensor):
+    def __init__(self, sensor: Sensor, beside: tuple[Kind, ...]):
+        self._beside = beside
         # Radial distance per unit of what the frame holds, and what is added: conversion from z, less the depth terms.
         gain = 1 / (1 + sensor.depth_scale)
         self._per_z = (gain * sensor.camera.lookup.ray_length).astype(np.float32)
@@ -82,9 +95,17 @@ class _DepthReader:
 
     def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]
-        distance = depth.si() * (self._per_z if depth.geometry == Geometry.Z else self._per_radial) + self._offset
-        amplitude = frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full_like(distance, np.nan)
-        return DepthImage(distance, amplitude)
+        gain = self._per_z if depth.geometry == Geometry.Z else self._per_radial
+        distance = depth.si() * gain + self._offset
+        return DepthImage(distance, self._amplitude(frames, gain, distance.shape))
+
+    def _amplitude(
+        self, frames: Mapping[Kind, Frame], gain: NDArray[np.float32] | np.float32, shape: tuple[int, ...]
+    ) -> NDArray[np.float32]:
+        """What the noise model asks for besides the distance; a σ is one of the same length as the distance."""
+        if Kind.DEVIATION in self._beside:
+            return frames[Kind.DEVIATION].si() * gain
+        return frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full(shape, np.nan, np.float32)
 
 
 class _ColorReader:

@@ -41,7 +41,8 @@ def pixels_where(mask: NDArray[np.bool_]) -> Pixels:
 class DepthNoise(Protocol):
     """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a.
 
-    Arrays x may be (n,), one distance for each of n pixels, or (…, n), several; a is (n,).
+    For a sensor that tells the σ of each measurement itself, a is that [m]. Arrays x may be (n,), one distance for each
+    of n pixels, or (…, n), several; a is (n,).
     """
 
     @property

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from calib.noise.base import DepthNoise
 from calib.noise.constant import Constant
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.measured import Measured
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial, blocks
@@ -63,6 +64,7 @@ def own_of_pixels(seed: int = 4) -> PerPixel:
 MODELS: dict[str, DepthNoise] = {
     "constant": Constant(4e-3, -0.02),
     "gaussian_polynomial": GLOBAL,
+    "measured": Measured(5.0, 1e-3),
     "region_polynomial": varied()[1],
     "pixel_polynomial": varied()[0],
     "per_pixel": own_of_pixels(),
@@ -108,6 +110,7 @@ def any_model() -> st.SearchStrategy[DepthNoise]:
         st.builds(Constant, SIGMAS, st.floats(-0.2, 0.2)),
         polynomials(),
         maps(),
+        st.builds(Measured, factor=st.floats(1e-7, 1e-6), floor=SIGMAS),  # the strategies' amplitudes are no metres
         st.builds(StructuredLight, noise=st.floats(3e-4, 5e-3), step=st.floats(0, 5e-3), floor=st.floats(0, 5e-3)),
         st.builds(
             TofAmplitude,

@@ -19,6 +19,7 @@ TABLES = {
 DEPTH = [
     "constant",
     "gaussian_polynomial",
+    "measured",
     "per_pixel",
     "pixel_polynomial",
     "region_polynomial",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from abs_service import plugins
-from calib.noise import constant, fitting, gaussian_polynomial, structured_light, tof_amplitude
+from calib.noise import constant, fitting, gaussian_polynomial, measured, structured_light, tof_amplitude
 from calib.noise.base import NoiseError
 from calib.noise.quality import judge
 from calib.noise.samples import Samples, domain, from_images
@@ -70,6 +70,17 @@ def test_a_constant_is_found_again(seed):
     model = constant.fit(Samples(measured, x, np.full(5000, np.nan), *laws.somewhere(5000)))
     assert model.sigma == pytest.approx(4e-3, rel=0.05)
     assert model.offset == pytest.approx(-0.02, abs=3e-4)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_factor_and_floor_on_a_sensor_s_own_deviations_are_found_again(seed):
+    generator = np.random.default_rng(seed)
+    x, own = generator.uniform(0.5, 2, 20_000), np.exp(generator.uniform(np.log(5e-4), np.log(1e-2), 20_000))
+    truth = measured.Measured(2.5, 3e-3)
+    drawn = x + truth.deviation(x, own, laws.somewhere(20_000)) * generator.standard_normal(20_000)
+    model = measured.fit(Samples(laws.scattered(generator, drawn, 0.05), x, own, *laws.somewhere(20_000)))
+    assert model.factor == pytest.approx(2.5, rel=0.05)
+    assert model.floor == pytest.approx(3e-3, rel=0.05)
 
 
 FITS = {

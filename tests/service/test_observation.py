@@ -12,6 +12,8 @@ from calib.camera import Camera
 from calib.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.measured import Measured
+from calib.noise.per_pixel import PerPixel
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from drivers.frame import Frame, FrameSet, Geometry, Kind
@@ -103,6 +105,29 @@ def test_what_did_not_come_is_missing():
 
 def test_without_the_amplitude_that_its_noise_model_needs_a_sensor_is_missing():
     assert observe(depth(), color()).missing == ("tof", "light")
+
+
+def deviation(sensor: str) -> Frame:
+    data = np.full((4, 6), 2, "<u2")
+    data[0, 1] = 0
+    return Frame(sensor, "deviation", Kind.DEVIATION, data, "16UC1", 50, 60, 7, scale=1e-3, invalid=0)
+
+
+OWN = PerPixel(Measured(), np.zeros((1, 4, 6)), np.ones((4, 6)), np.array([0.5, 3.0]))
+
+
+@pytest.mark.parametrize("noise", [Measured(), OWN])
+@pytest.mark.parametrize(("sensor", "geometry"), [("tof", Geometry.RADIAL), ("light", Geometry.Z)])
+def test_the_sensor_s_own_deviations_come_with_its_distances_and_are_converted_as_they_are(noise, sensor, geometry):
+    rig = Rig("r", {sensor: replace(RIG.sensors[sensor], noise=noise, depth_offset=0.02, depth_scale=0.25)})
+    frames = [depth(sensor, geometry), deviation(sensor), amplitude()]
+    image = Observer(rig).observe(FrameSet(3, 50, {frame.key: frame for frame in frames})).images[sensor]
+    assert isinstance(image, DepthImage)
+    share = image.amplitude / (image.distance + 0.02 / 1.25)  # of the measurement, whatever the conversion
+    expected = 2 / np.arange(1000, 1024).reshape(4, 6)
+    expected[[0, 1], [1, 2]] = np.nan
+    np.testing.assert_allclose(share, expected, rtol=1e-5)
+    assert Observer(rig).observe(FrameSet(3, 50, {frame.key: frame for frame in (frames[0], frames[2])})).missing
 
 
 def test_an_empty_set_misses_everything():
