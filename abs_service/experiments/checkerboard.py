@@ -1,0 +1,24 @@
+"""E4 and E5 on a checker board: black and white are everywhere, so that the bias of the black nearly cancels."""
+
+import numpy as np
+
+from abs_service.experiments import flat_boards
+from abs_service.experiments.base import Context, Findings
+from abs_service.experiments.flat_board_report import Published
+from abs_service.experiments.flat_boards import QUICK, Board, Settings, places, squared_print
+
+__all__ = ["QUICK", "TITLE", "Settings", "run"]
+
+TITLE = "E4 and E5: a flat checker board under a bias that depends on the amplitude"
+
+#: Edge of a square [m].
+SQUARE_M = 0.05
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Tracks the board with NURBS and FlexPad, with the Euclidean fitness and the likelihood."""
+    across, down = places()
+    black = (np.floor(across / SQUARE_M) + np.floor(down / SQUARE_M)) % 2 == 0
+    published = Published((0.16, 0.11), (0.12, 0.09))
+    board = Board("checker board", squared_print(black), published, {"FlexPad": 0.16 / 0.12, "NURBS": 1.0})
+    return flat_boards.run(board, settings, context)

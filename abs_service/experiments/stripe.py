@@ -1,0 +1,21 @@
+"""E4 and E5 on a white board with a black centre, made to mislead: the bias of the black bends the board."""
+
+import numpy as np
+
+from abs_service.experiments import flat_boards
+from abs_service.experiments.base import Context, Findings
+from abs_service.experiments.flat_board_report import Published
+from abs_service.experiments.flat_boards import QUICK, WIDTH, Board, Settings, places, squared_print
+
+__all__ = ["QUICK", "TITLE", "Settings", "run"]
+
+TITLE = "E4 and E5: a flat white board with a black centre under a bias that depends on the amplitude"
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Tracks the board, the middle third of which is black, with NURBS and FlexPad and with both fitness functions."""
+    across, _ = places()
+    black = np.abs(across - WIDTH / 2) < WIDTH / 6
+    published = Published((0.92, 0.23), (0.24, 0.17))
+    board = Board("stripe board", squared_print(black), published, {"FlexPad": 3.8, "NURBS": 2.0})
+    return flat_boards.run(board, settings, context)

@@ -1,0 +1,38 @@
+"""E4 and E5 in seconds: what is flat stays flat for the likelihood, and not for the Euclidean fitness."""
+
+import numpy as np
+import pytest
+
+from abs_service.experiments import checkerboard, stripe
+from abs_service.experiments.base import Context
+from abs_service.experiments.flat_boards import from_plane
+from abs_service.experiments.static_walls import learnt
+from calib import pose
+
+
+def test_points_are_as_far_from_their_plane_as_they_were_put():
+    places = np.random.default_rng(1).uniform(-1, 1, (500, 2))
+    heights = np.where(np.arange(500) % 2, 0.02, -0.02)
+    points = pose.transform(pose.from_rotation_vector([0.4, -0.7, 0.2], [1, 2, 3]), np.column_stack([places, heights]))
+    assert from_plane(points) == pytest.approx(0.02, rel=0.01)
+    assert from_plane(points[::2]) == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_static_walls_tell_the_sensor_s_law():
+    noise = learnt("dark=-40", 2, seed=1)
+    assert noise.mu_amplitude == pytest.approx(-40, rel=0.01)
+    assert noise.sigma_amplitude == pytest.approx(9, rel=0.03)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("experiment", [checkerboard, stripe], ids=["checkerboard", "stripe"])
+def test_the_likelihood_keeps_a_flat_board_flat(experiment):
+    findings = experiment.run(experiment.QUICK, Context(0))
+    for goal in findings.goals:
+        assert goal.met, goal
+    bend = findings.values["FlexPad, hybrid, 20 frames"]["likelihood"]["mean"]
+    assert bend < 0.15
+    unevenness_mm = findings.values["NURBS, hybrid, 20 frames"]["likelihood"]["mean"]
+    assert unevenness_mm < 5
+    assert [section.title for section in findings.sections] == ["The scene", "Errors"]
