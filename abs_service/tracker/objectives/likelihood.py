@@ -33,7 +33,7 @@ class Settings:
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
-    misplacement_px: Annotated[float, Ge(0)] = 0.0
+    misplacement_px: Annotated[float, Ge(0)] = 0.2
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
