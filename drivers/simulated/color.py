@@ -70,7 +70,9 @@ class Color:
 
 def digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:
     """Adds noise of deviation `sigma` to levels of 256 and rounds to 8 bits."""
-    draws = np.frombuffer(generator.bytes(2 * levels.size), np.uint16)
+    # What `generator.bytes` would give, in a quarter of the time.
+    words = generator.integers(0, 2**64, size=-(-levels.size // 4), dtype=np.uint64)
+    draws = words.astype("<u8", copy=False).view("<u2")[: levels.size]
     return _quantize(levels.reshape(-1), draws, np.float32(sigma) * _NORMAL).reshape(levels.shape)
 
 

@@ -62,18 +62,16 @@ def read_whole(path):
         return schemas, messages, {attachment.name: attachment.data for attachment in reader.iter_attachments()}
 
 
-def test_a_subscriber_receives_nearly_all_estimates_for_half_a_minute_and_ctrl_c_leaves_a_complete_recording(
-    run, tmp_path
-):
+def test_a_subscriber_receives_nearly_all_estimates_and_ctrl_c_leaves_a_complete_recording(run, tmp_path):
     process, ear = run
     begin_ns = time.monotonic_ns()
-    wait_until(lambda: time.monotonic_ns() - begin_ns > 30_000_000_000, 40, "half a minute")
+    wait_until(lambda: time.monotonic_ns() - begin_ns > 10_000_000_000, 20, "ten seconds")
     received = [(t_ns, state) for t_ns, state in ear.states() if state.header.t_host_ns > begin_ns]
     numbers = [state.header.seq for _, state in received]
     share = len(set(numbers)) / (numbers[-1] - numbers[0] + 1)
     ages_ms = [(t_ns - state.header.t_host_ns) * 1e-6 for t_ns, state in received]
     p50, p99 = np.percentile(ages_ms, [50, 99])
-    print(f"{len(received)} states in 30 s, {share:.1%} of those published; age p50 {p50:.0f} ms, p99 {p99:.0f} ms")
+    print(f"{len(received)} states in 10 s, {share:.1%} of those published; age p50 {p50:.0f} ms, p99 {p99:.0f} ms")
     assert share >= 0.95
     assert all(state.status == TRACKING for _, state in received)
 

@@ -1,0 +1,57 @@
+"""What was lost of a run: by the numbers of what arrived and of what is recorded, and by what everybody counted."""
+
+from collections import Counter
+from collections.abc import Mapping
+
+from abs_service import keys
+from abs_service.experiments.live import recording
+from abs_service.experiments.live.measurement import Watched
+from abs_service.experiments.live.rig import REFERENCE, STREAMS, TRACKER
+
+#: How the names of counters begin that count something lost.
+_LOST = frozenset({"dropped", "malformed", "missing", "refused", "rejected", "skipped", "unused"})
+
+
+def untracked(seen: Watched) -> int:
+    """Exposures of the reference between the first and the last estimate watched that are in no estimate."""
+    used = [one.sensors[REFERENCE] for one in seen.arrivals if REFERENCE in one.sensors]
+    return recording.holes(used, used[0], used[-1])
+
+
+def partial(seen: Watched) -> int:
+    """Estimates that lack a sensor."""
+    return sum(len(one.sensors) < len({sensor for sensor, _ in STREAMS}) for one in seen.arrivals)
+
+
+def not_received(seen: Watched) -> int:
+    """Estimates that were published and did not arrive."""
+    seqs = [one.seq for one in seen.arrivals]
+    return recording.holes(seqs, seqs[0], seqs[-1])
+
+
+def unrecorded(seen: Watched) -> Mapping[str, int]:
+    """Messages between the first and the last estimate watched that are not in the recording, by topic."""
+    first, last = seen.arrivals[0], seen.arrivals[-1]
+    missing = {keys.state(TRACKER): recording.holes(seen.recorded[keys.state(TRACKER)], first.seq, last.seq)}
+    for sensor, stream in STREAMS:
+        topic = keys.image(sensor, stream)
+        missing[topic] = recording.holes(seen.recorded[topic], first.sensors[sensor], last.sensors[sensor])
+    return missing
+
+
+def counted(counts: Mapping[str, Mapping[str, int]]) -> Counter[str]:
+    """What the components say they lost, as `component: what.why`; zeros are left out.
+
+    Args:
+        counts: counters by component and name.
+    """
+    found = Counter(
+        {f"{component}: {name}": number for component, names in counts.items() for name, number in names.items()}
+    )
+    return Counter({name: number for name, number in found.items() if number and _is_loss(name.partition(": ")[2])})
+
+
+def _is_loss(counter: str) -> bool:
+    """Whether this counts something lost; what a device counts is lost unless it is delivered, or nobody wants it."""
+    words = counter.split(".")
+    return words[0] in _LOST or (words[0] == "device" and words[-1] not in {"frames", "unwanted"})

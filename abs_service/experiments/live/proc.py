@@ -1,0 +1,55 @@
+"""What Linux knows of a process: the time that it computed, and the memory that it holds (proc(5))."""
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+_TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a process has used.
+
+    Attributes:
+        cpu_s: time that its threads computed, in user and system mode, since it began [s].
+        resident_bytes: memory that it holds now, shared or not (RSS) [bytes].
+        private_bytes: what of it is its own and no file's (RSS without files and shared memory) [bytes].
+    """
+
+    cpu_s: float
+    resident_bytes: int
+    private_bytes: int
+
+
+def usage(pid: int) -> Usage:
+    """What a process has used so far.
+
+    Raises:
+        OSError: there is no such process.
+    """
+    stat = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8")
+    # The name of the program, in brackets, may hold anything; user and system time are fields 14 and 15 of all.
+    fields = stat.rpartition(")")[2].split()
+    _, resident, shared, *_ = map(int, Path(f"/proc/{pid}/statm").read_text(encoding="utf-8").split())
+    ticks = int(fields[11]) + int(fields[12])
+    return Usage(ticks * _TICK_S, resident * _PAGE_BYTES, (resident - shared) * _PAGE_BYTES)
+
+
+def children(pid: int) -> Mapping[str, int]:
+    """Process numbers of the commands of `abs-service` that a process has started, by command."""
+    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
+    found: dict[str, int] = {}
+    for child in map(int, listed):
+        command = _command(Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0"))
+        if command:
+            found[command] = child
+    return found
+
+
+def _command(words: Iterable[str]) -> str:
+    """What follows `abs_service` on a command line; "" if nothing does."""
+    words = iter(words)
+    return next(words, "") if "abs_service" in words else ""

@@ -1,0 +1,47 @@
+"""The rig that is measured: the demo rig with a colour camera of full size, on a port of its own."""
+
+import socket
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+#: What the rig and its tracker are called.
+NAME, TRACKER = "end_to_end", "sheet"
+#: Its streams: sensor and stream of each.
+STREAMS = (("tof", "depth"), ("tof", "amplitude"), ("color", "color"))
+#: The sensor whose exposures become estimates.
+REFERENCE = "tof"
+#: The simulated device: time of flight with 176 × 144 and colour with 640 × 480 pixels, both 30 Hz.
+URI = "simulated://sheet?seed={seed}&color=640x480"
+
+
+def write_rig(folder: Path, seed: int) -> Path:
+    """Writes the rig's configuration into a folder; its recordings go to `takes` beside it.
+
+    Args:
+        folder: an existing, empty folder.
+        seed: of the simulated motion and noise.
+    """
+    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    rig: dict[str, Any] = tomllib.loads(text)
+    rig["name"] = NAME
+    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{_free_port()}"
+    rig["devices"]["sim"]["uri"] = URI.format(seed=seed)
+    rig["record"] |= {"enabled": True, "directory": "takes"}
+    path = folder / "rig.toml"
+    path.write_text(tomli_w.dumps(rig), encoding="utf-8")
+    return path
+
+
+def endpoint_of(rig: Path) -> str:
+    """Where the rig of a configuration listens."""
+    return str(tomllib.loads(rig.read_text(encoding="utf-8"))["bus"]["endpoint"])
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
