@@ -25,8 +25,8 @@ LEAST_SHARE = 0.3
 #: … and so many pixels do.
 LEAST_PIXELS = 10
 
-#: Missing returns deeper inside the expected outline are holes in the measurement; nearer to it, the outline itself may
-#: have moved [m].
+#: Missing returns deeper inside the expected outline are holes in the measurement, with what is missing around them up
+#: to twice as far away; elsewhere, the outline itself may have moved [m].
 RIM_M = 0.015
 
 
@@ -76,7 +76,10 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
         behind = ~shown & (distance > near + AGREEMENT_M)
     foreground = before & (cv2.dilate(((labels > 0) & before).astype(np.uint8), np.ones((3, 3))) > 0)
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
-        hole = ~np.isfinite(distance) & (_depth_inside(expected) * near / focal > RIM_M)
+        missing = ~np.isfinite(distance)
+        hole = missing & (_depth_inside(expected) * near / focal > RIM_M)
+        if hole.any():
+            hole |= missing & (_depth_inside(~hole) * near / focal < 2 * RIM_M)
     away, steps = _extended(np.where(shown, near, np.nan))
     return Visibility(shown, foreground, hole, np.where(behind, steps * away / focal, 0).astype(np.float32))
 

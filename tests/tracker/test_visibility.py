@@ -133,9 +133,18 @@ def test_a_hole_inside_the_outline_is_told_from_missing_returns_at_its_rim():
     distance[:, 82:] = np.nan
     seen = classify(distance, PREDICTED, STRAIGHT.fx)
     assert seen.hole[30:42, 84:96].all()
-    assert not seen.hole[~EXPECTED].any()
-    assert not seen.hole[:15].any()
+    assert not seen.hole[:9].any()
     assert (seen.free_m == 0).all()
+
+
+def test_a_hole_goes_on_to_the_rim_that_it_reaches():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[~EXPECTED] = np.nan
+    distance[:, 82:] = np.nan
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert seen.hole[30:42, 84:104].all()  # the sheet ends at column 102.5
+    assert not seen.hole[:, 107:].any()
+    assert not seen.hole[:, :60].any()
 
 
 def test_a_prediction_that_nothing_agrees_with_classifies_nothing():

@@ -29,11 +29,15 @@ class Settings:
         misplacement_px: standard deviation of where on the mesh its appearance lies, in pixels of the sensor that
             looks: around edges of a print, pictures may deviate by so much more than their noise models say. About
             0.2 for sharp edges, such as those of a checker board.
+        outline_px: standard deviation of where the object seems to end, in pixels of the depth sensor that looks, about
+            0.5. It is for sheets, which end where their mesh does, and holds them against sliding along themselves; 0,
+            for bodies whose outline is only where they turn away, lets outlines say nothing.
     """
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
     misplacement_px: Annotated[float, Ge(0)] = 0.2
+    outline_px: Annotated[float, Interval(ge=0, le=3)] = 0.0
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
@@ -41,7 +45,7 @@ class Settings:
         return TermSum(
             synthesizer,
             [
-                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement)
+                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement, self.outline_px)
                 for sensor in rig.sensors.values()
             ],
         )

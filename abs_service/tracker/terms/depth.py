@@ -1,5 +1,7 @@
 """A depth sensor's measurements against synthesised distances."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,8 +10,10 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, stack, summarize
 from abs_service.tracker.terms.gradients import chained, color_rows, depth_rows
+from abs_service.tracker.terms.outline import Outline, Unknown
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
+from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.base import WINDOW_M, DepthNoise, render_texture
 
@@ -28,14 +32,24 @@ class DepthTerm:
         sensor: name of the sensor.
     """
 
-    def __init__(self, sensor: str, synthesizer: Synthesizer, vertices: int, noise: DepthNoise, bounds: Bounds):
+    def __init__(
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        vertices: int,
+        noise: DepthNoise,
+        bounds: Bounds,
+        outline: Callable[[Camera], Outline] = lambda camera: Unknown(),
+    ):
         self.sensor = sensor
         self._noise = noise
         self._bounds = bounds
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
+        self._outline = outline(self._view.camera)
         self._texture = np.zeros((0, 8), np.float32)
         self._obscured = np.zeros(0, np.bool_)
+        self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
         self._foreground = np.zeros((0, 0), np.float32)
 
@@ -49,9 +63,11 @@ class DepthTerm:
         distance = np.where(texture[1:-1, 1:-1, 3] > 0, texture[1:-1, 1:-1, 0], np.float32(np.nan))
         seen = classify(distance, self._view.render(predicted), self._view.camera.fx)
         self._foreground = np.where(seen.foreground, distance, np.nan)
+        doubtful = self._outline.observe(distance, seen, predicted)
         self._obscured = np.pad(seen.foreground | seen.hole, 1).ravel()
-        self._free_m = np.pad(seen.free_m, 1)
-        self._silence(texture, seen)
+        self._doubtful = np.pad(doubtful, 1).ravel()
+        self._free_m = np.pad(np.where(doubtful, np.float32(0), seen.free_m), 1)
+        self._silence(texture, seen, doubtful)
         self._texture = texture.reshape(-1, 8)
 
     def foreground(self) -> NDArray[np.float64]:
@@ -64,19 +80,25 @@ class DepthTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Nothing more: a depth sensor sees for itself what stands before the object."""
 
-    def _silence(self, texture: NDArray[np.float32], seen: Visibility) -> None:
+    def _silence(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
         """Puts constants into the texture (height + 2, width + 2, 8) where a pixel says nothing about distances.
 
-        Behind an occluder, and where returns are missing, a vertex costs what one that agrees costs on average, so that
-        it has no reason to move there or away. In free space it costs an outlier, and more the farther it is from the
-        object.
+        Behind an occluder, where returns are missing, and right beside an outline that has a term of its own, a vertex
+        costs what one that agrees costs on average, so that it has no reason to move there or away. In free space it
+        costs an outlier, and more the farther it is from the object.
         """
-        silent = seen.foreground | seen.hole
+        silent = seen.foreground | seen.hole | doubtful
         agreeing = float(np.median(texture[1:-1, 1:-1, 6][seen.object])) + 0.5 if seen.object.any() else 0.0
-        _write_constants(silent, seen.free_m, agreeing, self._bounds.outlier - self._bounds.inlier, texture)
+        _write_constants(
+            silent, self._free_m[1:-1, 1:-1], agreeing, self._bounds.outlier - self._bounds.inlier, texture
+        )
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
-        """−Σ_v log φ (population,); the outlier share is mixed in by the larger of the two densities."""
+        """−Σ_v log φ (population,) with what the outline says."""
+        return self._measured_cost(surface) + self._outline.cost(surface)
+
+    def _measured_cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Of the measurements; the outlier share is mixed in by the larger of the two densities."""
         seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
         _depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
@@ -84,7 +106,11 @@ class DepthTerm:
 
     def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
         """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""
-        parts = [self._linearize_measured(surface, jacobian), self._linearize_free(surface, jacobian)]
+        parts = [
+            self._linearize_measured(surface, jacobian),
+            self._linearize_free(surface, jacobian),
+            self._outline.linearize(surface, jacobian),
+        ]
         return stack(parts, jacobian.shape[2])
 
     def _linearize_measured(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
@@ -116,9 +142,11 @@ class DepthTerm:
         pixel = self._view.synthesize(surface).pixel[0]
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
         hidden = (pixel < 0) | self._obscured[pixel]
-        mean = -float(self.cost(surface)[0]) / residual.size
+        mean = -float(self._measured_cost(surface)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
-        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured | free, size, mean)
+        return summarize(
+            self.sensor, (pixel > 0) & ~(hidden | self._doubtful[pixel]), hidden, measured | free, size, mean
+        )
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
