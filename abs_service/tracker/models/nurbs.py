@@ -11,6 +11,7 @@ from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import binding, spline
 from abs_service.tracker.models.base import BOARD, ModelError, Surface
+from abs_service.tracker.models.patches import Patches
 from abs_service.tracker.sighting import Sighting
 from calib.jit import kernel
 
@@ -109,86 +110,18 @@ class Nurbs:
         tables = spline.rational_basis(u[order], w[order], degree, weights)
         local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
         self._basis = np.ascontiguousarray(local.transpose(0, 2, 1), np.float32)
+        self._patches = Patches(u[order], w[order], offset[order], weights, degree)
         self.mesh = replace(ordered, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
-        control = np.ascontiguousarray(thetas, np.float32).reshape(len(thetas), -1, 3)
-        vertices = np.empty((len(thetas), 3, len(self._offset)), np.float32)
-        normals = np.empty_like(vertices)
-        _deform(control, self._span_start, self._span_control, self._basis, self._offset, vertices, normals)
-        return Surface(vertices, normals)
+        return self._patches.deform(thetas)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
         result = np.zeros((len(self._offset), 3, len(theta)))
         _jacobian(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, result)
         return result
-
-
-@kernel
-def _deform(
-    control: NDArray[np.float32],
-    span_start: NDArray[np.int32],
-    span_control: NDArray[np.int32],
-    basis: NDArray[np.float32],
-    offset: NDArray[np.float32],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-) -> None:
-    """Eq. 8 for a population. Vertices are sorted by knot span, so that the loops over them share control points.
-
-    Args:
-        control: (population, control points, 3).
-        span_start: first vertex of every span, and the number of vertices, (spans + 1,).
-        span_control: control points of every span (spans, q).
-        basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
-        offset: o of eq. 7 (n,).
-        vertices, normals: results (population, 3, n).
-    """
-    n = offset.size
-    along = np.empty((6, n), np.float32)
-    u0, u1, u2 = along[0], along[1], along[2]
-    w0, w1, w2 = along[3], along[4], along[5]
-    for k in range(control.shape[0]):
-        p0, p1, p2 = vertices[k, 0], vertices[k, 1], vertices[k, 2]
-        n0, n1, n2 = normals[k, 0], normals[k, 1], normals[k, 2]
-        vertices[k] = 0
-        along[:] = 0
-        # Unsigned counters, and few arrays in each loop: else the compiler gives up proving that it may vectorise.
-        for s in range(span_control.shape[0]):
-            begin, end = np.uintp(span_start[s]), np.uintp(span_start[s + 1])
-            for q in range(span_control.shape[1]):
-                i = span_control[s, q]
-                x, y, z = control[k, i, 0], control[k, i, 1], control[k, i, 2]
-                r, r_u, r_w = basis[0, q], basis[1, q], basis[2, q]
-                for v in range(begin, end):
-                    p0[v] += r[v] * x
-                    p1[v] += r[v] * y
-                    p2[v] += r[v] * z
-                for v in range(begin, end):
-                    u0[v] += r_u[v] * x
-                    u1[v] += r_u[v] * y
-                    u2[v] += r_u[v] * z
-                for v in range(begin, end):
-                    w0[v] += r_w[v] * x
-                    w1[v] += r_w[v] * y
-                    w2[v] += r_w[v] * z
-        for v in range(n):
-            n0[v] = u1[v] * w2[v] - u2[v] * w1[v]
-        for v in range(n):
-            n1[v] = u2[v] * w0[v] - u0[v] * w2[v]
-        for v in range(n):
-            n2[v] = u0[v] * w1[v] - u1[v] * w0[v]
-        for v in range(n):
-            inverse = np.float32(1) / np.sqrt(n0[v] * n0[v] + n1[v] * n1[v] + n2[v] * n2[v] + np.float32(1e-20))
-            n0[v] *= inverse
-            n1[v] *= inverse
-            n2[v] *= inverse
-        for v in range(n):
-            p0[v] += n0[v] * offset[v]
-            p1[v] += n1[v] * offset[v]
-            p2[v] += n2[v] * offset[v]
 
 
 @kernel
@@ -208,7 +141,10 @@ def _jacobian(
 
     Args:
         control: (control points, 3).
-        span_start, span_control, basis, offset: as in `_deform`.
+        span_start: first vertex of every span, and the number of vertices, (spans + 1,).
+        span_control: control points of every span (spans, q).
+        basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
+        offset: o of eq. 7 (n,).
         result: zeros (n, 3, 3 · control points) to begin with.
     """
     u, w, normal, a, b = np.empty((5, 3))

@@ -1,5 +1,7 @@
 """Base splines of NURBS surfaces and their derivatives (eqs. 3–5)."""
 
+import math
+
 import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
@@ -41,6 +43,21 @@ def rational_basis(
     total, total_u, total_w = (b.sum(axis=1, keepdims=True) for b in (value, along_u, along_w))
     basis = value / total
     return basis, (along_u - basis * total_u) / total, (along_w - basis * total_w) / total
+
+
+def power_form(control_points: int, degree: int) -> NDArray[np.float64]:
+    """Base splines as polynomials, span by span, of a coordinate that runs from −½ to ½ in each.
+
+    Returns:
+        Coefficients (spans, degree + 1, degree + 1), by ascending power, of the splines that reach into the span.
+    """
+    spans = control_points - degree
+    middle = (np.arange(spans) + 0.5) / spans
+    taylor = [
+        base_splines(middle, control_points, degree, m) / (math.factorial(m) * spans**m) for m in range(degree + 1)
+    ]
+    reaching = np.arange(spans)[:, None] + np.arange(degree + 1)
+    return np.stack([np.take_along_axis(row, reaching, axis=1) for row in taylor], axis=1)
 
 
 def support(

@@ -191,15 +191,18 @@ def _depth_cost(
     Texture as `render_texture` makes it.
     """
     window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
+    unbounded = np.float32(1e30)
+    # No branches on what is measured: whether an outlier's bound is reached cannot be foreseen, and each wrong guess
+    # takes the processor as long as several samples.
     for k in range(pixel.shape[0]):
-        total = np.float32(0)
-        for v in range(pixel.shape[1]):
-            if pixel[k, v] < 0:
-                continue
-            texel = texture[pixel[k, v]]
-            t = texel[0] - distance[k, v]
+        total, pixels, distances = 0.0, pixel[k], distance[k]
+        for v in range(np.uintp(pixels.size)):
+            i = pixels[v]
+            texel = texture[np.uintp(max(i, 0))]
+            t = texel[0] - distances[v]
             inside = min(max(t, -window), window)
             e = (t - texel[1] - texel[2] * inside) * (texel[3] + inside * (texel[4] + inside * texel[5]))
             cost = np.float32(0.5) * e * e + texel[6] + texel[7] * inside
-            total += (min(cost, ceiling) if texel[3] > 0 else cost) + least
+            bounded = min(cost, ceiling if texel[3] > 0 else unbounded) + least
+            total += bounded if i >= 0 else np.float32(0)
         out[k] = total
