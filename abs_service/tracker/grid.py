@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
@@ -21,6 +22,10 @@ LARGEST_RELIEF_M = 0.03
 
 #: A triangle with a side longer than this many typical sides spans a jump between two surfaces.
 LONGEST_SIDE = 5.0
+
+#: A connected part of the mesh with a smaller share of its vertices is an island: the region's rim often shows some of
+#: what is behind the object, which no smooth surface could carry.
+LEAST_PART = 0.1
 
 
 def grid_mesh(sighting: Sighting) -> Mesh:
@@ -45,7 +50,7 @@ def grid_mesh(sighting: Sighting) -> Mesh:
     at_grid, deviation = _local_planes(pixels, distance, 0.75 * spacing)
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
-    faces = _without_jumps(positions, triangles(place))
+    faces = _without_islands(_without_jumps(positions, triangles(place)))
     chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
     used = np.unique(faces)
     if len(used) < LEAST_VERTICES:
@@ -126,3 +131,14 @@ def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> 
         return faces
     sides = np.linalg.norm(positions[faces] - positions[np.roll(faces, 1, axis=1)], axis=2)
     return faces[sides.max(axis=1) < LONGEST_SIDE * np.median(sides)]
+
+
+def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangles (m, 3) of the connected parts that are large enough."""
+    used, corners = np.unique(faces, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    links = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]]).T
+    graph = scipy.sparse.coo_array((np.ones(links.shape[1]), links), shape=(len(used), len(used)))
+    count, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    sizes = np.bincount(part, minlength=count)
+    return faces[sizes[part[corners[:, 0]]] >= LEAST_PART * len(used)]
