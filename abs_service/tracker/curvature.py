@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.terms.linearization import Linearization
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,8 +26,8 @@ def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
     """The sum of linearised parts as a quadratic: gradient Jᵀr and curvature JᵀJ of all rows."""
     gradient, curvature = np.zeros(dimension), np.zeros((dimension, dimension))
     for part in parts:
-        gradient += part.jacobian.T @ part.residual
-        curvature += part.jacobian.T @ part.jacobian
+        gradient[part.parameters] += part.jacobian.T @ part.residual
+        curvature[part.square] += part.jacobian.T @ part.jacobian
     return Quadratic(gradient, curvature)
 
 

@@ -5,10 +5,11 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.curvature import Quadratic, gauss_newton
-from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.models.base import DeformationModel, Moves, Surface
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
-from abs_service.tracker.terms.base import Linearization, SensorFit, inlier_share
+from abs_service.tracker.terms.base import SensorFit, inlier_share
+from abs_service.tracker.terms.linearization import Linearization, stack
 
 
 class Posterior:
@@ -32,7 +33,7 @@ class Posterior:
         self._stretch = stretch
         self._shape = shape
         self._motion = motion
-        self._linearized: list[tuple[NDArray[np.float64], Quadratic, Linearization, NDArray[np.float64]]] = []
+        self._linearized: list[tuple[NDArray[np.float64], Quadratic, list[Linearization], Moves]] = []
         self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
 
     def observe(self, observation: Observation) -> NDArray[np.float64]:
@@ -57,25 +58,30 @@ class Posterior:
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
         if not (self._linearized and np.array_equal(self._linearized[0][0], theta)):
-            surface, jacobian = self._model.deform(theta[None]), self._model.jacobian(theta)
-            sensed = self._objective.linearize(surface, jacobian)
-            quadratic = gauss_newton([sensed, *self._priors(surface, jacobian, theta)], self.dimension)
-            self._linearized = [(theta, quadratic, sensed, jacobian)]
+            surface, moves = self._model.deform(theta[None]), self._model.moves(theta)
+            sensed = [part for points in self._objective.linearize(surface, moves) for part in points.parts()]
+            quadratic = gauss_newton([*sensed, *self._priors(surface, moves, theta)], self.dimension)
+            self._linearized = [(theta, quadratic, sensed, moves)]
         return self._linearized[0][1]
 
-    def sensed(self, theta: NDArray[np.float64]) -> tuple[Linearization, NDArray[np.float64]]:
-        """What the sensors alone say near theta (dim,), and the derivatives (n, 3, dim) of the vertices there."""
+    def sensed(self, theta: NDArray[np.float64]) -> tuple[list[Linearization], Moves]:
+        """What the sensors alone say near theta (dim,), and how the vertices move there."""
         self.linearize(theta)
         return self._linearized[0][2:]
 
-    def by_offsets(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (m, k) of the sensors' residuals at theta (dim,) by offsets of the vertices (n, 3, k) [m]."""
-        return self._objective.linearize(self._model.deform(theta[None]), offsets).jacobian
+    def answers(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """JᵀJE (dim, k) at theta (dim,): the sensors' derivatives by Θ and by offsets of the vertices (n, 3, k) [m]."""
+        surface = self._model.deform(theta[None])
+        by_theta, by_offsets = (
+            stack(self._objective.linearize(surface, moves), moves.dimension).jacobian
+            for moves in (self._model.moves(theta), Moves.full(offsets))
+        )
+        return by_theta.T @ by_offsets
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""
-        surface, jacobian = self._model.deform(theta[None]), self._model.jacobian(theta)
-        return gauss_newton(self._priors(surface, jacobian, theta), self.dimension)
+        surface, moves = self._model.deform(theta[None]), self._model.moves(theta)
+        return gauss_newton(self._priors(surface, moves, theta), self.dimension)
 
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """How every contributing sensor agrees with theta (dim,); the last theta's are remembered."""
@@ -87,11 +93,9 @@ class Posterior:
         """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""
         return 1 - inlier_share(self.fits(theta))
 
-    def _priors(
-        self, surface: Surface, jacobian: NDArray[np.float64], theta: NDArray[np.float64]
-    ) -> list[Linearization]:
+    def _priors(self, surface: Surface, moves: Moves, theta: NDArray[np.float64]) -> list[Linearization]:
         return [
-            self._stretch.linearize(surface, jacobian),
+            *self._stretch.linearize(surface, moves),
             self._shape.linearize(theta),
             self._motion.linearize(theta),
         ]

@@ -58,10 +58,10 @@ class Tracker:
         self, theta: NDArray[np.float64], surface: Surface
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
-        sensed, jacobian = self._posterior.sensed(theta)
+        sensed, moves = self._posterior.sensed(theta)
         covariance = uncertainty.sandwich(posterior_covariance(self._posterior.linearize(theta)), sensed)
         own = uncertainty.along_normals(surface, self._own)
-        return covariance, uncertainty.propagated(jacobian, covariance) + own
+        return covariance, uncertainty.propagated(moves, covariance) + own
 
     def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.
@@ -73,9 +73,9 @@ class Tracker:
             return self._own
         surface = self.model.deform(theta[None])
         offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
-        sensed, jacobian = self._posterior.sensed(theta)
         inverse = posterior_covariance(self._posterior.linearize(theta))
-        response = -inverse @ (sensed.jacobian.T @ self._posterior.by_offsets(theta, offsets))
+        response = -inverse @ self._posterior.answers(theta, offsets)
+        jacobian = self.model.jacobian(theta)
         normals = surface.normals[0].T.astype(np.float64)
         return np.einsum("ni,nij,nj->n", normals, uncertainty.remaining(offsets, jacobian, response), normals)
 

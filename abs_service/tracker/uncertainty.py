@@ -17,35 +17,43 @@ D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. T
 once for a mesh, in the frame after the one that it was made from; its part along the normal goes with the vertices.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.terms.linearization import Linearization
 
 #: Least share of its noise that a residual keeps: below, rounding decides.
 LEAST_KEPT = 1e-6
 
 
-def sandwich(inverse: NDArray[np.float64], sensed: Linearization) -> NDArray[np.float64]:
+def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> NDArray[np.float64]:
     """Covariance (dim, dim) of Θ: Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ, where P = Σ⁻¹ − JᵀJ.
 
     Args:
         inverse: Σ (dim, dim), of the curvature of likelihood and priors.
-        sensed: r and J of the sensors.
+        sensed: r and J of the sensors, in parts.
     """
-    answer = sensed.jacobian @ inverse
-    kept = np.maximum(1 - np.einsum("md,md->m", answer, sensed.jacobian), LEAST_KEPT)
-    excess = sensed.residual**2 / kept - 1
-    return inverse + (answer.T * excess) @ answer
+    excess = np.zeros_like(inverse)
+    for part in sensed:
+        answer = part.jacobian @ inverse[part.square]
+        kept = np.maximum(1 - np.einsum("md,md->m", answer, part.jacobian), LEAST_KEPT)
+        excess[part.square] += (part.jacobian.T * (part.residual**2 / kept - 1)) @ part.jacobian
+    return inverse + inverse @ excess @ inverse
 
 
-def propagated(jacobian: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """D Σ Dᵀ (n, 3, 3) of every vertex, for derivatives (n, 3, dim) and the covariance Σ (dim, dim) of Θ."""
-    n, axes, dimension = jacobian.shape
-    # One product of matrices for all vertices: n small ones take several times as long.
-    weighted = (jacobian.reshape(-1, dimension) @ covariance).reshape(n, axes, dimension)
-    return weighted @ jacobian.transpose(0, 2, 1)
+def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """D Σ Dᵀ (n, 3, 3) of every vertex, for its derivatives D and the covariance Σ (dim, dim) of Θ."""
+    result = np.empty((len(moves.local), 3, 3))
+    for group, own in enumerate(moves.parameters):
+        vertices = np.flatnonzero(moves.group == group)
+        local = moves.local[vertices]
+        # One product of matrices for all vertices: n small ones take several times as long.
+        weighted = (local.reshape(-1, len(own)) @ covariance[np.ix_(own, own)]).reshape(local.shape)
+        result[vertices] = weighted @ local.transpose(0, 2, 1)
+    return result
 
 
 def own_offsets(surface: Surface, deviation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -23,8 +23,9 @@ from scipy.stats import chi2
 from abs_service.evaluation import TruthComparison
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
-from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.models.base import DeformationModel, Moves
 from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.uncertainty import propagated
 from abs_service.tracking import Tracking
 from drivers.simulated.simulation import Simulation
@@ -78,7 +79,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
         sensed = _sensed(known, _prior(frame, jacobian, 1 / simulation.rate_hz))
         within = [
             _inside(error, frame.estimate.vertex_covariance),
-            _inside(error, propagated(jacobian, known)),
+            _inside(error, propagated(Moves.full(jacobian), known)),
             _inside((sensed @ off)[None], (sensed @ known @ sensed.T)[None]),
             len(sensed),
             _inside(off[None], known[None]),
@@ -129,7 +130,8 @@ def _prior(frame: Frame, jacobian: NDArray[np.float64], interval_s: float) -> ND
     """Curvature (dim, dim) of the priors alone at an estimate, for the derivatives (n, 3, dim) of its vertices."""
     settings, model = default_plan().priors, frame.model
     surface = model.deform(frame.estimate.theta[None])
-    stretch = StretchPrior(model.mesh, settings.stretch).linearize(surface, jacobian).jacobian
+    parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, Moves.full(jacobian))
+    stretch = stack(parts, jacobian.shape[2]).jacobian
     motion = np.diag(1 / (model.scales * settings.speed * interval_s))
     rows = np.concatenate([stretch, model.prior, motion])
     return rows.T @ rows

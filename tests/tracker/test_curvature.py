@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.curvature import Quadratic, gauss_newton, newton_step, posterior_covariance, search_metric
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.terms.linearization import Linearization
 
 
 @pytest.fixture

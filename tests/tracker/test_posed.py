@@ -15,7 +15,7 @@ from abs_service.tracker.curvature import gauss_newton, search_metric
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
@@ -24,7 +24,7 @@ from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.priors import MotionPrior, StretchPrior
 from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.terms.linearization import Linearization, stack
 from abs_service.tracking import Tracking
 from calib import pose
 from drivers.simulated.rectangle import Rectangle
@@ -93,6 +93,9 @@ class Waves:
         result[:, 2] = np.sin(np.outer(self.mesh.vertices[:, 0], [40.0, 60.0]))
         return result
 
+    def moves(self, theta: np.ndarray) -> Moves:
+        return Moves.full(self.jacobian(theta))
+
 
 @pytest.mark.parametrize(
     ("shape", "known", "rigid"),
@@ -137,7 +140,8 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     motion.predict(0)
     jacobian = MODEL.jacobian(MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
-    stretch = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), jacobian).jacobian
+    parts = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), MODEL.moves(MODEL.rest))
+    stretch = stack(parts, 54).jacobian
     rows = np.concatenate([measured, stretch, MODEL.prior, motion.linearize(MODEL.rest).jacobian])
     metric = search_metric(gauss_newton([Linearization(np.zeros(len(rows)), rows)], 54))
     np.testing.assert_allclose(metric.T @ rows.T @ rows @ metric, np.eye(54), atol=1e-6)

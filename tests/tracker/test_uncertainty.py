@@ -9,9 +9,9 @@ from abs_service.tracker import uncertainty
 from abs_service.tracker.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.models import nurbs
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.sighting import Sighting
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.terms.linearization import Linearization
 from tests.evaluation.posterior import coverage
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
 from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
@@ -26,7 +26,7 @@ def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
     rows = generator.standard_normal((12, 4))
     covariance = posterior_covariance(gauss_newton([Linearization(np.zeros(12), rows)], 4))
     jacobian = generator.standard_normal((5, 3, 4))
-    found = uncertainty.propagated(jacobian, covariance)
+    found = uncertainty.propagated(Moves.full(jacobian), covariance)
     solutions = jacobian @ np.linalg.pinv(rows)  # what unit noise of every measurement does to a vertex
     np.testing.assert_allclose(found, solutions @ solutions.transpose(0, 2, 1), rtol=1e-6, atol=1e-9 * found.max())
 
@@ -69,7 +69,7 @@ def test_the_sandwich_is_that_of_the_definition(seed):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows + prior), np.float64)
     leverage = np.diag(rows @ inverse @ rows.T)
     expected = inverse @ (rows.T @ np.diag(residual**2 / (1 - leverage)) @ rows + prior) @ inverse
-    found = uncertainty.sandwich(inverse, Linearization(residual, rows))
+    found = uncertainty.sandwich(inverse, [Linearization(residual, rows)])
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
     assert np.linalg.eigvalsh(found).min() > 0
 
@@ -82,7 +82,7 @@ def test_the_sandwich_learns_the_noise_that_the_residuals_show(factor):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     fit = np.eye(200) - rows @ inverse @ rows.T
     draws = [fit @ (factor * generator.standard_normal(200)) for _ in range(100)]
-    mean = np.mean([uncertainty.sandwich(inverse, Linearization(residual, rows)) for residual in draws], axis=0)
+    mean = np.mean([uncertainty.sandwich(inverse, [Linearization(residual, rows)]) for residual in draws], axis=0)
     np.testing.assert_allclose(mean, factor**2 * inverse, atol=0.05 * factor**2 * np.diag(inverse).max())
 
 

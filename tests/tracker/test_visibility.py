@@ -204,8 +204,8 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     """The slope of what is linearised is that of the cost; depth itself says nothing about sliding along a plane."""
     term, model = term_before(board(STRAIGHT)), Rigid(MESH)
     theta = np.array([0, 0, 0, x, 0, 0])
-    jacobian = model.jacobian(theta)
-    linear = term.linearize(model.deform(theta[None]), jacobian)
+    moves = model.moves(theta)
+    linear = term.linearize(model.deform(theta[None]), moves)
     ahead, behind = (
         np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)
     )
@@ -216,7 +216,7 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     assert slope == pytest.approx(np.sign(x) * steps / FREE_SCALE_M, rel=0.25)
     assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
     within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
-    assert term.linearize(within, jacobian).residual.size == np.count_nonzero(term._residuals(within)[2])
+    assert term.linearize(within, moves).residual.size == np.count_nonzero(term._residuals(within)[2])
 
 
 def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():

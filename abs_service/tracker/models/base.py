@@ -25,6 +25,36 @@ class Surface:
     normals: NDArray[np.float32]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Moves:
+    """How points move with the parameters: all points of a group with the same few.
+
+    Attributes:
+        local: derivatives (n, 3, k) of the points by the k parameters of their group, contiguous.
+        group: group (n,) of every point.
+        parameters: parameters (groups, k) that move the points of each group.
+        dimension: number of all parameters.
+    """
+
+    local: NDArray[np.float64]
+    group: NDArray[np.int32]
+    parameters: NDArray[np.int64]
+    dimension: int
+
+    @classmethod
+    def full(cls, jacobian: NDArray[np.float64]) -> "Moves":
+        """Of points that all parameters move, with derivatives (n, 3, dim)."""
+        n, _, dimension = jacobian.shape
+        return cls(np.ascontiguousarray(jacobian), np.zeros(n, np.int32), np.arange(dimension)[None], dimension)
+
+    @property
+    def jacobian(self) -> NDArray[np.float64]:
+        """Derivatives (n, 3, dim) of the points by all parameters."""
+        result = np.zeros((len(self.local), 3, self.dimension))
+        np.put_along_axis(result, self.parameters[self.group][:, None], self.local, axis=2)
+        return result
+
+
 class ModelError(ValueError):
     """A model that cannot be made from these settings and this mesh."""
 
@@ -50,5 +80,9 @@ class DeformationModel(Protocol):
         ...
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the vertices by the parameters at theta (dim,), contiguous."""
+        """Derivatives (n, 3, dim) of the vertices by the parameters at theta (dim,)."""
+        ...
+
+    def moves(self, theta: NDArray[np.float64]) -> Moves:
+        """The same, without what is zero everywhere."""
         ...

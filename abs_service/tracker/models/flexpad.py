@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models import bends
 from abs_service.tracker.models.arc import arc
-from abs_service.tracker.models.base import BOARD, Surface
+from abs_service.tracker.models.base import BOARD, Moves, Surface
 from abs_service.tracker.rectangle import find_sheet
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracker.sighting import Sighting
@@ -117,6 +117,10 @@ class FlexPad:
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
         on_sheet = turn @ self._rotation @ self._slopes(theta[BENDS], theta[HEIGHT])
         return np.concatenate([on_sheet, pose.turning(theta[ROTATION], turned), shifts], axis=2)
+
+    def moves(self, theta: NDArray[np.float64]) -> Moves:
+        """As `jacobian`: every parameter moves every vertex."""
+        return Moves.full(self.jacobian(theta))
 
     def _slopes(self, bend: NDArray[np.float64], height: float) -> NDArray[np.float64]:
         """Derivatives (n, 3, 9) of places on the sheet, z pointing away, by bends (8,) and height map.

@@ -9,7 +9,7 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.arc import arc
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.sighting import Sighting
 from abs_service.tracker.strip import Strip, find_strip
 from calib import pose
@@ -115,6 +115,10 @@ class Gravity:
         arms = self.deform(theta[None]).vertices[0].T - gripper[:, 3]
         turning = pose.turning(theta[self.segments : self.segments + 3], arms)
         return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
+
+    def moves(self, theta: NDArray[np.float64]) -> Moves:
+        """As `jacobian`: every parameter moves every vertex."""
+        return Moves.full(self.jacobian(theta))
 
     def _slopes(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Derivatives (segments, columns) of the columns' places along (real) and across (imaginary) the gripper's x.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import binding, spline
-from abs_service.tracker.models.base import BOARD, ModelError, Surface
+from abs_service.tracker.models.base import BOARD, ModelError, Moves, Surface
 from abs_service.tracker.models.patches import Patches
 from abs_service.tracker.sighting import Sighting
 from calib.jit import kernel
@@ -106,6 +106,8 @@ class Nurbs:
         self.scales = np.ones_like(self.rest)
         self.prior = np.zeros((0, self.rest.size))
         self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
+        self._span = span[order]
+        self._span_parameters = (3 * self._span_control[:, :, None] + np.arange(3)).reshape(len(self._span_control), -1)
         self._offset = offset[order].astype(np.float32)
         tables = spline.rational_basis(u[order], w[order], degree, weights)
         local = np.take_along_axis(np.stack(tables), self._span_control[span[order]][None], axis=2)
@@ -119,13 +121,17 @@ class Nurbs:
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
-        result = np.zeros((len(self._offset), 3, len(theta)))
-        _jacobian(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, result)
-        return result
+        return self.moves(theta).jacobian
+
+    def moves(self, theta: NDArray[np.float64]) -> Moves:
+        """The same: the control points of its knot span move a vertex."""
+        local = np.empty((len(self._offset), 3, self._span_parameters.shape[1]))
+        _moves(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, local)
+        return Moves(local, self._span, self._span_parameters, len(theta))
 
 
 @kernel
-def _jacobian(
+def _moves(
     control: NDArray[np.float64],
     span_start: NDArray[np.int32],
     span_control: NDArray[np.int32],
@@ -145,7 +151,7 @@ def _jacobian(
         span_control: control points of every span (spans, q).
         basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
         offset: o of eq. 7 (n,).
-        result: zeros (n, 3, 3 · control points) to begin with.
+        result: derivatives (n, 3, 3 · q) by the control points of each vertex's span.
     """
     u, w, normal, a, b = np.empty((5, 3))
     for s in range(span_control.shape[0]):
@@ -166,7 +172,7 @@ def _jacobian(
                 a[i] = (w[j] * normal[k] - w[k] * normal[j]) * inverse
                 b[i] = (normal[j] * u[k] - normal[k] * u[j]) * inverse
             for q in range(span_control.shape[1]):
-                first = 3 * span_control[s, q]
+                first = 3 * q
                 for i in range(3):
                     turn = -offset[v] * (basis[1, q, v] * a[i] + basis[2, q, v] * b[i])
                     for j in range(3):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import BOARD, Surface
+from abs_service.tracker.models.base import BOARD, Moves, Surface
 from abs_service.tracker.sighting import Sighting
 from calib import pose
 
@@ -64,3 +64,7 @@ class Rigid:
         turned = pose.transform(pose.from_rotation_vector(theta[:3], (0, 0, 0)), self._arms)
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
         return np.concatenate([pose.turning(theta[:3], turned), shifts], axis=2)
+
+    def moves(self, theta: NDArray[np.float64]) -> Moves:
+        """As `jacobian`: every parameter moves every vertex."""
+        return Moves.full(self.jacobian(theta))

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Linearization, SensorFit, Term, stack
+from abs_service.tracker.terms.base import SensorFit, Term
+from abs_service.tracker.terms.linearization import Linear
 
 
 class Objective(Protocol):
@@ -23,12 +24,12 @@ class Objective(Protocol):
         """Cost (population,) of every deformed mesh; lower explains the measurements better."""
         ...
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
-        """Normalised residuals of a population of one, and their derivatives by the parameters.
+    def linearize(self, surface: Surface, moves: Moves) -> list[Linear]:
+        """Normalised residuals of a population of one, and their derivatives.
 
         Args:
             surface: the deformed mesh.
-            jacobian: derivatives (n, 3, dim) of its vertices by the parameters.
+            moves: how its vertices move with the parameters.
         """
         ...
 
@@ -62,9 +63,9 @@ class TermSum:
             total += term.cost(surface)
         return total
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> list[Linear]:
         """All sensors' normalised residuals and their derivatives."""
-        return stack([term.linearize(surface, jacobian) for term in self._active], jacobian.shape[2])
+        return [term.linearize(surface, moves) for term in self._active]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """How every contributing sensor agrees with a population of one."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from calib.camera import Camera
 
 
@@ -59,6 +59,10 @@ class View(Protocol):
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
+        ...
+
+    def follow(self, surface: Surface, moves: Moves) -> Moves:
+        """How the samples of a population of one move, from how its vertices do."""
         ...
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.raster import Raster
@@ -120,6 +120,10 @@ class DenseView:
         """Values (n, …) of the vertices, interpolated at the samples (m, …) of a population of one."""
         samples, _ = self._render(surface)
         return np.einsum("mi,mi...->m...", samples.weights[0], values[self._faces[samples.face[0]]])
+
+    def follow(self, surface: Surface, moves: Moves) -> Moves:
+        """As the vertices, interpolated."""
+        return Moves.full(self.spread(surface, moves.jacobian))
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (population, n) of the vertices, interpolated at the samples (population, m)."""

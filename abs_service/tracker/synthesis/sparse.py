@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sampling import sampler
@@ -128,6 +128,10 @@ class SparseView:
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values
+
+    def follow(self, surface: Surface, moves: Moves) -> Moves:
+        """As the vertices."""
+        return moves
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves."""

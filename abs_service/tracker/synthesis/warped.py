@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import ModelError, Surface
+from abs_service.tracker.models.base import ModelError, Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from calib.camera import Camera
@@ -155,6 +155,10 @@ class _SharedView:
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""
         return values
+
+    def follow(self, surface: Surface, moves: Moves) -> Moves:
+        """As the vertices."""
+        return moves
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves."""

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import BeamReading, Image
-from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import Bounds, Linearization, SensorFit
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.terms.base import Bounds, SensorFit
+from abs_service.tracker.terms.linearization import PointLinearization
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.binary import LightBarrier
@@ -46,9 +47,9 @@ class BarrierTerm:
         """−log P(reading | does the mesh cross the beam) (population,)."""
         return self._costs[self._crossing(surface).astype(int)]
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
         """Nothing: the cost is constant but for a step, which the search has to find."""
-        return Linearization(np.zeros(0), np.zeros((0, jacobian.shape[2])))
+        return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), moves)
 
     def fit(self, surface: Surface) -> SensorFit:
         """One sample, which agrees or not."""

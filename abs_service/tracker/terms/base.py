@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import Image
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.terms.linearization import Linear
 from calib.noise.truncation import deviation_within
 
 #: Residuals up to this many deviations count as explained by the sensor's noise.
@@ -28,27 +29,6 @@ class Bounds:
     inlier: float
     uniform: float
     outlier: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Linearization:
-    """Normalised residuals and their derivatives by the parameters: the cost is about ½‖residual + jacobian δΘ‖².
-
-    Attributes:
-        residual: (m,).
-        jacobian: (m, dim).
-    """
-
-    residual: NDArray[np.float64]
-    jacobian: NDArray[np.float64]
-
-
-def stack(parts: Sequence[Linearization], dimension: int) -> Linearization:
-    """All residuals of several linearisations below each other."""
-    return Linearization(
-        np.concatenate([np.zeros(0), *(part.residual for part in parts)]),
-        np.concatenate([np.zeros((0, dimension)), *(part.jacobian for part in parts)]),
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +121,7 @@ class Term(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> Linear:
         """The inliers' normalised residuals around a deformed mesh; arguments as in `Objective`."""
         ...
 

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import ChannelImage, Image
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import chained, channel_slopes
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
+from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NO_WIDENING, NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
@@ -96,7 +97,7 @@ class ChannelTerm:
         _channel_cost(seen.pixel, self._texture, seen.attributes, *self._widening, self._bounds.outlier, uniform, out)
         return self._view.balance(out, surface, uniform)
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
         """The inliers' normalised residuals, and how they change with the parameters.
 
         What light makes of a turning surface changes slower than its texture, and is left to the search.
@@ -105,8 +106,8 @@ class ChannelTerm:
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         slopes = self._slopes(surface)[use] * inverse[use, None]
-        rows = slopes[:, None] @ self._view.camera.projection_jacobian(vertices)
-        return Linearization(residual[use], chained(rows, use, self._view.spread(surface, jacobian)))
+        rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices))[:, 0]
+        return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, moves))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

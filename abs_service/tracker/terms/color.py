@@ -4,10 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import ColorImage, Image
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, summarize
-from abs_service.tracker.terms.gradients import chained, color_rows
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import color_rows
+from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel
@@ -75,14 +76,15 @@ class ColorTerm:
         _color_cost(seen.pixel, self._texture, seen.attributes, *noise, out)
         return self._view.balance(out, surface, uniform)
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
         rows = color_rows(self._image, self._view.camera, vertices) * inverse
-        return Linearization(residual[use].ravel(), chained(rows, use, self._view.spread(surface, jacobian)))
+        points = np.repeat(np.flatnonzero(use), residual.shape[1])
+        return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, self._view.follow(surface, moves))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

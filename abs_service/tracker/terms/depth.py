@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import DepthImage, Image
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, Linearization, SensorFit, stack, summarize
-from abs_service.tracker.terms.gradients import chained, color_rows, depth_rows
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import color_rows, depth_rows
+from abs_service.tracker.terms.linearization import PointLinearization, Together
 from abs_service.tracker.terms.outline import Outline, Unknown
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
@@ -104,25 +105,22 @@ class DepthTerm:
         _depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> Together:
         """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""
-        parts = [
-            self._linearize_measured(surface, jacobian),
-            self._linearize_free(surface, jacobian),
-            self._outline.linearize(surface, jacobian),
-        ]
-        return stack(parts, jacobian.shape[2])
+        samples = self._view.follow(surface, moves)
+        parts = (self._linearize_measured(surface, samples), self._linearize_free(surface, samples))
+        return Together((*parts, self._outline.linearize(surface, moves)), moves.dimension)
 
-    def _linearize_measured(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def _linearize_measured(self, surface: Surface, samples: Moves) -> PointLinearization:
         residual, inverse_deviation, measured = self._residuals(surface)
         use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
         vertices, normals = (
             self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, surface.normals[0].T)
         )
         rows = depth_rows(vertices, normals, self._view.camera.center) * inverse_deviation[use, None]
-        return Linearization(residual[use], chained(rows[:, None], use, self._view.spread(surface, jacobian)))
+        return PointLinearization(residual[use], rows, np.flatnonzero(use), samples)
 
-    def _linearize_free(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def _linearize_free(self, surface: Surface, samples: Moves) -> PointLinearization:
         """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
 
         The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
@@ -133,8 +131,8 @@ class DepthTerm:
         vertices = self._view.spread(surface, surface.vertices[0].T)[out]
         distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
-        rows = color_rows(distances, self._view.camera, vertices) * weight[:, None, None]
-        return Linearization(away[out] * weight, chained(rows, out, self._view.spread(surface, jacobian)))
+        rows = color_rows(distances, self._view.camera, vertices)[:, 0] * weight[:, None]
+        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples)
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

@@ -73,19 +73,6 @@ def channel_slopes(
     return np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
 
 
-def chained(rows: NDArray[np.float64], chosen: NDArray[np.bool_], moves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Derivatives (m · channels, dim) of residuals by the parameters, by the chain rule.
-
-    Args:
-        rows: derivatives (m, channels, 3) of the residuals of m samples by their positions.
-        chosen: which of the samples (n,) they are.
-        moves: derivatives (n, 3, dim) of all samples' positions by the parameters.
-    """
-    result = np.empty((rows.shape[0] * rows.shape[1], moves.shape[2]))
-    _chain(np.ascontiguousarray(rows), np.flatnonzero(chosen), np.ascontiguousarray(moves), result)
-    return result
-
-
 def _bell() -> NDArray[np.float64]:
     """Weights of a neighbourhood: a Gaussian of one pixel."""
     return np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
@@ -143,18 +130,3 @@ def _color_rows(
                     down += (i - reach) * value
             for k in range(3):
                 rows[v, c, k] = right * projection[v, 0, k] + down * projection[v, 1, k]
-
-
-@kernel
-def _chain(
-    rows: NDArray[np.float64], samples: NDArray[np.int64], moves: NDArray[np.float64], result: NDArray[np.float64]
-) -> None:
-    """See `chained`; a library multiplies thousands of 3 × 3 by 3 × dim matrices ten times as slowly."""
-    channels = rows.shape[1]
-    for m in range(samples.size):
-        move = moves[samples[m]]
-        for c in range(channels):
-            x, y, z = rows[m, c, 0], rows[m, c, 1], rows[m, c, 2]
-            row = result[m * channels + c]
-            for d in range(row.size):
-                row[d] = x * move[0, d] + y * move[1, d] + z * move[2, d]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
-from abs_service.tracker.terms.base import Linearization
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.terms.linearization import Linearization, PointLinearization
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
 from calib.jit import kernel
@@ -40,8 +40,8 @@ class Outline(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
-        """Normalised residuals of a population of one and their derivatives, for derivatives (n, 3, dim)."""
+    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
+        """Normalised residuals of a population of one and their derivatives, from how the vertices move."""
         ...
 
 
@@ -56,9 +56,9 @@ class Unknown:
         """Nothing."""
         return 0.0
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
+    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
         """No rows."""
-        return Linearization(np.zeros(0), np.zeros((0, jacobian.shape[2])))
+        return Linearization(np.zeros(0), np.zeros((0, moves.dimension)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,15 +120,16 @@ class RimOutline:
         residual = self._look_up(self._points(surface))[0] / self._deviation
         return 0.5 * np.sum(np.minimum(residual**2, FARTHEST**2), axis=1)
 
-    def linearize(self, surface: Surface, jacobian: NDArray[np.float64]) -> Linearization:
-        """Residuals of what is near the outline, and their derivatives; jacobian (n, 3, dim)."""
+    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
+        """Residuals of what is near the outline, and their derivatives."""
         points = self._points(surface)
         residual, slopes = (values[0] / self._deviation for values in self._look_up(points))
         use = np.abs(residual) < FARTHEST
         rows = np.einsum("vi,vij->vj", slopes[use], self._camera.projection_jacobian(points[0, use]))
-        beyond = self._beyond[use, None, None]
-        moves = (1 + beyond) * jacobian[self._rim.outer[use]] - beyond * jacobian[self._rim.inner[use]]
-        return Linearization(residual[use], np.einsum("vj,vjd->vd", rows, moves))
+        beyond = self._beyond[use, None]
+        ends = ((1 + beyond) * rows, self._rim.outer), (-beyond * rows, self._rim.inner)
+        parts = [PointLinearization(residual[use], slope, of[use], moves).jacobian for slope, of in ends]
+        return Linearization(residual[use], parts[0] + parts[1])
 
     def _points(self, surface: Surface) -> NDArray[np.float64]:
         """Where the object ends (population, k, 3) [m]."""
