@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 Grid = NDArray[np.float64]
 
+#: Over so short a time a surface moves on a straight line, as far as a mesh on it can tell [ns].
+STRAIGHT_NS = 250_000_000
 #: Truths kept while their estimate is still being searched for.
 KEPT = 256
 
@@ -33,7 +35,8 @@ class TruthComparison:
     A vertex belongs to the material point that was nearest to it when the mesh was made. From then on it is compared
     with where that point went (vertex error), and with the surface wherever it is (surface error, never larger).
     Point-set methods look good on the second and poor on the first. Of several surfaces, the mesh belongs to the one
-    that it was nearest to when it was made.
+    that it was nearest to when it was made. If the truth of just that moment was lost on the way, the surface was where
+    it passed between the truths before and after.
     """
 
     def __init__(self) -> None:
@@ -67,10 +70,22 @@ class TruthComparison:
 
     def _own(self, t_host_ns: int) -> tuple[Grid | None, NDArray[np.float64]]:
         """The grid of the mesh's own surface, None where it is unknown, and the vertices' places (n, 2) on it."""
-        if self._material is None and self._rest is not None and self._rest[0] in self._truths:
-            self._material = _nearest(self._rest[1], self._truths[self._rest[0]])
+        if self._material is None and self._rest is not None and (then := self._at(self._rest[0])):
+            self._material = _nearest(self._rest[1], then)
         surface, places = self._material or (0, np.empty((0, 2)))
         return self._truths.get(t_host_ns, {}).get(surface) if self._material else None, places
+
+    def _at(self, t_host_ns: int) -> dict[int, Grid]:
+        """The surfaces at a moment, on the straight line between those before and after if they are missing."""
+        if t_host_ns in self._truths:
+            return self._truths[t_host_ns]
+        before = max((t for t in self._truths if t < t_host_ns), default=None)
+        after = min((t for t in self._truths if t > t_host_ns), default=None)
+        if before is None or after is None or after - before > STRAIGHT_NS:
+            return {}
+        share = (t_host_ns - before) / (after - before)
+        one, other = self._truths[before], self._truths[after]
+        return {surface: (1 - share) * one[surface] + share * other[surface] for surface in one.keys() & other.keys()}
 
 
 def expected_mm(covariance_f32: bytes) -> float | None:

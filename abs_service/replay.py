@@ -7,10 +7,10 @@ from typing import Any
 
 from abs_service import estimates, keys
 from abs_service.estimates import Effort, Identity
-from abs_service.live import Report, TrackerLog
 from abs_service.stamps import Speaker
 from abs_service.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
+from abs_service.tracker_log import Report, TrackerLog
 from abs_service.tracking import Tracking
 from drivers.device import Truth
 from drivers.frame import Frame, FrameSet

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from abs_service import live
+from abs_service import keys, live
 from abs_service.bus.contract import Bus, Sample
 from abs_service.display.view import Display, View
 from abs_service.health import Health, Level
@@ -16,6 +16,8 @@ from abs_service.supervisor import Child, State, Supervisor
 DEPTH = 64
 #: Time between two looks at the children, at most [s].
 PERIOD_S = 0.05
+#: Time between two questions for what was lost, and patience for the answer [s].
+QUESTION_S, ANSWER_S = 1.0, 0.2
 
 _LEVELS: Mapping[State, Level] = {
     State.PAUSED: Level.WARNING,
@@ -49,11 +51,11 @@ class Session:
         display: Display,
         clock: WallClock,
     ) -> None:
-        self._rig, self._endpoint, self._directory = rig, endpoint, directory
+        self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
-        self._begin_ns = clock.monotonic()
+        self._begin_ns = self._asked_ns = clock.monotonic()
         self._live = live.Live(trackers, clock.monotonic)
         self._health = Health(bus, "run", Speaker(rig, clock))
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
@@ -71,6 +73,7 @@ class Session:
             self._supervisor.poll()
             self._report()
             self._listen(PERIOD_S)
+            self._catch_up()
 
     def stop(self) -> None:
         """Stops the processes in order, and hears what they say last."""
@@ -105,6 +108,15 @@ class Session:
                 break
             self._take(*arrived)
         self._display.update(self.view())
+
+    def _catch_up(self) -> None:
+        """Asks for the topologies that the network dropped: each is sent once, and errors are not known without."""
+        if self._clock.monotonic() - self._asked_ns < QUESTION_S * 1e9:
+            return
+        self._asked_ns = self._clock.monotonic()
+        for tracker in self._live.without_topology():
+            for sample in self._bus.ask(keys.topology(tracker), ANSWER_S):
+                self._take(sample.topic, sample)
 
     def _take(self, topic: str, sample: Sample) -> None:
         for report in self._live.take(sample):

@@ -4,7 +4,7 @@ import json
 from typing import Self, TextIO
 
 from abs_service.display.view import View, size
-from abs_service.live import Report
+from abs_service.tracker_log import Report
 
 PERIOD_NS = 1_000_000_000
 

@@ -11,8 +11,8 @@ from rich.table import Table
 from rich.text import Text
 
 from abs_service.display.view import View, size
-from abs_service.live import Report, TrackerLog
 from abs_service.supervisor import State
+from abs_service.tracker_log import Report, TrackerLog
 
 REFRESH_HZ = 6
 

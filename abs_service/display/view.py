@@ -8,8 +8,9 @@ from typing import Protocol, Self
 from abs.v1.health_pb2 import Health
 
 from abs_service import keys
-from abs_service.live import Live, Report
+from abs_service.live import Live
 from abs_service.supervisor import Child, State
+from abs_service.tracker_log import Report
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.experiments import plots
 from abs_service.experiments.tracked import Followed, Shot
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.optimizers import cma_es
@@ -150,7 +151,7 @@ def _errors(published: Published, compared: Sequence[Comparison]) -> Section:
 
 
 def _course(compared: Sequence[Comparison]) -> Picture:
-    figure = _figure(10, 3.2)
+    figure = plots.figure(10, 3.2)
     first = _first(compared)
     for axes, one in zip(figure.subplots(1, len(first)), first.values()):
         for title, errors in one.errors.items():
@@ -176,7 +177,7 @@ def _biases(by_bias: Mapping[float, Sequence[Comparison]]) -> Section:
 
 def _scene(shot: Shot, first: Mapping[str, Comparison], number: int) -> "Figure":
     images = {frame.kind: frame.si() for frame in shot.frames.frames.values()}
-    figure = _figure(12, 3.4)
+    figure = plots.figure(12, 3.4)
     amplitude, *profiles = figure.subplots(1, 1 + len(first), width_ratios=(1, *[1.2] * len(first)))
     amplitude.imshow(images[Kind.AMPLITUDE], cmap="gray", vmax=9000)
     amplitude.set(title="amplitude", xticks=(), yticks=())
@@ -199,9 +200,3 @@ def _section(
     arms = vertices - center
     near = np.abs(arms @ y) < _BAND * np.linalg.norm(down)
     return arms[near] @ x * 1e3, -arms[near] @ np.cross(x, y) * 1e3
-
-
-def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
-
-    return Figure(figsize=(width, height), layout="constrained")

@@ -88,8 +88,9 @@ class RemoteDevice:
             return
         self._streams = {}
         self._delivery.report(DeviceState.STREAMING, f'rig "{self._rig}" is captured elsewhere')
-        self._link.listen(self._rig, IMAGES, self._on_image)
+        # Whoever makes a mesh of the first images needs their truth, which comes just before them.
         self._link.listen(self._rig, TRUTHS, self._on_truth)
+        self._link.listen(self._rig, IMAGES, self._on_image)
         self._link.watch(self._rig, self._on_gone)
         if stop.is_set():
             self._link.silence()

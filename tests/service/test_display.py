@@ -11,8 +11,9 @@ from rich.spinner import Spinner
 from abs_service.display.lines import JsonDisplay, PlainDisplay, line
 from abs_service.display.table import TableDisplay, draw
 from abs_service.display.view import View, size
-from abs_service.live import Live, Report
+from abs_service.live import Live
 from abs_service.supervisor import Child, State
+from abs_service.tracker_log import Report
 from tests.service.idle import Idle
 
 S = 1_000_000_000

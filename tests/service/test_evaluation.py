@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.evaluation import KEPT, TruthComparison, closest_points
+from abs_service.evaluation import KEPT, STRAIGHT_NS, TruthComparison, closest_points
 
 
 def grid(rows=21, columns=31, bend=0.0):
@@ -78,6 +78,25 @@ def test_the_truth_of_the_mesh_may_come_after_the_mesh():
     assert result.compare(1, inner()) is None
     result.add_truth(0, grid())
     assert result.compare(1, inner()) is not None
+
+
+def test_if_the_truth_of_the_mesh_was_lost_the_surface_was_where_it_passed_between_its_neighbours():
+    result = TruthComparison()
+    result.add_topology(inner() + np.array((0.002, 0, 0)), STRAIGHT_NS // 2)
+    result.add_truth(0, grid())
+    assert result.compare(0, inner()) is None
+    result.add_truth(STRAIGHT_NS, grid() + np.array((0.004, 0, 0)))
+    errors = result.compare(0, inner() + np.array((0.003, 0, 0)))
+    assert errors is not None
+    assert errors.vertex_mm == pytest.approx(3)
+
+
+def test_truths_too_far_apart_say_nothing_of_the_time_between():
+    result = TruthComparison()
+    result.add_topology(inner(), 1)
+    result.add_truth(0, grid())
+    result.add_truth(STRAIGHT_NS + 1, grid())
+    assert result.compare(0, inner()) is None
 
 
 def test_of_two_surfaces_the_nearer_one_is_the_truth():

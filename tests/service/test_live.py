@@ -8,7 +8,8 @@ from abs.v1.health_pb2 import Health
 from abs.v1.surface_truth_pb2 import SurfaceTruth
 
 from abs_service.bus.contract import Sample
-from abs_service.live import Live, Total
+from abs_service.live import Live
+from abs_service.tracker_log import Total
 
 
 def sample(topic, message):
@@ -64,6 +65,18 @@ def test_an_estimate_is_reported_with_its_error_once_its_mesh_has_come(live):
     assert report.theta == (0.5, -0.25)
     assert report.error_mm == pytest.approx(2.0, abs=0.01)
     assert report.surface_mm == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_topology_that_did_not_arrive_is_missed_until_it_comes(live):
+    assert live.without_topology() == []
+    take(live, truth(1), truth(2), state(2, 1), mesh(2))
+    assert live.without_topology() == ["sheet"]
+    take(live, topology(1), topology(1))
+    assert live.without_topology() == []
+    (report,) = take(live, truth(3), state(3, 2), mesh(3))
+    assert report.error_mm == pytest.approx(0, abs=1e-3)
+    take(live, state(4, 3, mesh_version=2))
+    assert live.without_topology() == ["sheet"]
 
 
 def test_an_estimate_whose_mesh_was_lost_is_reported_with_the_next_one_and_without_error(live):

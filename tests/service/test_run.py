@@ -6,9 +6,11 @@ import time
 from pathlib import Path
 
 import pytest
+from abs.v1.deformation_state_pb2 import DeformationState
+from abs.v1.deformed_mesh_pb2 import MeshTopology
 from abs.v1.health_pb2 import Health
 
-from abs_service import config, keys
+from abs_service import config, estimates, keys
 from abs_service.bus.contract import EVENTS
 from abs_service.commands import run
 from abs_service.display.lines import PlainDisplay
@@ -107,7 +109,7 @@ class TestTheFileOfTheChildren:
 class Bench:
     """A session around processes that do nothing, one of which may end."""
 
-    def __init__(self, display):
+    def __init__(self, display, trackers=()):
         self.bus = LoopbackBus()
         self.killed = []
         limits = Limits(startup_ns=10**12, stall_ns=0, restarts=0)
@@ -115,7 +117,9 @@ class Bench:
         self.supervisor = Supervisor(
             children, lambda component, _: Idle(component, self.killed), time.monotonic_ns, limits
         )
-        self.session = Session(self.bus, "bench", "tcp/127.0.0.1:1", Path(), [], self.supervisor, display, WallClock())
+        self.session = Session(
+            self.bus, "bench", "tcp/127.0.0.1:1", Path(), trackers, self.supervisor, display, WallClock()
+        )
 
 
 class Gone(io.StringIO):
@@ -136,6 +140,22 @@ def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
     told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
     assert told[-1].level == Health.LEVEL_ERROR
     assert "capture failed: needed more than 0 restarts" in told[-1].message
+
+
+def test_a_topology_that_the_network_lost_is_asked_for():
+    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
+    asked = []
+
+    def topology():
+        asked.append(bench.session.elapsed_s)
+        return MeshTopology(mesh_version=3).SerializeToString()
+
+    bench.bus.answer(keys.topology("sheet"), estimates.TOPOLOGY, topology)
+    state = DeformationState(tracker="sheet", mesh_version=3).SerializeToString()
+    bench.bus.publisher(keys.state("sheet"), estimates.STATE, EVENTS).put(state)
+    bench.session.go_on_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
+    assert len(asked) == 1
+    assert bench.session.view().live.without_topology() == []
 
 
 def test_the_processes_are_stopped_also_when_nobody_reads_the_output_any_more():

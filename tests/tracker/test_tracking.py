@@ -216,21 +216,3 @@ def test_the_likelihood_is_within_2_mm_and_better_than_squares_of_the_same_size(
     equal = euclidean.Settings(depth_weight=0.5 / 4.5e-3**2, color_weight=0.5 / 4.0**2)
     assert likelihood < error_over_300_exposures(uri, objective=equal)
     assert likelihood < 1.1 * error_over_300_exposures(uri, objective=euclidean.Settings())
-
-
-@pytest.mark.slow
-def test_a_mean_offset_that_is_known_is_compensated():
-    """Experiment E3: the mesh is made from distances that are 10 cm too long; squares cannot know."""
-    uri = "simulated://sheet?seed=1&offset=0.1"
-    simulation = simulate(uri)
-    plain = rig_of(simulation)
-    tof = plain.sensors["tof"]
-    noise = dataclasses.replace(tof.noise, mu=((0.1,),))  # pyright: ignore[reportArgumentType]
-    known = dataclasses.replace(plain, sensors={**plain.sensors, "tof": dataclasses.replace(tof, noise=noise)})
-    likelihood = mean_errors(list(drive(Tracking(known, default_plan()), simulation, range(60))))
-    squares = mean_errors(
-        list(drive(Tracking(plain, default_plan(objective=euclidean.Settings())), simulation, range(60)))
-    )
-    print("offset of 10 cm, vertex and surface error [mm]: likelihood", likelihood, "squares", squares)
-    assert likelihood[0] < 5
-    assert squares[1] > 90
