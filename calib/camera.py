@@ -51,10 +51,12 @@ class Camera:
         """Camera centre `c_s` in rig coordinates, shape (3,) [m]."""
         return self.T_rs[:3, 3]
 
-    @property
+    @functools.cached_property
     def T_sr(self) -> Pose:
-        """Pose that maps rig coordinates to sensor coordinates."""
-        return pose.inverse(self.T_rs)
+        """Pose that maps rig coordinates to sensor coordinates; cannot be written to."""
+        inverse = pose.inverse(self.T_rs)
+        inverse.setflags(write=False)
+        return inverse
 
     @property
     def calib_id(self) -> str:

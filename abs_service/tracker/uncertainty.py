@@ -51,7 +51,7 @@ def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.floa
         vertices = np.flatnonzero(moves.group == group)
         local = moves.local[vertices]
         # One product of matrices for all vertices: n small ones take several times as long.
-        weighted = (local.reshape(-1, len(own)) @ covariance[np.ix_(own, own)]).reshape(local.shape)
+        weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
         result[vertices] = weighted @ local.transpose(0, 2, 1)
     return result
 

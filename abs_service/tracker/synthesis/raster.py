@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.synthesis.projection import Projection
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -14,22 +15,15 @@ class Raster:
     """
 
     def __init__(self, camera: Camera, faces: NDArray[np.int32]):
-        self._camera = camera
+        self._projection = Projection(camera)
         self._faces = np.ascontiguousarray(faces, np.int32)
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
-        self._limit = camera.field_radius
 
     def render(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite where it is not."""
-        camera = self._camera
-        points = vertices.T.astype(np.float64)
-        local = (points - camera.center) @ camera.T_rs[:3, :3]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            aside = np.linalg.norm(local[:, :2], axis=1) / local[:, 2]
-            inverse_z = np.where((local[:, 2] > 1e-6) & (aside < self._limit), 1 / local[:, 2], np.nan)
-        place = np.where(np.isfinite(inverse_z)[:, None], camera.project(points), 0.0)
-        nearness = np.zeros((camera.height, camera.width), np.float32)
-        _nearest(place.astype(np.float32), inverse_z.astype(np.float32), self._faces, nearness)
+        place, inverse_z = self._projection.project(np.ascontiguousarray(vertices[None], np.float32))
+        nearness = np.zeros(self._ray_length.shape, np.float32)
+        _nearest(place[0], inverse_z[0], self._faces, nearness)
         with np.errstate(divide="ignore"):
             return self._ray_length / nearness
 

@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.forward import bend_fisheye
 from calib.jit import kernel
 from calib.rig import PictureNoise, Rig
-
-#: Edges that appear shorter than this [px], of a surface seen from aside, tell little of what is where in the image.
-SHORT_EDGE_PX = 0.5
 
 
 def surroundings(mesh: Mesh, step_m: float) -> Mesh:
@@ -126,16 +124,8 @@ class Relief:
 
         The deformation takes tangents along, so the edges around a vertex tell where they point in the image.
         """
-        place = self._camera.project(predicted.vertices[0].T.astype(np.float64))
-        first, second = self._edges.T
-        seen = place[second] - place[first]
-        seen[~np.isfinite(seen).all(axis=1)] = 0
-        square, mixed = (np.zeros((len(place), 2, 2)) for _ in range(2))
-        for end, lengths in ((first, self._lengths[0]), (second, self._lengths[1])):
-            np.add.at(square, end, seen[:, :, None] * seen[:, None, :])
-            np.add.at(mixed, end, lengths[:, :, None] * seen[:, None, :])
-        metres_per_pixel = mixed @ np.linalg.inv(square + SHORT_EDGE_PX**2 * np.eye(2))
-        self._per_pixel = np.ascontiguousarray(self._per_metre @ metres_per_pixel, np.float32)
+        flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
+        self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
 
     def at_centers(
         self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]

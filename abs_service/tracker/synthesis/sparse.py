@@ -84,6 +84,7 @@ class SparseView:
         self._attributes = np.ascontiguousarray(attributes, np.float32)
         self._slopes = slopes
         self._hidden = np.zeros(len(attributes), np.bool_)
+        self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
         self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
         self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
         self._lens = camera.lens.coefficients.astype(np.float32)
@@ -98,7 +99,9 @@ class SparseView:
         seen = self.synthesize(predicted)
         stride = self.camera.width + 2
         row, column = np.divmod(seen.pixel[0], stride)
-        front = np.pad(self.render(predicted), 1, constant_values=np.inf)[row, column]
+        rendered = self.render(predicted)
+        inside = seen.pixel[0] > 0
+        front = np.where(inside, rendered[(row - 1) * inside, (column - 1) * inside], np.float32(np.inf))
         facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
         self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
 
@@ -142,8 +145,15 @@ class SparseView:
         return costs
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
-        return self._raster.render(surface.vertices[0])
+        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it.
+
+        Asked again for the last one, it answers at once.
+        """
+        last, image = self._rendered
+        if last is not surface:
+            image = self._raster.render(surface.vertices[0])
+            self._rendered = (surface, image)
+        return image
 
     def _sight(self, surface: Surface) -> NDArray[np.float64]:
         """Lines of sight (3, n) from the camera to the vertices of a population of one [m]."""

@@ -86,8 +86,8 @@ class ChannelTerm:
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
-        covered = np.pad(self._shadow.mask(points), 1).ravel()
-        self._texture[covered, VALUE] = np.inf
+        if len(points):
+            self._texture[np.pad(self._shadow.mask(points), 1).ravel(), VALUE] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured values (population,)."""

@@ -50,7 +50,10 @@ class ColorTerm:
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         self._image = self._synthesizer.image(self.sensor, image.rgb.astype(np.float32))
-        self._texture = np.pad(self._image, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan).reshape(-1, 3)
+        height, width = self._image.shape[:2]
+        texture = np.full((height + 2, width + 2, 3), np.nan, np.float32)
+        texture[1:-1, 1:-1] = self._image
+        self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
         widening = self._misplacement.widening(self._view, predicted, self._sigma)
         self._inverse = np.repeat(
@@ -64,8 +67,8 @@ class ColorTerm:
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Marks the pixels that show points (k, 3) [m] before the object: their colours say nothing."""
-        covered = np.pad(self._shadow.mask(points), 1).ravel()
-        self._texture[covered] = np.inf
+        if len(points):
+            self._texture[np.pad(self._shadow.mask(points), 1).ravel()] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""

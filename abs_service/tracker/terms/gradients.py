@@ -3,12 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.synthesis.perspective import project_with_slopes
 from calib.camera import Camera
 from calib.jit import kernel
 
 #: Half the side of the neighbourhood whose colours give the image's slope at a vertex [px].
 RADIUS_PX = 2
 _STEPS = np.arange(-RADIUS_PX, RADIUS_PX + 1.0)
+
+#: Weights of the neighbourhood: a Gaussian of one pixel; and those of a regression on steps.
+_BELL = np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
+_REGRESSION = _BELL / np.sum(_BELL * _STEPS**2)
 
 #: Grazing views: the cosine between line of sight and normal below which a row would explode.
 LEAST_COSINE = 0.2
@@ -41,10 +46,9 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    pixels, projection = _pixels(camera, vertices), camera.projection_jacobian(vertices)
-    weights = _bell()
-    rows = np.empty((len(pixels), image.shape[2], 3))
-    _color_rows(image, pixels, weights / np.sum(weights * _STEPS**2), projection, rows)
+    places, projection = project_with_slopes(camera, vertices)
+    rows = np.empty((len(places), image.shape[2], 3))
+    _color_rows(image, places, _REGRESSION, projection, rows)
     return rows
 
 
@@ -68,14 +72,9 @@ def channel_slopes(
     column, row = _neighborhood(_pixels(camera, vertices), values.shape)
     patches = values[row, column].astype(np.float64)
     same = channels[row, column] == channels[row[:, RADIUS_PX], column[:, :, RADIUS_PX]][..., None]
-    weights = _bell() * (same & np.isfinite(patches))
+    weights = _BELL * (same & np.isfinite(patches))
     patches = np.where(weights > 0, patches, 0.0)
     return np.stack([_slope(patches, weights, _STEPS), _slope(patches, weights, _STEPS[:, None])], axis=-1)
-
-
-def _bell() -> NDArray[np.float64]:
-    """Weights of a neighbourhood: a Gaussian of one pixel."""
-    return np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
 
 
 def _slope(
@@ -108,16 +107,16 @@ def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDA
 @kernel
 def _color_rows(
     image: NDArray[np.float32],
-    pixels: NDArray[np.int64],
+    places: NDArray[np.float64],
     weights: NDArray[np.float64],
     projection: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> None:
-    """Regression of the image around pixels (n, 2) on column and row, times how these move (n, 2, 3)."""
+    """Regression of the image around the pixels of places (n, 2) on column and row, times how these move (n, 2, 3)."""
     height, width, channels = image.shape
     side, reach = weights.shape[0], weights.shape[0] // 2
-    for v in range(pixels.shape[0]):
-        column, row = pixels[v, 0], pixels[v, 1]
+    for v in range(places.shape[0]):
+        column, row = int(np.floor(places[v, 0] + 0.5)), int(np.floor(places[v, 1] + 0.5))
         own = image[min(max(row, 0), height - 1), min(max(column, 0), width - 1)]
         for c in range(channels):
             right, down = 0.0, 0.0

@@ -31,7 +31,7 @@ class Linearization:
     @property
     def square(self) -> tuple[NDArray[np.int64], ...] | slice:
         """Index of a matrix (dim, dim) that gives its part (k, k) for the parameters."""
-        return self.parameters if isinstance(self.parameters, slice) else np.ix_(self.parameters, self.parameters)
+        return self.parameters if isinstance(self.parameters, slice) else (self.parameters[:, None], self.parameters)
 
     def parts(self) -> list["Linearization"]:
         """Itself."""
