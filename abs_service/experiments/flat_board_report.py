@@ -68,7 +68,7 @@ class Comparison:
         """One row of the table for each fitness function."""
         return [
             (
-                self.model, self.search, title, e.mean(), e.std(ddof=1), e.max(), self.unit or "–",
+                self.model, self.search, title, e.mean(), e.std(ddof=1), float(np.median(e)), e.max(), self.unit or "–",
                 float(np.mean([one.surface_mm for one in self.followed[title]])),
                 float(np.mean([one.median_ms for one in self.followed[title]])),
                 self.ratio if title == "Euclidean" else float("nan"),
@@ -129,6 +129,7 @@ def _first(compared: Sequence[Comparison]) -> dict[str, Comparison]:
 def _errors(published: Published, compared: Sequence[Comparison]) -> Section:
     columns = (
         Column("model"), Column("search"), Column("fitness"), Column("mean", "", ".3g"), Column("SD", "", ".2g"),
+        Column("median", "", ".3g"),
         Column("largest", "", ".3g"), Column("unit"), Column("surface error", "mm", ".2f"),
         Column("time", "ms", ".1f"), Column("Euclidean / likelihood", "", ".2f"),
     )  # fmt: skip

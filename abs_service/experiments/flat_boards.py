@@ -13,6 +13,7 @@ from abs_service.experiments.flat_board_report import Comparison, Published
 from abs_service.experiments.static_walls import learnt
 from abs_service.experiments.tracked import Followed, Shot, demo_plan, follow, mean_deviation, shoot, squares
 from abs_service.tracker.models import flexpad, nurbs
+from abs_service.tracker.models.bends import FULL
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracking import ModelSettings, OptimizerSettings
@@ -99,8 +100,8 @@ class Measure:
 
 
 def largest_bends(followed: Followed) -> NDArray[np.float64]:
-    """Largest |bend| (frames,) of FlexPad; in truth all are 0, and 2 is a radius of `least_radius_m`."""
-    return np.abs(followed.thetas[:, flexpad.BENDS]).max(axis=1)
+    """Largest |bend| (frames,) of FlexPad, at most 2, which is a radius of `least_radius_m`; in truth all are 0."""
+    return np.minimum(np.abs(followed.thetas[:, flexpad.BENDS]).max(axis=1), FULL)
 
 
 def unevenness_mm(followed: Followed) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.experiments import plots
-from abs_service.experiments.base import Context, Findings, at_least, at_most
+from abs_service.experiments.base import Context, Findings, Goal, at_least, at_most
 from abs_service.experiments.static_walls import learnt
 from abs_service.experiments.tracked import (
     Followed,
@@ -134,7 +134,7 @@ def _figures(runs: Sequence[Followed]) -> dict[str, float]:
     }
 
 
-def _goals(model: str, found: Mapping[str, Sequence[Followed]], offset: float):
+def _goals(model: str, found: Mapping[str, Sequence[Followed]], offset: float) -> tuple[Goal, ...]:
     errors = {name: _figures(runs) for name, runs in found.items()}
     share = errors[_KNOWN]["vertex_mm"] / errors[_REFERENCE]["vertex_mm"]
     raised = errors[_SQUARES]["surface_mm"] - errors[_REFERENCE]["surface_mm"]
