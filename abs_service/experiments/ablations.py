@@ -41,8 +41,8 @@ class Settings:
     """
 
     seeds: int = 3
-    frames: int = 40
-    every: int = 3
+    frames: int = 30
+    every: int = 4
     bend: float = 90.0
     speed: float = 2.0
     noise: float = 1.5

@@ -54,11 +54,11 @@ class Settings:
     """
 
     sequences: int = 2
-    frames: int = 250
-    every: int = 2
+    frames: int = 150
+    every: int = 3
     bias: float = -40.0
-    biases: tuple[float, ...] = (0.0, -10.0, -20.0, -60.0)
-    published: int = 20
+    biases: tuple[float, ...] = (0.0, -20.0, -60.0)
+    published: int = 12
     still: int = 10
 
 
@@ -205,8 +205,8 @@ def _sequence(board: Board, bias: float, settings: Settings, context: Context, n
 
 def _of_bias(board: Board, bias: float, settings: Settings, context: Context) -> list[Comparison]:
     """Both models with another bias, on some frames of the first sequence, in which the board has begun to move."""
-    shots = _sequence(board, bias, replace(settings, frames=60), context, 0)
-    shots = [shots[0], *shots[20:]]
+    shots = _sequence(board, bias, replace(settings, frames=50), context, 0)
+    shots = [shots[0], *shots[14:]]
     noise = _learnt(bias, settings, context)
     return [compare(name, noise, [shots], hybrid.Settings(), context) for name in MEASURES]
 

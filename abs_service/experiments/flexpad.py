@@ -66,7 +66,7 @@ class Settings:
 
     directions: tuple[int, ...] = DIRECTIONS
     motions: int = 2
-    frames: int = 60
+    frames: int = 50
     every: int = 5
     bend: float = 75.0
     published: int = 20

@@ -54,8 +54,8 @@ class Settings:
 
     offset: float = 0.1
     sequences: int = 3
-    frames: int = 100
-    every: int = 3
+    frames: int = 50
+    every: int = 6
     models: tuple[str, ...] = ("NURBS", "FlexPad")
     still: int = 10
 
