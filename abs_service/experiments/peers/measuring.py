@@ -1,0 +1,71 @@
+"""Runs a follower through a scene: its errors and what it costs."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.evaluation import closest_points
+from abs_service.experiments.peers.rivals import Follower
+from abs_service.experiments.peers.scene import SIDE, Shot, places
+
+#: A follower that is farther from the material on average than this has lost the object [m].
+LOST_M = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What one tracker made of one sequence, the first frame, of which everything is known, left out.
+
+    Attributes:
+        vertices: of every frame (n, 3) [m].
+        vertex_mm, surface_mm: mean distance of the vertices from their own material, and from the surface [mm].
+        cpu_ms: processor time of every frame, all threads [ms].
+    """
+
+    vertices: Sequence[NDArray[np.floating]]
+    vertex_mm: NDArray[np.float64]
+    surface_mm: NDArray[np.float64]
+    cpu_ms: NDArray[np.float64]
+
+    @property
+    def lost(self) -> bool:
+        """Whether the object is lost in the end."""
+        return bool(self.vertex_mm[-1] > LOST_M * 1e3)
+
+
+def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -> Followed:
+    """Follows shots after the first.
+
+    Args:
+        follower: has the first shot behind it.
+        at: places (n, 2) [m] of its vertices on the flat sheet.
+        shots: the sequence.
+    """
+    fine = places(121, 81)
+    tracked, vertex, surface, cpu = [], [], [], []
+    for shot in shots[1:]:
+        begun = time.process_time()
+        vertices = follower.track(shot)
+        cpu.append(time.process_time() - begun)
+        tracked.append(vertices)
+        vertex.append(np.linalg.norm(vertices - shot.moment.points(at), axis=1).mean())
+        closest = closest_points(vertices, shot.moment.points(fine))
+        surface.append(np.linalg.norm(vertices - closest, axis=1).mean())
+    return Followed(tracked, 1e3 * np.array(vertex), 1e3 * np.array(surface), 1e3 * np.array(cpu))
+
+
+#: Makes a follower that knows the sheet in the first shot, and tells the places (n, 2) [m] of its vertices.
+Make = Callable[[Shot, float, int], tuple[Follower, NDArray[np.float64]]]
+
+
+def with_template(make: Callable[[NDArray[np.float64]], Follower]) -> Make:
+    """A maker for what begins with the template's vertices."""
+
+    def start(first: Shot, sigma: float, seed: int) -> tuple[Follower, NDArray[np.float64]]:
+        at = places(SIDE, SIDE).reshape(-1, 2)
+        return make(first.moment.points(at)), at
+
+    return start
