@@ -72,7 +72,9 @@ class ShapePrior:
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
-        return 0.5 * np.sum(((thetas - self._rest) @ self._prior.T) ** 2, axis=1)
+        out = np.zeros(len(thetas))
+        _add_squares(thetas, self._rest, self._prior, out)
+        return out
 
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives, which are constant."""
@@ -94,12 +96,14 @@ class MotionPrior:
         self._velocity = np.zeros_like(rest)
         self._t_ns: int | None = None
         self._elapsed_s = FIRST_INTERVAL_S
+        self._inverse_deviation = self._told()
 
     def predict(self, t_ns: int) -> None:
         """Turns to the frame of time `t_ns` [ns]; the velocity fades with the age of the last estimate."""
         elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
         self._elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
         self._t_ns = t_ns
+        self._inverse_deviation = self._told()
         travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
         self.predicted = self._theta + travel * self._velocity
 
@@ -110,16 +114,22 @@ class MotionPrior:
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
-        return 0.5 * np.sum(((thetas - self.predicted) * self._inverse_deviation) ** 2, axis=1)
+        out = np.empty(len(thetas))
+        _sum_squares(thetas, self.predicted, self._inverse_deviation, out)
+        return out
 
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives."""
         inverse_deviation = self._inverse_deviation
         return Linearization((theta - self.predicted) * inverse_deviation, np.diag(inverse_deviation))
 
-    @property
-    def _inverse_deviation(self) -> NDArray[np.float64]:
+    def _told(self) -> NDArray[np.float64]:
+        """Inverse deviation (dim,) of the parameters around the predicted ones."""
         return 1 / (self._scales * self._settings.speed * self._elapsed_s)
+
+
+#: Members of a population whose edges are measured at once, in lanes of the processor.
+LANES = 8
 
 
 @kernel
@@ -130,16 +140,51 @@ def _stretch_cost(
     out: NDArray[np.float64],
 ) -> None:
     """Sum over edges of the squared relative change of length, for every member of the population."""
-    for k in range(vertices.shape[0]):
-        total = np.float32(0)
+    population, _, n = vertices.shape
+    for block in range((population + LANES - 1) // LANES):
+        first = block * LANES
+        count = min(LANES, population - first)
+        place, total = np.zeros((3, n, LANES), np.float32), np.zeros(LANES, np.float32)
+        for k in range(count):
+            for i in range(3):
+                for v in range(n):
+                    place[i, v, k] = vertices[first + k, i, v]
         for e in range(edges.shape[0]):
-            i, j = edges[e, 0], edges[e, 1]
-            x = vertices[k, 0, i] - vertices[k, 0, j]
-            y = vertices[k, 1, i] - vertices[k, 1, j]
-            z = vertices[k, 2, i] - vertices[k, 2, j]
-            change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[e] - np.float32(1)
-            total += change * change
-        out[k] = total
+            ax, ay, az = place[0, edges[e, 0]], place[1, edges[e, 0]], place[2, edges[e, 0]]
+            bx, by, bz = place[0, edges[e, 1]], place[1, edges[e, 1]], place[2, edges[e, 1]]
+            inverse = inverse_lengths[e]
+            for k in range(LANES):
+                x, y, z = ax[k] - bx[k], ay[k] - by[k], az[k] - bz[k]
+                change = np.sqrt(x * x + y * y + z * z) * inverse - np.float32(1)
+                total[k] += change * change
+        for k in range(count):
+            out[first + k] = total[k]
+
+
+@kernel
+def _add_squares(
+    thetas: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Adds half the squared length of every row times Θ − center."""
+    for k in range(thetas.shape[0]):
+        for r in range(rows.shape[0]):
+            length = 0.0
+            for d in range(center.size):
+                length += rows[r, d] * (thetas[k, d] - center[d])
+            out[k] += 0.5 * length * length
+
+
+@kernel
+def _sum_squares(
+    thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Half the squared length of scales times Θ − center."""
+    for k in range(thetas.shape[0]):
+        total = 0.0
+        for d in range(center.size):
+            length = scales[d] * (thetas[k, d] - center[d])
+            total += length * length
+        out[k] = 0.5 * total
 
 
 @kernel

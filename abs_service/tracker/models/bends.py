@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.jit import kernel
+
 #: Angles [rad] of the directions a along which the sheet bends, from its x axis towards its y axis.
 ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 
@@ -52,3 +54,55 @@ def tabulate(points: NDArray[np.float64], kappa: NDArray[np.float64]) -> NDArray
     shift = q * (np.sinc(angle / np.pi) - 1)
     rise = 0.5 * angle * q * np.sinc(angle / (2 * np.pi)) ** 2
     return np.stack([shift, rise, np.cos(angle) - 1, np.sin(angle)], axis=2).astype(np.float32)
+
+
+@kernel
+def look_up(
+    thetas: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    full_height: float,
+    half: float,
+    rows: int,
+    row: NDArray[np.int32],
+    fraction: NDArray[np.float32],
+    height: NDArray[np.float32],
+    motion: NDArray[np.float32],
+) -> None:
+    """From FlexPad's parameters to places in the tables, and what comes after them.
+
+    Args:
+        thetas: parameters (population, 15).
+        pose: of the sheet in the rig (3, 4).
+        full_height: largest parameter of the height map.
+        half: half the sheet's long side [m].
+        rows: of the tables.
+        row, fraction: place of every bend between two rows of its table (population, 8).
+        height: g/c of the height map (population,) [1/m].
+        motion: rotation and translation from sheet to rig (population, 3, 4).
+    """
+    turn = np.empty((3, 3))
+    for k in range(thetas.shape[0]):
+        theta = thetas[k]
+        for j in range(8):
+            bounded = min(max(theta[j], -FULL), FULL)
+            place = (bounded / FULL + 1) * ((rows - 1) / 2)
+            row[k, j] = min(int(place), rows - 2)
+            fraction[k, j] = place - row[k, j]
+        height[k] = min(max(theta[8], -full_height), full_height) / half
+        _turn(theta[9], theta[10], theta[11], turn)
+        for i in range(3):
+            for j in range(3):
+                motion[k, i, j] = turn[i, 0] * pose[0, j] + turn[i, 1] * pose[1, j] + turn[i, 2] * pose[2, j]
+            motion[k, i, 3] = pose[i, 3] + theta[12 + i]
+
+
+@kernel
+def _turn(x: float, y: float, z: float, turn: NDArray[np.float64]) -> None:
+    """The rotation (3, 3) of a rotation vector, by Rodrigues' formula; its series near zero."""
+    square = x * x + y * y + z * z
+    angle = np.sqrt(square)
+    a = np.sin(angle) / angle if square > 1e-8 else 1 - square / 6
+    b = (1 - np.cos(angle)) / square if square > 1e-8 else 0.5 - square / 24
+    turn[0, 0], turn[0, 1], turn[0, 2] = 1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
+    turn[1, 0], turn[1, 1], turn[1, 2] = b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x
+    turn[2, 0], turn[2, 1], turn[2, 2] = b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
@@ -87,6 +86,8 @@ class FlexPad:
         self._points = np.ascontiguousarray(points.T, np.float32)
         self._half = 0.5 * sheet.width
         self._rotation, self._center = sheet.T_rp[:3, :3], sheet.T_rp[:3, 3]
+        self._pose = np.ascontiguousarray(sheet.T_rp[:3], np.float64)
+        self._sides = bends.SIDES.astype(np.float32)
         self._kappa = bends.curvatures(np.linalg.norm(points, axis=1).max(), least_radius)
         self._tables = bends.tabulate(points, self._kappa)
         self.rest = np.zeros(DIMENSION)
@@ -96,18 +97,13 @@ class FlexPad:
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, 15)."""
-        rows = len(self._kappa)
-        place = (np.clip(thetas[:, BENDS], -bends.FULL, bends.FULL) / bends.FULL + 1) * ((rows - 1) / 2)
-        row = np.minimum(place.astype(np.int32), rows - 2)
-        height = np.clip(thetas[:, HEIGHT], -FULL_HEIGHT, FULL_HEIGHT) / self._half
-        turns = scipy.spatial.transform.Rotation.from_rotvec(thetas[:, ROTATION]).as_matrix()
-        centers = self._center + thetas[:, TRANSLATION]
-        motion = np.concatenate([turns @ self._rotation, centers[:, :, None]], axis=2).astype(np.float32)
-        vertices = np.empty((len(thetas), 3, self._points.shape[1]), np.float32)
-        normals = np.empty_like(vertices)
-        fraction = (place - row).astype(np.float32)
-        sides = bends.SIDES.astype(np.float32)
-        _deform(row, fraction, height.astype(np.float32), motion, self._points, sides, self._tables, vertices, normals)
+        population, n = len(thetas), self._points.shape[1]
+        row, fraction = np.empty((population, 8), np.int32), np.empty((population, 8), np.float32)
+        height, motion = np.empty(population, np.float32), np.empty((population, 3, 4), np.float32)
+        limits = FULL_HEIGHT, self._half
+        bends.look_up(thetas, self._pose, *limits, len(self._kappa), row, fraction, height, motion)
+        vertices, normals = np.empty((population, 3, n), np.float32), np.empty((population, 3, n), np.float32)
+        _deform(row, fraction, height, motion, self._points, self._sides, self._tables, vertices, normals)
         return Surface(vertices, normals)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:

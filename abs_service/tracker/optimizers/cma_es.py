@@ -41,6 +41,10 @@ class Settings:
         return Evolution(schedule, make, population, self.step, self.restarts)
 
 
+#: Share of the covariance that may be new before candidates are drawn with it.
+LEARNT = 0.1
+
+
 class Constants:
     """Weights and learning rates for a dimension and a population, in the tutorial's words and equations."""
 
@@ -65,9 +69,10 @@ class CmaEs:
     """Mean, step size and covariance of one frame start the next; see `Strategy` for the interface.
 
     Candidates are drawn with the Cholesky factor of the covariance in place of its symmetric root, which distributes
-    them equally, and costs so little that the factor is new in every generation: there is no lazy eigendecomposition.
-    The evolution path of the step size then lives in the coordinates of that factor (Krause, Arbonès, Igel: CMA-ES
-    with optimal covariance update and storage complexity, 2016).
+    them equally and costs a fraction of an eigendecomposition. The factor is a new one when a share `LEARNT` of the
+    covariance may be new; with few parameters that is every generation. The evolution path of the step size lives in
+    the coordinates of that factor (Krause, Arbonès, Igel: CMA-ES with optimal covariance update and storage complexity,
+    2016).
 
     Args:
         dimension: of ξ.
@@ -87,6 +92,7 @@ class CmaEs:
         self._covariance = np.eye(dimension)
         self._factor = np.eye(dimension)
         self._generation = 0
+        self._gap = max(1, int(LEARNT / (self._constants.rates[2] + self._constants.rates[3])))
         self._z = np.zeros((population, dimension))
         self._y = np.zeros((population, dimension))
 
@@ -107,9 +113,11 @@ class CmaEs:
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
-        self._z = self._generator.standard_normal(self._z.shape)
-        self._y = self._z @ self._factor.T
-        return self._mean + self._sigma * self._y
+        self._generator.standard_normal(out=self._z)
+        np.matmul(self._z, self._factor.T, out=self._y)
+        candidates = self._sigma * self._y
+        candidates += self._mean
+        return candidates
 
     def tell(self, candidates: NDArray[np.float64], costs: NDArray[np.float64]) -> None:
         """Updates mean, step size and covariance; the candidates are those of the last `ask`."""
@@ -126,7 +134,9 @@ class CmaEs:
             self._paths,
             self._covariance,
         )
-        if not _factorize(self._covariance, self._factor):  # rounding made it indefinite: keep the axes' deviations
+        if self._generation % self._gap == 0 and not _factorize(
+            self._covariance, self._factor
+        ):  # rounding made it indefinite: keep the axes' deviations
             self._covariance = np.diag(np.diag(self._covariance))
             self._factor = np.sqrt(self._covariance)
 

@@ -135,16 +135,19 @@ def evolve(
     Returns:
         The better of the origin and the strategy's mean.
     """
-    stop, best = None, []
+    stop, best, columns = None, [], np.ascontiguousarray(metric.T)
     for _ in range(schedule.generations):
         if best and (stop := budget.exhausted()):
             break
         candidates = strategy.ask()
-        costs = problem.cost(origin + candidates @ metric.T)
+        thetas = candidates @ columns
+        thetas += origin
+        costs = problem.cost(thetas)
         strategy.tell(candidates, costs)
         budget.spend(len(candidates), generations=1)
         best = [*best, float(costs.min())][-PATIENCE:]
-        if len(best) == PATIENCE and max(np.ptp(costs), np.ptp(best)) < schedule.tolerance:
+        steady = len(best) == PATIENCE and max(best) - min(best) < schedule.tolerance
+        if steady and np.ptp(costs) < schedule.tolerance:
             stop = Stop.CONVERGED
             break
     theta = origin + metric @ strategy.mean
