@@ -4,9 +4,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from abs_service.experiments.warping.comparison import SCENES, SOURCE, TARGET, least_ms, opencv_alone_ms
 from calib.warp.mesh import MeshWarp
 from tests.calib.warp_scenes import image
-from tests.evaluation.warping import SCENES, SOURCE, TARGET, least_ms, opencv_alone_ms
 
 
 @pytest.mark.parametrize("threads", [1, 2])

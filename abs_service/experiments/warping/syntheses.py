@@ -1,0 +1,97 @@
+"""Every synthesis on the same sequences, whose sensors have lenses: what warping the input costs and saves.
+
+The demo rig and a second depth sensor, structured light. A frame costs the median of the processor time from images to
+estimate; a candidate the least of many times for a population, per member.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service.experiments.tracked import Followed, Shot, demo_plan, demo_rig, follow, shoot, simulate
+from abs_service.observation import Observer
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models import nurbs
+from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
+from abs_service.tracking import SynthesisSettings
+from calib.noise.structured_light import StructuredLight
+from calib.rig import Rig, Sensor
+
+SYNTHESES: Mapping[str, SynthesisSettings] = {
+    "sparse": sparse.Settings(),
+    "undistorted": undistorted.Settings(),
+    "warped": warped.Settings(),
+    "dense, step 4": dense.Settings(4),
+    "dense, step 2": dense.Settings(2),
+    "dense": dense.Settings(),
+}
+
+#: Barrel lens of all sensors.
+LENS = "-0.25,0.06"
+#: Candidates of the population that is timed, and how often.
+POPULATION, TIMES = 32, 30
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """The exposures of one seed, and the rig that took them."""
+
+    rig: Rig
+    shots: Sequence[Shot]
+
+
+@dataclass(frozen=True)
+class Row:
+    """Of one synthesis: mean vertex error [mm] of every sequence, and means over them.
+
+    Attributes:
+        frame_ms: processor time of a frame [ms].
+        candidate_us: time to synthesise and compare one candidate [µs].
+    """
+
+    vertex_mm: tuple[float, ...]
+    surface_mm: float
+    frame_ms: float
+    candidate_us: float
+
+
+def recorded(seed: int, frames: int) -> Recorded:
+    """The exposures of one seed."""
+    sensors = "sensors=tof,color,structured_light"
+    simulation = simulate(f"simulated://sheet?seed={seed}&{sensors}&lens={LENS}")
+    depth = Sensor("structured_light", simulation.heads["structured_light"].camera, StructuredLight())
+    known = demo_rig(simulate(f"simulated://sheet?seed={seed}&sensors=tof,color&lens={LENS}"))
+    return Recorded(Rig("e9", {**known.sensors, depth.name: depth}), shoot(simulation, range(frames)))
+
+
+def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row:
+    """Tracks all sequences with a synthesis; candidates are timed in the first frame of the first."""
+    found = [follow(one.rig, demo_plan(nurbs.Settings(), synthesis=synthesis), one.shots) for one in sequences]
+    return Row(
+        tuple(one.vertex_mm for one in found),
+        float(np.mean([one.surface_mm for one in found])),
+        float(np.mean([one.median_ms for one in found])),
+        _candidate_us(sequences[0], synthesis, _mesh(found[0])),
+    )
+
+
+def _mesh(found: Followed) -> Mesh:
+    return found.model.mesh
+
+
+def _candidate_us(sequence: Recorded, synthesis: SynthesisSettings, mesh: Mesh) -> float:
+    plan, model = demo_plan(nurbs.Settings()), Rigid(mesh)
+    objective = plan.objective.build(sequence.rig, mesh, synthesis.build(sequence.rig, mesh))
+    observation = Observer(sequence.rig).observe(sequence.shots[0].frames)
+    objective.observe(observation, model.deform(model.rest[None]))
+    thetas = np.random.default_rng(0).normal(0, 2e-3, (POPULATION, 6))
+    times = []
+    for _ in range(TIMES):
+        surface = model.deform(thetas)
+        begin = time.process_time()
+        objective.cost(surface)
+        times.append(time.process_time() - begin)
+    return min(times) / POPULATION * 1e6
