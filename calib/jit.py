@@ -1,13 +1,22 @@
 """The one place where kernel compilation is configured."""
 
 import functools
+import os
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 #: Sums may be reordered so that loops vectorise; not-a-number still behaves as one, because missing returns are NaN.
 _FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
+
+#: The range of a loop whose turns do not need each other: those over a population. Kernels divide it among as many
+#: threads as the environment says, and give the same numbers whatever it says.
+prange = range
+
+#: Says how many threads a kernel has; the compiler's own name for it. One if it is not set.
+THREADS = "NUMBA_NUM_THREADS"
 
 
 def kernel(function: Function) -> Function:
@@ -38,4 +47,17 @@ class _Kernel:
         for name, value in list(names.items()):
             if isinstance(value, _Kernel) and value is not self and name in self._function.__code__.co_names:
                 names[name] = value.compiled
-        return njit(cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH)(self._function)
+        options = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": _FASTMATH}
+        if "prange" in self._function.__code__.co_names and int(os.environ.get(THREADS, "1")) > 1:
+            return njit(parallel=True, **options)(_divided(self._function))
+        return njit(**options)(self._function)
+
+
+def _divided(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A copy whose loops over `prange` are divided; its other name keeps it apart in the compiler's cache."""
+    from numba import config, prange  # noqa: PLC0415
+
+    config.THREADING_LAYER = "omp"  # the one whose threads are ready at once, and which several may call
+    copy = FunctionType(function.__code__, function.__globals__ | {"prange": prange}, function.__name__)
+    copy.__module__, copy.__qualname__ = function.__module__, f"{function.__qualname__}_divided"
+    return copy

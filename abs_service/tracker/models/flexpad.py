@@ -14,7 +14,7 @@ from abs_service.tracker.rectangle import find_sheet
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracker.sighting import Sighting
 from calib import pose
-from calib.jit import kernel
+from calib.jit import kernel, prange
 
 #: Θ: bends of the eight sides, height map, rotation vector, translation.
 BENDS, HEIGHT, ROTATION, TRANSLATION = slice(0, 8), 8, slice(9, 12), slice(12, 15)
@@ -170,10 +170,10 @@ def _deform(
     """
     one, two = np.float32(1), np.float32(2)
     n = points.shape[1]
-    work = np.empty((8, n), np.float32)
-    x, y, z, g, h = work[0], work[1], work[2], work[3], work[4]
-    stretch_x, shear, stretch_y = work[5], work[6], work[7]
-    for k in range(row.shape[0]):
+    for k in prange(row.shape[0]):
+        work = np.empty((8, n), np.float32)
+        x, y, z, g, h = work[0], work[1], work[2], work[3], work[4]
+        stretch_x, shear, stretch_y = work[5], work[6], work[7]
         work[2:] = 0
         work[0], work[1] = points[0], points[1]
         # Few arrays in each loop: else the compiler gives up proving that it may vectorise.

@@ -13,7 +13,7 @@ from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.sighting import Sighting
 from abs_service.tracker.strip import Strip, find_strip
 from calib import pose
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.pose import Pose
 
 #: Columns of vertices that every segment has at least; with fewer its curvature could not be told from its direction.
@@ -184,8 +184,8 @@ def _deform(
         vertices, normals: results (population, 3, rows · columns).
     """
     columns, last = along.size, bends.shape[1] - 1
-    line = np.empty((6, columns), np.float32)
-    for k in range(bends.shape[0]):
+    for k in prange(bends.shape[0]):
+        line = np.empty((6, columns), np.float32)
         x, z, phi, segment = 0.0, 0.0, 0.0, 0  # where the segment begins
         for c in range(columns):
             while segment < last and along[c] > (segment + 1) * step:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models import spline
 from abs_service.tracker.models.base import Surface
-from calib.jit import kernel
+from calib.jit import kernel, prange
 
 #: Vertices whose results are collected before they are written: few enough to stay in the fastest cache. A constant,
 #: so that the compiler knows how far apart the rows of results are and need not fear that they overlap.
@@ -143,10 +143,9 @@ def _evaluate(
         vertices, normals: results (population, 3, n).
     """
     one, n = np.float32(1), vertices.shape[2]
-    result, c = np.empty((6, _TILE + _LANES), np.float32), np.empty((3, coefficients.shape[1]), np.float32)
-    cx, cy, cz = c[0], c[1], c[2]
-    for k in range(vertices.shape[0]):
-        s = 0
+    for k in prange(vertices.shape[0]):
+        result, c = np.empty((6, _TILE + _LANES), np.float32), np.empty((3, coefficients.shape[1]), np.float32)
+        cx, cy, cz, s = c[0], c[1], c[2], 0
         for first in range(0, n, _TILE):
             last = min(first + _TILE, n)
             begin = first

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.models.base import DeformationModel, Moves, Surface
 from abs_service.tracker.sighting import Sighting
 from calib import pose
-from calib.jit import kernel
+from calib.jit import kernel, prange
 
 #: Standard deviation of the rigid motion that is left to the shape [m].
 GAUGE_M = 1e-4
@@ -116,8 +116,8 @@ def _move(
 ) -> None:
     """Rotates vertices and normals (population, 3, n) about `center` (3,) and puts it where `motion` (…, 3, 4) says."""
     n = vertices.shape[2]
-    old = np.empty((2, 3, n), np.float32)
-    for k in range(vertices.shape[0]):
+    for k in prange(vertices.shape[0]):
+        old = np.empty((2, 3, n), np.float32)
         old[0], old[1] = vertices[k], normals[k]
         for i in range(3):
             r0, r1, r2 = motion[k, i, 0], motion[k, i, 1], motion[k, i, 2]

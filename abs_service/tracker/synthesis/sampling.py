@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib.fisheye import KannalaBrandt
 from calib.forward import bend_fisheye, straighten_fisheye
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.lens import LensModel
 
 #: Flattest angle (cosine) at which a surface's slope is followed to a pixel's centre.
@@ -45,7 +45,7 @@ def _sample(
     stride = width + 2
     per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
     columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
-    for k in range(vertices.shape[0]):
+    for k in prange(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
             x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
@@ -94,7 +94,7 @@ def _sample_pinhole(
     stride = width + 2
     per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
     columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
-    for k in range(vertices.shape[0]):
+    for k in prange(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
             x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
@@ -142,7 +142,7 @@ def _sample_fisheye(
     stride = width + 2
     per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
     columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
-    for k in range(vertices.shape[0]):
+    for k in prange(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
             x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]

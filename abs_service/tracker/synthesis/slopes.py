@@ -11,7 +11,7 @@ from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.forward import bend_fisheye
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.rig import PictureNoise, Rig
 
 
@@ -169,7 +169,7 @@ def _at_centers(
     one, two = np.float32(1), np.float32(2)
     fx, fy, cx, cy = matrix
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
-    for k in range(pixel.shape[0]):
+    for k in prange(pixel.shape[0]):
         for v in range(pixel.shape[1]):
             right, down = np.float32(0), np.float32(0)
             if pixel[k, v] > 0:
@@ -203,7 +203,7 @@ def _at_centers_fisheye(
     """What `_at_centers` is with the four coefficients of a fisheye."""
     one = np.float32(1)
     fx, fy, cx, cy = matrix
-    for k in range(pixel.shape[0]):
+    for k in prange(pixel.shape[0]):
         for v in range(pixel.shape[1]):
             right, down = np.float32(0), np.float32(0)
             if pixel[k, v] > 0:

@@ -15,7 +15,7 @@ from abs_service.tracker.terms.illumination import Illumination
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NO_WIDENING, NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 
 #: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
@@ -208,9 +208,9 @@ def _channel_cost(
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     samples, channels = factor.shape
-    for k in range(pixel.shape[0]):
+    for k in prange(pixel.shape[0]):
         total = np.float32(0)
-        own = k % appearance.shape[0]
+        own = np.intp(k) % appearance.shape[0]
         for v in range(pixel.shape[1]):
             if pixel[k, v] < 0:
                 continue

@@ -11,7 +11,7 @@ from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.color import GaussianColor
 
@@ -126,9 +126,9 @@ def _color_cost(
     half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     shared = inverse.shape[0] == 1
-    for k in range(pixel.shape[0]):
+    for k in prange(pixel.shape[0]):
         total = 0.0
-        own = k % colors.shape[0]
+        own = np.intp(k) % colors.shape[0]
         for v in range(pixel.shape[1]):
             if pixel[k, v] < 0:
                 continue

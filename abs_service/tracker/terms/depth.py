@@ -15,7 +15,7 @@ from abs_service.tracker.terms.outline import Outline, Unknown
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.camera import Camera
-from calib.jit import kernel
+from calib.jit import kernel, prange
 from calib.noise.base import WINDOW_M, DepthNoise, render_texture
 
 #: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
@@ -192,7 +192,7 @@ def _depth_cost(
     unbounded = np.float32(1e30)
     # No branches on what is measured: whether an outlier's bound is reached cannot be foreseen, and each wrong guess
     # takes the processor as long as several samples.
-    for k in range(pixel.shape[0]):
+    for k in prange(pixel.shape[0]):
         total, pixels, distances = 0.0, pixel[k], distance[k]
         for v in range(np.uintp(pixels.size)):
             i = pixels[v]
