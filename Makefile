@@ -1,5 +1,6 @@
 # Everything happens in .venv, from hash-pinned requirements: `make run` and `make test` on a bare machine are all the set-up.
 PYTHON ?= python3
+JSON ?= bench.json
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input install --quiet
 COMPILE := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --fork-strategy fewest \
@@ -16,8 +17,10 @@ lint: .venv/.dev ## format, style, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 format: .venv/.dev ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
-bench: .venv/.dev ## measure the hot parts; compare minima, machines differ
-	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,rounds $(ARGS)
+bench: .venv/.dev ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
+	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
+cost: .venv/.dev ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
+	@$(BIN)/python -m tests.benchmarks.growth docs/images/cost.png
 proto: .venv/.dev ## regenerate the wire code from proto/abs/v1/*.proto
 	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/abs/v1/*.proto
 constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
@@ -26,7 +29,7 @@ constraints: .venv/.dev ## resolve the pinned requirements again: make constrain
 	@$(COMPILE) --all-extras --constraints constraints-dev.txt --output-file constraints-devices.txt
 devices: .venv/.devices ## install every device SDK as well; the tests of their drivers are skipped without
 clean: ## remove .venv and every cache
-	rm -rf .venv build dist .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .venv/.created:
@@ -40,4 +43,4 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-dev.txt && touch $@
 .venv/.devices: .venv/.dev constraints-devices.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-devices.txt && touch $@
-.PHONY: help run test check lint format bench proto constraints devices clean
+.PHONY: help run test check lint format bench cost proto constraints devices clean

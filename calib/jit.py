@@ -57,7 +57,8 @@ def _divided(function: Callable[..., Any]) -> Callable[..., Any]:
     """A copy whose loops over `prange` are divided; its other name keeps it apart in the compiler's cache."""
     from numba import config, prange  # noqa: PLC0415
 
-    config.THREADING_LAYER = "omp"  # the one whose threads are ready at once, and which several may call
+    # OpenMP's threads wait ready for a moment, and several threads may call what they do.
+    config.THREADING_LAYER = "omp"  # pyright: ignore[reportAttributeAccessIssue]
     copy = FunctionType(function.__code__, function.__globals__ | {"prange": prange}, function.__name__)
     copy.__module__, copy.__qualname__ = function.__module__, f"{function.__qualname__}_divided"
     return copy

@@ -1,18 +1,42 @@
-"""Prints what the kernels cost per vertex and candidate, and in units of the yardstick, below the benchmarks."""
+"""Prints one table of everything that was measured, and adds it to what `--benchmark-json` writes."""
+
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
-KEY = "ns_per_vertex_and_candidate"
+#: Where a benchmark leaves rows of its own: {part: {threads: ns per vertex and candidate}}.
+KEY = "kernels"
+
+Row = dict[str, str | float]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     session = getattr(config, "_benchmarksession", None)
-    costs = {
-        bench.name: bench.extra_info[KEY] for bench in getattr(session, "benchmarks", ()) if KEY in bench.extra_info
-    }
-    if not costs:
+    rows = list(_rows(getattr(session, "benchmarks", ())))
+    if not rows or not session or session.disabled:
         return
-    yardstick = costs.get("test_yardstick", float("nan"))
-    terminalreporter.write_sep("-", "kernels: minimum, ns per vertex and candidate, ratio to the yardstick")
-    for name, cost in costs.items():
-        terminalreporter.write_line(f"{name.removeprefix('test_'):<44} {cost:7.2f} ns {cost / yardstick:6.2f}")
+    terminalreporter.write_sep("-", "minima; ns per vertex and candidate, ratio to the C++ yardstick")
+    heads = ("part", "ms", "1 thread, ns", "ratio", "2 threads, ns", "ratio")
+    terminalreporter.write_line(f"{heads[0]:<58}" + "".join(f"{head:>15}" for head in heads[1:]))
+    for row in rows:
+        cells = [row.get(key) for key in ("ms", "ns_1", "ratio_1", "ns_2", "ratio_2")]
+        line = f"{row['part']:<58}" + "".join(f"{'' if cell is None else f'{cell:.3g}':>15}" for cell in cells)
+        terminalreporter.write_line(line.rstrip())
+
+
+def pytest_benchmark_update_json(config: pytest.Config, benchmarks: list[Any], output_json: dict[str, Any]) -> None:
+    output_json["table"] = list(_rows(benchmarks))
+
+
+def _rows(benchmarks: Any) -> Iterator[Row]:
+    """A row for each kernel, with the time of both numbers of threads, and one for each other benchmark."""
+    for bench in benchmarks:
+        kernels = bench.extra_info.get(KEY, {})
+        for part, times in kernels.items():
+            row: Row = {"part": part}
+            for threads, ns in times.items():
+                row |= {f"ns_{threads}": ns, f"ratio_{threads}": ns / kernels["yardstick"][threads]}
+            yield row
+        if not kernels:
+            yield {"part": bench.name.removeprefix("test_"), "ms": 1e3 * bench.stats.min}

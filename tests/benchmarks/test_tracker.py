@@ -1,13 +1,7 @@
-"""What an estimate costs: kernels per vertex and candidate beside a C++ yardstick, set-up and whole frames.
+"""What an estimate costs: priors, set-up and whole frames; its kernels have a table of their own (`kernels`).
 
-Compare minima of one run with each other; machines, and hours on one machine, differ. The yardstick is a fused,
-hand-vectorised kernel for degree 2 and one knot span (deform, project, compare), kept outside the repository.
+Compare minima of one run with each other; machines, and hours on one machine, differ.
 """
-
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,11 +12,10 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Nurbs, Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
 from abs_service.tracker.priors import StretchPrior
-from abs_service.tracker.synthesis.sparse import Sparse, SparseView
+from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking import Tracking
 from calib.noise.base import render_texture
-from calib.rig import Rig
 from tests.tracker.differences import central_differences
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 from tests.tracker.scenes import sheet
@@ -43,72 +36,10 @@ def model_and_thetas(shape: tuple[int, int], mesh: Mesh = MESH):
     return model, model.rest + np.random.default_rng(1).normal(0, 2e-3, (POPULATION, len(model.rest)))
 
 
-def per_vertex(benchmark, population: int = POPULATION, vertices: int = VERTICES) -> None:
-    """Adds the number to compare; there is none where benchmarks are only run as tests."""
-    if benchmark.stats is not None:
-        benchmark.extra_info["ns_per_vertex_and_candidate"] = benchmark.stats.stats.min / population / vertices * 1e9
-
-
-def single_term(sensor: str, mesh: Mesh):
-    rig = Rig("r", {sensor: RIG.sensors[sensor]})
-    return Likelihood().build(rig, mesh, Sparse(rig, mesh))
-
-
-def test_yardstick(benchmark):
-    beside = Path(__file__).parents[3] / "shared" / "bench"
-    folder = Path(os.environ.get("ABS_SHARED_BENCH", beside))
-    if not (folder / "run_yardstick.py").is_file():
-        pytest.skip(f"no yardstick in {folder}; name its folder with ABS_SHARED_BENCH")
-    repeats = 1 if benchmark.disabled else 300
-    # In a process of its own: a library built with -ffast-math changes how its process rounds, for every test after it.
-    measure = f"import run_yardstick; print(run_yardstick.yardstick_ns({VERTICES}, {POPULATION}, repeats={repeats}))"
-    command = [sys.executable, "-c", measure]
-    printed = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout
-    benchmark.extra_info["ns_per_vertex_and_candidate"] = float(printed)
-    assert float(printed) > 0
-    benchmark.pedantic(lambda: None, rounds=1)
-
-
-@pytest.mark.parametrize("shape", [(3, 3), (4, 4), (6, 6), (12, 12)], ids=lambda shape: f"{shape[0]}x{shape[1]}")
-def test_deform(benchmark, shape):
-    model, thetas = model_and_thetas(shape)
-    assert benchmark(model.deform, thetas).vertices.shape == (POPULATION, 3, VERTICES)
-    per_vertex(benchmark)
-
-
-def test_synthesize(benchmark):
-    model, thetas = model_and_thetas((4, 4))
-    surface = model.deform(thetas)
-    synthesis = SparseView(RIG.sensors["tof"].camera, model.mesh.faces, model.mesh.colors)
-    assert (benchmark(synthesis.synthesize, surface).pixel > 0).all()
-    per_vertex(benchmark)
-
-
-@pytest.mark.parametrize("sensor", ["tof", "color"])
-def test_term_with_its_synthesis(benchmark, observation, sensor):
-    model, thetas = model_and_thetas((4, 4))
-    objective = single_term(sensor, model.mesh)
-    objective.observe(observation, model.deform(model.rest[None]))
-    surface = model.deform(thetas)
-    assert np.isfinite(benchmark(objective.cost, surface)).all()
-    per_vertex(benchmark)
-
-
-@pytest.mark.parametrize("shape", [(3, 3), (4, 4)], ids=lambda shape: f"{shape[0]}x{shape[1]}")
-def test_what_the_yardstick_does(benchmark, observation, shape):
-    """Deform, synthesise, depth term."""
-    model, thetas = model_and_thetas(shape)
-    objective = single_term("tof", model.mesh)
-    objective.observe(observation, model.deform(model.rest[None]))
-    assert np.isfinite(benchmark(lambda: objective.cost(model.deform(thetas)))).all()
-    per_vertex(benchmark)
-
-
-def test_stretch_prior(benchmark):
+def test_stretch_prior_32_candidates(benchmark):
     model, thetas = model_and_thetas((4, 4))
     prior, surface = StretchPrior(model.mesh, 0.02), model.deform(thetas)
     assert np.isfinite(benchmark(prior.cost, surface)).all()
-    per_vertex(benchmark)
 
 
 def test_per_frame_render_texture(benchmark, observation):

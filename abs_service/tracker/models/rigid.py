@@ -46,7 +46,8 @@ class Rigid:
         self.rest = np.zeros(6)
         self._centroid = mesh.vertices.mean(axis=0)
         self._arms = mesh.vertices - self._centroid
-        self._normals = mesh.normals
+        self._arms_32 = np.ascontiguousarray(self._arms.T, np.float32)
+        self._normals_32 = np.ascontiguousarray(mesh.normals.T, np.float32)
         radius = np.linalg.norm(self._arms, axis=1).max()
         self.scales = np.repeat([1 / max(radius, 1e-3), 1.0], 3)
         self.prior = np.zeros((0, 6))
@@ -54,10 +55,10 @@ class Rigid:
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Moves the mesh with every row of `thetas` (population, 6)."""
         rotations = scipy.spatial.transform.Rotation.from_rotvec(thetas[:, :3]).as_matrix()
-        centers = (self._centroid + thetas[:, 3:])[:, :, None]
-        vertices = rotations @ self._arms.T + centers
-        normals = rotations @ self._normals.T
-        return Surface(np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(normals, np.float32))
+        turns, shape = rotations.reshape(-1, 3).astype(np.float32), (len(thetas), 3, -1)
+        vertices, normals = (turns @ part for part in (self._arms_32, self._normals_32))
+        vertices += (self._centroid + thetas[:, 3:]).reshape(-1, 1).astype(np.float32)
+        return Surface(vertices.reshape(shape), normals.reshape(shape))
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, 6) of the vertices at theta (6,)."""

@@ -208,17 +208,18 @@ def _channel_cost(
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     samples, channels = factor.shape
+    # No branches on what is measured, see `depth._depth_cost`.
     for k in prange(pixel.shape[0]):
-        total = np.float32(0)
-        own = np.intp(k) % appearance.shape[0]
-        for v in range(pixel.shape[1]):
-            if pixel[k, v] < 0:
-                continue
-            texel = texture[pixel[k, v]]
-            channel = np.int32(texel[1])
-            row, column = (v if samples > 1 else 0), (channel if channels > 1 else 0)
-            e = (texel[0] - appearance[own, v, channel]) * texel[2] / factor[row, column]
+        total, pixels, looks = 0.0, pixel[k], appearance[np.intp(k) % appearance.shape[0]]
+        for v in range(np.uintp(pixels.size)):
+            i = pixels[v]
+            texel = texture[np.uintp(max(i, 0))]
+            channel = np.uintp(np.int32(texel[1]))
+            row, column = (v if samples > 1 else np.uintp(0)), (channel if channels > 1 else np.uintp(0))
+            e = (texel[0] - looks[v, channel]) * texel[2] / factor[row, column]
             normalizer = texel[3] + log_factor[row, column]
-            agreeing = half + normalizer if abs(e) > farthest else min(half * e * e + normalizer, most)
-            total += unknown if np.isnan(e) else agreeing
+            explained = min(half * e * e + normalizer, most)
+            cost = half + normalizer if abs(e) > farthest else explained
+            cost = unknown if np.isnan(e) else cost
+            total += cost if i >= 0 else np.float32(0)
         out[k] = total

@@ -126,19 +126,19 @@ def _color_cost(
     half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     shared = inverse.shape[0] == 1
+    # No branches on what is measured, see `depth._depth_cost`.
     for k in prange(pixel.shape[0]):
-        total = 0.0
-        own = np.intp(k) % colors.shape[0]
-        for v in range(pixel.shape[1]):
-            if pixel[k, v] < 0:
-                continue
-            measured, color = texture[pixel[k, v]], colors[own, v]
-            row = 0 if shared else v
+        total, pixels, looks = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
+        for v in range(np.uintp(pixels.size)):
+            i = pixels[v]
+            measured, color = texture[np.uintp(max(i, 0))], looks[v]
+            row = np.uintp(0) if shared else v
             red = (measured[0] - color[0]) * inverse[row, 0]
             green = (measured[1] - color[1]) * inverse[row, 1]
             blue = (measured[2] - color[2]) * inverse[row, 2]
             square = red * red + green * green + blue * blue
-            agreeing = average + normalizer[row]
-            cost = agreeing if square > farthest else min(normalizer[row] + half * square, most)
-            total += unknown if np.isnan(square) else cost
+            explained = min(normalizer[row] + half * square, most)
+            cost = average + normalizer[row] if square > farthest else explained
+            cost = unknown if np.isnan(square) else cost
+            total += cost if i >= 0 else np.float32(0)
         out[k] = total
