@@ -14,11 +14,16 @@ TITLE = "E4 and E5: a flat checker board under a bias that depends on the amplit
 #: Edge of a square [m].
 SQUARE_M = 0.05
 
+_ACROSS, _DOWN = places()
+
+BOARD = Board(
+    "checker board",
+    squared_print((np.floor(_ACROSS / SQUARE_M) + np.floor(_DOWN / SQUARE_M)) % 2 == 0),
+    Published((0.16, 0.11), (0.12, 0.09)),
+    {"FlexPad": 0.16 / 0.12, "NURBS": 1.0},
+)
+
 
 def run(settings: Settings, context: Context) -> Findings:
     """Tracks the board with NURBS and FlexPad, with the Euclidean fitness and the likelihood."""
-    across, down = places()
-    black = (np.floor(across / SQUARE_M) + np.floor(down / SQUARE_M)) % 2 == 0
-    published = Published((0.16, 0.11), (0.12, 0.09))
-    board = Board("checker board", squared_print(black), published, {"FlexPad": 0.16 / 0.12, "NURBS": 1.0})
-    return flat_boards.run(board, settings, context)
+    return flat_boards.run(BOARD, settings, context)

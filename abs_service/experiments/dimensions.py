@@ -53,7 +53,7 @@ class Settings:
 
 
 QUICK = Settings(
-    sequences=1, frames=12, interval_s=0.2, vertices=300, sizes=(4, 6), evolutions=((10, 18), (30, 18)),
+    sequences=1, frames=9, interval_s=0.2, vertices=300, sizes=(4, 6), evolutions=((10, 18), (30, 18)),
     references=((5, 18),), steps=(12,),
 )  # fmt: skip
 

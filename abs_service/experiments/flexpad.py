@@ -156,6 +156,11 @@ def run(settings: Settings, context: Context) -> Findings:
     goals = (
         at_least("Surface error, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "surface_mm"), 1.0),
         at_least("Error of the bends, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "bend"), 1.0),
+        at_least(
+            "Surface error, Euclidean that is bounded like the likelihood / likelihood",
+            report.ratio(tracked, "Euclidean, bounded", "surface_mm"),
+            1.0,
+        ),
     )
     return Findings(goals, report.sections(tracked, budgets, sequences[0]), report.values(tracked))
 

@@ -11,11 +11,14 @@ __all__ = ["QUICK", "TITLE", "Settings", "run"]
 
 TITLE = "E4 and E5: a flat white board with a black centre under a bias that depends on the amplitude"
 
+BOARD = Board(
+    "stripe board",
+    squared_print(np.abs(places()[0] - WIDTH / 2) < WIDTH / 6),
+    Published((0.92, 0.23), (0.24, 0.17)),
+    {"FlexPad": 3.8, "NURBS": 2.0},
+)
+
 
 def run(settings: Settings, context: Context) -> Findings:
     """Tracks the board, the middle third of which is black, with NURBS and FlexPad and with both fitness functions."""
-    across, _ = places()
-    black = np.abs(across - WIDTH / 2) < WIDTH / 6
-    published = Published((0.92, 0.23), (0.24, 0.17))
-    board = Board("stripe board", squared_print(black), published, {"FlexPad": 3.8, "NURBS": 2.0})
-    return flat_boards.run(board, settings, context)
+    return flat_boards.run(BOARD, settings, context)
