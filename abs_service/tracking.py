@@ -141,7 +141,7 @@ class Tracking:
             if self._tracker is None:
                 self._adopt(*self._begin(observation), observation)
             elif told or self._watch.overdue(observation.t_host_ns) or self._unseen.difference(observation.missing):
-                self._look_again(self._tracker.model.mesh, told, observation)
+                self._look_again(self._tracker, told, observation)
         except (SightingError, ModelError) as error:
             notes = (str(error),)
         if self._tracker is None:
@@ -154,8 +154,12 @@ class Tracking:
         """Looks for the object anew in the next frame set, whatever the old one was; safe from any thread."""
         self._told = True
 
-    def _look_again(self, lost: Mesh, told: bool, observation: Observation) -> None:
+    def _look_again(self, tracker: Tracker, told: bool, observation: Observation) -> None:
         """Begins anew if the object is in sight; SightingError or ModelError if it is not, or not the lost one."""
+        if not told and self._watch.keeps_mesh(observation.t_host_ns):
+            tracker.relocate(self._sight(observation).points)
+            return
+        lost = tracker.model.mesh
         begun, mesh = self._begin(observation)
         if not told and self._watch.is_another(mesh, lost):
             raise SightingError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
@@ -168,9 +172,12 @@ class Tracking:
         self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, PictureNoise))
         self.mesh_version += 1
 
+    def _sight(self, observation: Observation) -> Sighting:
+        return sight(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
+
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
         plan = self._plan
-        model = plan.model.build(sight(observation, self._rig, plan.reference, self._region, plan.vertices))
+        model = plan.model.build(self._sight(observation))
         synthesizer = plan.synthesis.build(self._rig, model.mesh)
         mesh = replace(
             dressed(model.mesh, observation.images, self._rig),

@@ -16,6 +16,8 @@ class Settings:
     Attributes:
         after_s: time that the object must be LOST before it is looked for anew [s]. Until then, and between the
             attempts, the search goes on from the last estimate, so that what was hidden for a moment keeps its mesh.
+        keep_s: so long after the loss, the old mesh is laid over what is found, so that its vertices stay the same
+            material; then a new mesh is made [s]. It is for objects that nothing else in sight is mistaken for.
         every_s: time between two attempts [s].
         confirm: so many estimates in a row must be good before the first says TRACKING; until then it is DEGRADED.
         size_ratio: what is found must not be larger or smaller than the lost object by more than this factor of its
@@ -23,6 +25,7 @@ class Settings:
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
+    keep_s: Annotated[float, Ge(0)] = 0.0
     every_s: Annotated[float, Gt(0)] = 0.2
     confirm: Annotated[int, Ge(1)] = 3
     size_ratio: Annotated[float, Gt(1)] = 2.0
@@ -45,6 +48,10 @@ class LossWatch:
             return False
         self._tried_ns = t_ns
         return True
+
+    def keeps_mesh(self, t_ns: int) -> bool:
+        """Whether the old mesh is still to be laid over what is found at `t_ns` [ns]."""
+        return self._lost_ns is not None and t_ns - self._lost_ns < self._settings.keep_s * 1e9
 
     def judge(self, estimate: Estimate) -> Estimate:
         """The estimate with hysteresis: after a loss the first good ones are DEGRADED."""

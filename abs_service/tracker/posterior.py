@@ -45,6 +45,10 @@ class Posterior:
         self._objective.observe(observation, self._model.deform(predicted[None]))
         return predicted
 
+    def restart(self, theta: NDArray[np.float64]) -> None:
+        """Expects the next observation's object near theta (dim,), wherever it was before."""
+        self._motion.restart(theta)
+
     def settle(self, theta: NDArray[np.float64]) -> None:
         """Takes what was found for the observation (dim,), from which the next one's motion is predicted."""
         self._motion.update(theta)

@@ -90,8 +90,7 @@ class MotionPrior:
 
     def __init__(self, rest: NDArray[np.float64], scales: NDArray[np.float64], settings: Settings):
         self.predicted = rest
-        self._settings = settings
-        self._scales = scales
+        self._settings, self._scales = settings, scales
         self._theta = rest
         self._velocity = np.zeros_like(rest)
         self._t_ns: int | None = None
@@ -107,10 +106,14 @@ class MotionPrior:
         travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
         self.predicted = self._theta + travel * self._velocity
 
+    def restart(self, theta: NDArray[np.float64]) -> None:
+        """Takes parameters (dim,) near which what was lost may be, as if it had not been seen for long."""
+        self._theta, self._velocity = theta, np.zeros_like(theta)
+        self._t_ns = (self._t_ns or 0) - round(LONGEST_INTERVAL_S * 1e9)
+
     def update(self, theta: NDArray[np.float64]) -> None:
         """Takes the parameters found for the frame in hand."""
-        self._velocity = (theta - self._theta) / self._elapsed_s
-        self._theta = theta
+        self._velocity, self._theta = (theta - self._theta) / self._elapsed_s, theta
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
@@ -120,8 +123,7 @@ class MotionPrior:
 
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives."""
-        inverse_deviation = self._inverse_deviation
-        return Linearization((theta - self.predicted) * inverse_deviation, np.diag(inverse_deviation))
+        return Linearization((theta - self.predicted) * self._inverse_deviation, np.diag(self._inverse_deviation))
 
     def _told(self) -> NDArray[np.float64]:
         """Inverse deviation (dim,) of the parameters around the predicted ones."""

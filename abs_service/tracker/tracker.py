@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from abs_service.observation import Observation
 from abs_service.tracker import status, uncertainty
 from abs_service.tracker.curvature import posterior_covariance
-from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome
 from abs_service.tracker.posterior import Posterior
+from abs_service.tracker.relocation import laid_over
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 
 
@@ -36,6 +37,7 @@ class Tracker:
         self._evaluations = evaluations
         self._verdict = verdict
         self._started = False
+        self._trusted = model.rest
         self._own = np.broadcast_to(model.mesh.deviation**2, len(model.mesh.vertices))
         self._knows_own = False
 
@@ -53,6 +55,11 @@ class Tracker:
         self._started = True
         self._posterior.settle(found.theta)
         return self._estimate(observation, found, budget)
+
+    def relocate(self, points: NDArray[np.float64]) -> None:
+        """Takes points (k, 3) [m] for the object, which was lost: the next observation's search begins there."""
+        self._posterior.restart(laid_over(self.model, self._trusted, points))
+        self._started = False
 
     def _covariances(
         self, theta: NDArray[np.float64], surface: Surface
@@ -85,6 +92,8 @@ class Tracker:
         fits = self._posterior.fits(found.theta)
         share = inlier_share(fits)
         verdict, reasons = status.judge(share, _hidden_share(fits), observation.missing, self._verdict)
+        if verdict == Status.TRACKING:
+            self._trusted = found.theta
         return Estimate(
             seq=observation.seq,
             t_host_ns=observation.t_host_ns,

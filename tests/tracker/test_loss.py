@@ -101,3 +101,14 @@ def test_a_tracker_that_is_told_to_begins_anew_at_once():
         if k == 2:
             tracking.reinitialize()
     assert versions == [1, 1, 1, 2, 2, 2]
+
+
+def test_a_mesh_is_kept_for_a_while():
+    watch = LossWatch(Settings(keep_s=1.0))
+    assert not watch.keeps_mesh(0)
+    watch.judge(estimate(0, Status.LOST))
+    assert watch.keeps_mesh(FRAME_NS)
+    assert not watch.keeps_mesh(1_100_000_000)
+    lost_for_good = LossWatch(Settings())
+    lost_for_good.judge(estimate(0, Status.LOST))
+    assert not lost_for_good.keeps_mesh(FRAME_NS)

@@ -118,7 +118,7 @@ def _leaps(leapt: Rows) -> Section:
             )
         )  # fmt: skip
     text = (
-        "After three frames, the sheet is elsewhere, 7 to 13 cm to the side, turned by up to 57° about the line of "
+        "After three frames, the sheet is elsewhere, 7 to 13 cm to the side, turned by up to 75° about the line of "
         "sight, tilted and bent otherwise, as if it had been out of sight. It is lost if its vertices are more than "
         f"{LOST_M * 1e3:.0f} mm off at the end."
     )

@@ -153,8 +153,8 @@ def spin(t: float) -> Moment:
 class Leap:
     """From the third frame on, the sheet is elsewhere: it was out of sight, or nobody looked.
 
-    It was moved by up to 20 cm, turned by up to 57° about the line of sight and 29° out of it, and is bent by up to
-    ±90° instead of up to ±40°.
+    It was moved by up to 20 cm, turned by up to 75° about the line of sight and tilted by up to 34°, and is bent by up
+    to ±110° instead of up to ±40°.
     """
 
     def __init__(self, generator: np.random.Generator):
@@ -162,10 +162,10 @@ class Leap:
             x, y, z = generator.uniform(-1, 1, 3) * sizes
             return float(x), float(y), float(z)
 
-        bends = generator.uniform(-1, 1, 2) * np.deg2rad([40, 90])
+        bends = generator.uniform(-1, 1, 2) * np.deg2rad([40, 110])
         x, y, z = within(0.05, 0.03, 0.05)
         turn = within(0.2, 0.3, 0.3)
-        tilt_x, tilt_y, about_sight = within(0.4, 0.5, 1.0)
+        tilt_x, tilt_y, about_sight = within(0.4, 0.6, 1.3)
         aside, down, away = within(0.05, 0.06, 0.15)
         self._before = Moment(float(bends[0]), turn, (x, y, 1 + z))
         self._after = Moment(
