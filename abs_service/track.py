@@ -1,11 +1,12 @@
-"""A tracker in a running rig: takes the newest frame set, publishes the estimate."""
+"""A tracker in a running rig: takes frame sets, publishes estimates."""
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
+from statistics import median
 
 from abs_service import estimates, keys
 from abs_service.bus.contract import MESH, STATE, Bus
-from abs_service.bus.frames import FrameSubscriber
+from abs_service.bus.frames import DEPTH, FrameSubscriber
 from abs_service.estimates import Effort, Identity
 from abs_service.health import Health, Level
 from abs_service.observation import ObservationError
@@ -18,10 +19,16 @@ from drivers.frame import FrameSet
 
 #: How long one turn waits for a frame [s]; a reader that is told to stop notices within this time.
 TURN_S = 0.05
+#: Turns of which the median says how fast the tracker is: a few slow ones, as after a stall, say nothing.
+TURNS = 9
 
 
-class NewestSets:
-    """The newest frame set there is; older ones that nobody took in time are counted.
+class WaitingSets:
+    """The frame sets that a tracker has still to take.
+
+    A tracker that is faster than the cameras gets all of them, in order: what a stall of the machine has left waiting
+    is worked off within a few frames. A slower one gets the newest, or it would fall back more and more; the others are
+    counted.
 
     Args:
         frames: where frames come from.
@@ -37,6 +44,9 @@ class NewestSets:
         self._frames = frames
         self._synchroniser = synchroniser
         self._clock = clock
+        self._waiting: deque[FrameSet] = deque()
+        self._turns_ns: deque[int] = deque(maxlen=TURNS)
+        self._taken_ns: int | None = None  # when the set was taken that is being worked on
 
     @property
     def counters(self) -> Mapping[str, int]:
@@ -66,15 +76,30 @@ class NewestSets:
         return self._frames.last_error
 
     def take(self) -> FrameSet | None:
-        """The newest set after everything that has arrived; None if there is none yet."""
-        sets: list[FrameSet] = []
-        frame = self._frames.take(TURN_S)
+        """The next set; None if there is none yet. Whoever calls is done with the last one."""
+        if self._taken_ns is not None:
+            self._turns_ns.append(self._clock() - self._taken_ns)
+        self._collect()
+        allowed = DEPTH if self._keeps_up() else 1
+        while len(self._waiting) > allowed:
+            self._waiting.popleft()
+            self.skipped += 1
+        self._taken_ns = self._clock() if self._waiting else None
+        return self._waiting.popleft() if self._waiting else None
+
+    def _collect(self) -> None:
+        frame = self._frames.take(0 if self._waiting else TURN_S)
         while frame is not None:
-            sets += self._synchroniser.add(frame)
+            self._waiting.extend(self._synchroniser.add(frame))
             frame = self._frames.take(0)
-        sets += self._synchroniser.poll(self._clock())
-        self.skipped += max(len(sets) - 1, 0)
-        return sets[-1] if sets else None
+        self._waiting.extend(self._synchroniser.poll(self._clock()))
+
+    def _keeps_up(self) -> bool:
+        """Whether a turn usually takes less time than lies between the sets that wait."""
+        if len(self._waiting) < 2 or not self._turns_ns:
+            return False
+        interval_ns = (self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns) / (len(self._waiting) - 1)
+        return median(self._turns_ns) < interval_ns
 
 
 class EstimatePublisher:
@@ -92,7 +117,8 @@ class EstimatePublisher:
         """Publishes an estimate, after the topology of its mesh if that is new."""
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
             self._identity = estimates.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
-            header = self._speaker.header(tracking.made_ns, self._seq, keys.RIG_FRAME)
+            # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
+            header = self._speaker.header(tracking.made_ns, tracking.mesh_version, keys.RIG_FRAME)
             self._topology.put(estimates.topology(header, tracking.mesh, self._identity).SerializeToString())
         header = self._speaker.header(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
         self._state.put(estimates.state(header, estimate, self._identity, effort).SerializeToString())
@@ -116,7 +142,7 @@ class LiveTracker:
     def __init__(
         self,
         tracking: Tracking,
-        sets: NewestSets,
+        sets: WaitingSets,
         publisher: EstimatePublisher,
         health: Health,
         residuals: ResidualWatch,
@@ -133,7 +159,7 @@ class LiveTracker:
         self._reported = 0
 
     def turn(self) -> None:
-        """Handles the newest frame set, if there is one."""
+        """Handles the next frame set, if there is one."""
         frames = self._sets.take()
         if frames is None:
             return

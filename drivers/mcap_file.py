@@ -21,7 +21,8 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 
-#: Uncompressed bytes after which a chunk is closed; what a reader must decompress to reach one message.
+#: Uncompressed bytes after which a chunk is closed; what a reader must decompress to reach one message. Four times
+#: as many cost the recorder twice the time, since such buffers come from the system anew for every chunk.
 CHUNK_SIZE = 1 << 20
 
 #: Name of the metadata records that repeat what each channel is: its id, topic and schema.

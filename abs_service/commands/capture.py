@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from abs_service import announcements, config, keys, plugins
+from abs_service import announcements, config, keys, pauses, plugins
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
 from abs_service.capture import DeviceKeeper
@@ -68,6 +68,7 @@ def _keeper(
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
         crier.add_device(name, device)
+        pauses.keep_what_is_loaded()
 
     return DeviceKeeper(
         name,

@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-from abs_service import config
+from abs_service import config, pauses
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 
@@ -42,6 +42,7 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> ZenohB
     Raises:
         BusError: it cannot be opened.
     """
+    pauses.take_short_turns()
     role = Role.ROUTER if arguments.listen else Role.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
     return ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory)

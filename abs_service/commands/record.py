@@ -14,7 +14,7 @@ import sys
 import tempfile
 import threading
 
-from abs_service import config
+from abs_service import config, pauses
 from abs_service.commands import participant
 from abs_service.exits import Exit
 from abs_service.health import Health, Level
@@ -25,6 +25,8 @@ from drivers.mcap_file import Compression
 
 #: Time to write what still waits when told to stop [s].
 DRAIN_S = 2.5
+#: How far recording steps back for capture and tracking where cores are scarce: it has a queue, they have no time.
+NICE = 5
 
 
 class DirectoryError(Exception):
@@ -49,7 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
         # Beside the recording, which must not wait for what may take minutes.
         threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock)
+        os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         recorder.start()
+        pauses.keep_what_is_loaded()
         while not stop.wait(0.2):
             if health.due():
                 clock.measure()

@@ -21,7 +21,7 @@ from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
 
 from rich.console import Console
 
-from abs_service import config, keys
+from abs_service import config, keys, pauses
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands import participant
@@ -54,6 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until told to stop, until its devices are at their end, or until nothing can go on."""
     rig = effective(participant.load_config(arguments), arguments)
     stop = participant.stop_on_signals()
+    pauses.take_short_turns()  # what the router passes on may have to wait for the threads of this process
     with (
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 from abs.v1.sensor_model_pb2 import SensorModel
 
-from abs_service import config, keys
+from abs_service import config, keys, pauses
 from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.commands import participant, plans
@@ -21,7 +21,7 @@ from abs_service.exits import Exit
 from abs_service.health import Health, Level
 from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker, WallClock
-from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
+from abs_service.track import EstimatePublisher, LiveTracker, WaitingSets
 from abs_service.tracking import Plan, Tracking, streams
 from abs_service.warmup import warm_up
 from calib.camera import Camera
@@ -60,6 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         health.publish()
         if stop.is_set():
             return Exit.OK
+        pauses.keep_what_is_loaded()
         rig = plans.rig(settings, name, cameras)
         tracking = Tracking(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
@@ -88,7 +89,7 @@ def _live(
     synchroniser = plans.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,
-        NewestSets(frames, synchroniser, time.monotonic_ns),
+        WaitingSets(frames, synchroniser, time.monotonic_ns),
         EstimatePublisher(bus, speaker, name, plans.model_name(settings, name), rig.calib_id),
         health,
         ResidualWatch(health),

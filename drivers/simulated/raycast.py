@@ -104,26 +104,31 @@ def soften_edges(
     """Replaces what `cast` found at the rim of the sheet by means over sub-rays, in place.
 
     Directions between pixels are interpolated from the neighbours', which is exact to second order in a pixel's size.
+    Written out in scalars: small arrays would take as long as all the rest.
     """
     height, width = rays.shape[:2]
     center = share.copy()
     for row in range(1, height - 1):
         for column in range(1, width - 1):
             filled = np.float32(0)
-            for i in range(3):  # written out, because a slice and its sum would take longer than everything else
+            for i in range(3):
                 filled += (
                     center[row - 1 + i, column - 1] + center[row - 1 + i, column] + center[row - 1 + i, column + 1]
                 )
-            if filled in {0, 9}:
+            if not 0 < filled < 9:
                 continue
-            x, y, z = rays[row, column]
-            right = (rays[row, column + 1] - rays[row, column - 1]) / (2 * _SUBRAYS)
-            down = (rays[row + 1, column] - rays[row - 1, column]) / (2 * _SUBRAYS)
+            x, y, z = rays[row, column, 0], rays[row, column, 1], rays[row, column, 2]
+            right_x = (rays[row, column + 1, 0] - rays[row, column - 1, 0]) / (2 * _SUBRAYS)
+            right_y = (rays[row, column + 1, 1] - rays[row, column - 1, 1]) / (2 * _SUBRAYS)
+            right_z = (rays[row, column + 1, 2] - rays[row, column - 1, 2]) / (2 * _SUBRAYS)
+            down_x = (rays[row + 1, column, 0] - rays[row - 1, column, 0]) / (2 * _SUBRAYS)
+            down_y = (rays[row + 1, column, 1] - rays[row - 1, column, 1]) / (2 * _SUBRAYS)
+            down_z = (rays[row + 1, column, 2] - rays[row - 1, column, 2]) / (2 * _SUBRAYS)
             distance, a, b, cosine, hits = 0.0, 0.0, 0.0, 0.0, 0
             for i in range(_SUBRAYS * _SUBRAYS):
                 u, v = (i % _SUBRAYS) - 0.5 * (_SUBRAYS - 1), (i // _SUBRAYS) - 0.5 * (_SUBRAYS - 1)
-                dx, dy = x + u * right[0] + v * down[0], y + u * right[1] + v * down[1]
-                dz = z + u * right[2] + v * down[2]
+                dx, dy = x + u * right_x + v * down_x, y + u * right_y + v * down_y
+                dz = z + u * right_z + v * down_z
                 norm = 1 / np.sqrt(dx * dx + dy * dy + dz * dz)
                 found = _follow(dx * norm, dy * norm, dz * norm, T_bs, sheet)
                 if not np.isnan(found[0]):

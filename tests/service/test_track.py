@@ -1,4 +1,4 @@
-"""A live tracker takes the newest frame set, counts what it passed over, and announces its mesh before it uses it."""
+"""A live tracker takes frame sets, counts what it passed over, and announces its mesh before it uses it."""
 
 import dataclasses
 
@@ -15,7 +15,7 @@ from abs_service.health import Health
 from abs_service.residuals import ResidualWatch
 from abs_service.stamps import Speaker, WallClock
 from abs_service.synchroniser import Synchroniser
-from abs_service.track import EstimatePublisher, LiveTracker, NewestSets
+from abs_service.track import EstimatePublisher, LiveTracker, WaitingSets
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking import Tracking, streams
 from drivers import codec
@@ -38,9 +38,10 @@ class Bench:
         self.speaker = Speaker("demo", self.wall)
         self.health = Health(self.bus, "track/sheet", self.speaker)
         frames = FrameSubscriber(self.bus, MEMBERS)
-        self.sets = NewestSets(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
+        self.sets = WaitingSets(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
+        self.tracking = Tracking(RIG, default_plan(optimizer=cma.Settings(generations=2)))
         self.live = LiveTracker(
-            Tracking(RIG, default_plan(optimizer=cma.Settings(generations=2))),
+            self.tracking,
             self.sets,
             EstimatePublisher(self.bus, self.speaker, "sheet", "nurbs", RIG.calib_id),
             self.health,
@@ -114,7 +115,7 @@ def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
     assert [MeshTopology.FromString(s.payload) for s in bench.bus.ask("sheet/topology", 0.0)] == [topology]
 
 
-def test_the_newest_set_wins_and_the_others_are_counted(bench):
+def test_before_a_tracker_is_known_to_be_fast_the_newest_set_wins_and_the_others_are_counted(bench):
     for k in range(3):
         bench.expose(k)
     bench.live.turn()
@@ -123,6 +124,42 @@ def test_the_newest_set_wins_and_the_others_are_counted(bench):
     assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(2), SIMULATION.time_ns(3)]
     assert [state.skipped for state in bench.states] == [2, 0]
     assert bench.said.counters["skipped"] == 2
+
+
+def test_a_tracker_that_is_faster_than_the_cameras_works_off_what_a_stall_left(bench):
+    for k in range(4):  # three quick turns and a slow one
+        bench.expose(k)
+        bench.live.turn()
+        bench.now_ns += 20_000_000 if k < 3 else 120_000_000
+        if k < 3:
+            bench.live.turn()  # finds nothing
+    for k in range(4, 7):
+        bench.expose(k)
+    for _ in range(3):
+        bench.live.turn()
+        bench.now_ns += 20_000_000
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in range(7)]
+    assert bench.said.counters["skipped"] == 0
+
+
+def test_a_slower_tracker_takes_the_newest(bench):
+    for k in range(6):
+        bench.expose(k)
+        if k % 2:
+            bench.live.turn()
+            bench.now_ns += 50_000_000
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in (1, 3, 5)]
+    assert [state.skipped for state in bench.states] == [1, 1, 1]
+
+
+def test_topologies_are_numbered_by_themselves_so_that_a_recorder_misses_none(bench):
+    for k in range(3):
+        bench.expose(k)
+        bench.live.turn()
+    bench.tracking.reinitialize()
+    bench.expose(3)
+    bench.live.turn()
+    assert [topology.header.seq for topology in bench.sent("sheet/topology", MeshTopology)] == [1, 2]
 
 
 def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):

@@ -1,0 +1,31 @@
+"""What keeps Python from pausing a process while a frame waits."""
+
+import gc
+import sys
+
+import pytest
+
+from abs_service import pauses
+
+
+@pytest.fixture
+def as_it_was():
+    interval_s = sys.getswitchinterval()
+    yield
+    sys.setswitchinterval(interval_s)
+    gc.unfreeze()
+
+
+@pytest.mark.usefixtures("as_it_was")
+def test_threads_take_short_turns():
+    sys.setswitchinterval(0.005)
+    pauses.take_short_turns()
+    assert sys.getswitchinterval() == pytest.approx(pauses.SWITCH_S)
+
+
+@pytest.mark.usefixtures("as_it_was")
+def test_what_is_loaded_is_searched_for_garbage_no_more():
+    frozen = gc.get_freeze_count()
+    pauses.keep_what_is_loaded()
+    assert gc.get_freeze_count() > frozen + 1000
+    assert len(gc.get_objects()) < 1000
