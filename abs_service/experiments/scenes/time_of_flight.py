@@ -51,6 +51,7 @@ class TimeOfFlight:
         mu_amplitude: mean offset times amplitude [m]: what is dark looks farther away, or nearer if negative.
         amplitude_deviation: deviation of the amplitude.
         least_amplitude: a weaker return is reported as none.
+        illumination: share of the lamp's light that goes where each pixel looks (height, width), or one for all ().
     """
 
     factor: NDArray[np.float64] = field(default_factory=lambda: np.ones(()))
@@ -62,6 +63,11 @@ class TimeOfFlight:
     mu_amplitude: float = 0.0
     amplitude_deviation: float = 25.0
     least_amplitude: float = 100.0
+    illumination: NDArray[np.float64] = field(default_factory=lambda: np.ones(()))
+
+    def amplitude(self, view: View) -> NDArray[np.float64]:
+        """Amplitudes (height, width) without noise."""
+        return WHITE * self.illumination * view.light
 
     def deviation(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.float64]:
         """σ [m] of every pixel (height, width) at its distance [m] and amplitude."""
@@ -75,7 +81,7 @@ class TimeOfFlight:
 
     def measure(self, view: View, generator: np.random.Generator, exposures: int = 1) -> Measurement:
         """Takes an exposure, or the mean of several of the same view."""
-        amplitude = WHITE * view.light
+        amplitude = self.amplitude(view)
         normal = generator.standard_normal((2, *amplitude.shape)) / np.sqrt(exposures)
         with np.errstate(invalid="ignore"):
             distance = view.distance + self.mean(view.distance, amplitude)

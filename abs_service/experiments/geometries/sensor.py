@@ -1,0 +1,99 @@
+"""The camera of E1: how it really errs, and what its calibration makes of that (section 5.1 of the paper)."""
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.experiments.scenes.rendering import Renderer
+from abs_service.experiments.scenes.surfaces import Wall
+from abs_service.experiments.scenes.time_of_flight import SR4000, TimeOfFlight
+from calib.noise import per_pixel, tof_amplitude
+from calib.noise.per_pixel import PerPixel
+from calib.noise.region_polynomial import blocks
+from calib.noise.samples import Samples, from_images
+from calib.noise.shrinkage import Repeats
+from calib.sequences.evidence import thinned
+
+#: Distances of the static sequences [m], as in the paper's figure 8, and reflectivities of the materials.
+DISTANCES, MATERIALS = (0.753, 1.185, 1.606, 2.193, 2.652), (0.9, 0.5, 0.17)
+
+#: Share of the light of the centre that the lamp sends to the corners of the image.
+CORNER = 0.3
+
+#: Frames of a sequence whose single measurements tell the law of the image, and how many of all of these.
+FEW, LARGEST = 2, 20_000
+
+#: Sides of the regions [px] by which the image differs from its law.
+REGION_PX = 8
+
+#: Deviation of the logarithm of the pixels' own factors on the deviation.
+SCATTER = 0.3
+
+
+def true_sensor(generator: np.random.Generator) -> TimeOfFlight:
+    """A camera whose light falls off to the corners, and whose pixels differ; it has no mean offset."""
+    v, u = np.indices((SR4000.height, SR4000.width))
+    radius = np.hypot((u - SR4000.cx) / SR4000.cx, (v - SR4000.cy) / SR4000.cy) / np.sqrt(2)
+    factor = np.exp(SCATTER * generator.standard_normal(radius.shape))
+    return TimeOfFlight(factor, illumination=1 - (1 - CORNER) * radius**2)
+
+
+def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator) -> PerPixel:
+    """What static sequences of walls tell of it: a law of the image, and how every pixel differs.
+
+    It is the form that `abs-service calibrate noise` chooses for such a sensor, fitted by the same functions. The mean
+    offsets of the pixels are left out: where a sensor has none, they are noise of the calibration.
+
+    Args:
+        sensor: the camera.
+        frames: of every sequence.
+        generator: draws the noise.
+    """
+    walls = [_Static(sensor, depth, material, frames, generator) for depth in DISTANCES for material in MATERIALS]
+    law = tof_amplitude.fit(thinned(_joined([wall.singles for wall in walls]), LARGEST, generator))
+    repeats = Repeats(*(np.concatenate([getattr(wall.repeats, key) for wall in walls]) for key in Repeats._fields))
+    labels = blocks(SR4000.height, SR4000.width, REGION_PX)
+    model = per_pixel.fit(_joined([wall.means for wall in walls]), law, labels, repeats=repeats)
+    return replace(model, offset=np.zeros_like(model.offset))
+
+
+class _Static:
+    """A static sequence of a wall at right angles to the optical axis.
+
+    Attributes:
+        singles: measurements of the first frames.
+        means: of every pixel over all frames.
+        repeats: of the means.
+    """
+
+    def __init__(
+        self, sensor: TimeOfFlight, depth: float, material: float, frames: int, generator: np.random.Generator
+    ):
+        view = Renderer(SR4000, Wall(depth, material)).render()
+        measured = [sensor.measure(view, generator) for _ in range(frames)]
+        distance, amplitude = (
+            np.stack(part).astype(float) for part in zip(*((one.distance, one.amplitude) for one in measured))
+        )
+        self.singles = from_images(distance[:FEW], view.distance, amplitude[:FEW]).returns(with_amplitude=True)
+        times = np.isfinite(distance).sum(axis=0)
+        some = times > 1
+        mean = np.nanmean(distance[:, some], axis=0)
+        rows, columns = np.nonzero(some)
+        self.means = Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], rows, columns)
+        variance = np.nanmean((distance[:, some] - mean) ** 2, axis=0)
+        self.repeats = Repeats(times[some].astype(float), variance)
+
+
+def _joined(parts: Sequence[Samples]) -> Samples:
+    return Samples(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)))
+
+
+def relative_error(
+    model: PerPixel, sensor: TimeOfFlight, distance: NDArray[np.float64], amplitude: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """σ of the model over the true one, less 1, at every pixel (height, width)."""
+    rows, columns = np.indices(distance.shape)
+    found = model.deviation(distance.ravel(), amplitude.ravel(), (rows.ravel(), columns.ravel()))
+    return found.reshape(distance.shape) / sensor.deviation(distance, amplitude) - 1
