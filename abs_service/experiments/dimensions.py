@@ -47,7 +47,7 @@ class Settings:
     vertices: int = 400
     sizes: tuple[int, ...] = (4, 6, 8, 10)
     size: int = 6
-    evolutions: tuple[tuple[int, int], ...] = ((3, 18), (10, 18), (30, 18), (100, 18), (300, 18), (100, 40), (1000, 40))
+    evolutions: tuple[tuple[int, int], ...] = ((3, 18), (10, 18), (30, 18), (100, 18), (300, 18), (100, 40), (300, 40))
     references: tuple[tuple[int, int], ...] = ((10, 18), (100, 18))
     steps: tuple[int, ...] = (1, 2, 4, 12)
 
@@ -127,6 +127,7 @@ def _figures(runs: Sequence[Followed]) -> dict[str, float]:
         "evaluations": float(np.mean([one.evaluations for one in runs])),
         "median_ms": float(np.median([one.median_ms for one in runs])),
         "tracked": float(np.mean([one.tracked for one in runs])),
+        "found_again": float(np.sum([one.found_again for one in runs])),
     }
 
 
@@ -136,8 +137,8 @@ def control_error_mm(followed: Followed) -> float:
     The control points at a rim are only known as well as the few vertices that they move.
     """
     errors = []
-    for estimate, points in zip(followed.estimates[1:], followed.material[1:]):
-        jacobian = followed.model.jacobian(estimate.theta)
+    for model, estimate, points in list(zip(followed.models, followed.estimates, followed.material))[1:]:
+        jacobian = model.jacobian(estimate.theta)
         away = (points - estimate.vertices).ravel()
         off = np.linalg.lstsq(jacobian.reshape(away.size, -1), away, rcond=None)[0]
         errors.append(np.linalg.norm(off.reshape(-1, 3), axis=1).mean())
@@ -157,7 +158,7 @@ def _table(caption: str, runs: Mapping[str, Sequence[Followed]], first: str) -> 
     columns = (
         Column(first), Column("dimensions", "", ".0f"), Column("vertex", "mm", ".2f"), Column("surface", "mm", ".2f"),
         Column("control points", "mm", ".2f"), Column("worst frame", "mm", ".2f"), Column("evaluations", "", ".0f"),
-        Column("time", "ms", ".0f"), Column("TRACKING", "", ".0%"),
+        Column("time", "ms", ".0f"), Column("TRACKING", "", ".0%"), Column("found again", "", ".0f"),
     )  # fmt: skip
     return Table(caption, columns, tuple((name, *_figures(one).values()) for name, one in runs.items()))
 

@@ -157,7 +157,12 @@ def _course(compared: Sequence[Comparison]) -> Picture:
     for axes, one in zip(figure.subplots(1, len(first)), first.values()):
         for title, errors in one.errors.items():
             axes.plot(errors, lw=0.8, label=title)
-        axes.set(title=one.model, xlabel="frame", ylabel=f"deviation from flat {one.unit}", ylim=(0, None))
+        axes.set(
+            title=one.model,
+            xlabel="frame",
+            ylabel="deviation from flat" + (f" [{one.unit}]" if one.unit else ""),
+            ylim=(0, None),
+        )
         axes.legend()
     return drawing(figure, "Deviation from flat, frame by frame.", "The Euclidean fitness is above the likelihood")
 

@@ -16,6 +16,7 @@ from abs_service.experiments.flexpad_report import Errors, Tracked
 from abs_service.experiments.static_walls import learnt
 from abs_service.experiments.tracked import Followed, Shot, demo_plan, follow, mean_deviation, shoot, squares
 from abs_service.tracker.models import flexpad
+from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracking import OptimizerSettings
@@ -129,7 +130,7 @@ class Bent:
         for number, estimate in enumerate(followed.estimates):
             placement = self.moves.at(estimate.t_host_ns * 1e-9)
             true[number, first : first + 2] = -2 * MODEL.least_radius_m * placement.curvature
-            poses.append(_pose_error(_unbent(followed, estimate.theta), placement.T_rp))
+            poses.append(_pose_error(_unbent(followed.models[number], estimate.theta), placement.T_rp))
         rotation, translation = np.mean(poses, axis=0)
         return Errors(bends, true, followed.thetas[:, flexpad.HEIGHT], float(rotation), float(translation))
 
@@ -184,10 +185,10 @@ def _camera() -> Camera:
     return OPTICS["tof"].camera(OPTICS["tof"].width, OPTICS["tof"].height, Lens())
 
 
-def _unbent(followed: Followed, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+def _unbent(model: DeformationModel, theta: NDArray[np.float64]) -> NDArray[np.float64]:
     """The vertices (n, 3) [m] that theta has without its bends: where its pose puts the flat sheet."""
     flat = np.concatenate([np.zeros(flexpad.HEIGHT + 1), theta[flexpad.HEIGHT + 1 :]])
-    return followed.model.deform(flat[None]).vertices[0].T.astype(np.float64)
+    return model.deform(flat[None]).vertices[0].T.astype(np.float64)
 
 
 def _pose_error(flat: NDArray[np.float64], T_rp: Pose) -> tuple[float, float]:

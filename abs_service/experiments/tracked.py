@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,14 +80,14 @@ class Followed:
     """What a tracker made of a sequence.
 
     Attributes:
-        model: as it was built from the first shot.
+        models: that every estimate's parameters are those of; another one where a lost object was found again.
         estimates: of every shot.
         errors: of every estimate.
         material: where the vertices' own material points (n, 3) really were [m], of every shot.
         cpu_ms: processor time of every shot [ms].
     """
 
-    model: DeformationModel
+    models: Sequence[DeformationModel]
     estimates: Sequence[Estimate]
     errors: Sequence[Errors]
     material: Sequence[NDArray[np.float64]]
@@ -101,6 +102,16 @@ class Followed:
     def surface_mm(self) -> float:
         """Mean surface error [mm]."""
         return float(np.mean([error.surface_mm for error in self.errors]))
+
+    @property
+    def model(self) -> DeformationModel:
+        """The last model."""
+        return self.models[-1]
+
+    @property
+    def found_again(self) -> int:
+        """How often a lost object was found again: its vertices are then compared with other material points."""
+        return sum(one is not other for one, other in pairwise(self.models))
 
     @property
     def worst_mm(self) -> float:
@@ -135,7 +146,7 @@ def follow(rig: Rig, plan: Plan, shots: Sequence[Shot]) -> Followed:
         UntrackedError: no object is in sight in its first shot.
     """
     tracking, truths = Tracking(rig, plan), TruthComparison()
-    estimates, errors, material, cpu_ms = [], [], [], []
+    models, estimates, errors, material, cpu_ms = [], [], [], [], []
     for shot in shots:
         t_ns, known, begun = shot.frames.stamp_ns, tracking.mesh_version, time.process_time()
         estimate = tracking.track(shot.frames, lambda: True)
@@ -146,12 +157,11 @@ def follow(rig: Rig, plan: Plan, shots: Sequence[Shot]) -> Followed:
         error, points = truths.compare(t_ns, estimate.vertices), truths.material_points(t_ns)
         if error is None or points is None or tracking.model is None:
             raise UntrackedError(f"exposure {shot.frames.seq}: {', '.join(estimate.reasons)}")
+        models.append(tracking.model)
         estimates.append(estimate)
         errors.append(error)
         material.append(points)
-    if tracking.model is None:
-        raise UntrackedError("a sequence without shots")
-    return Followed(tracking.model, estimates, errors, material, cpu_ms)
+    return Followed(models, estimates, errors, material, cpu_ms)
 
 
 def mean_deviation(rig: Rig, sensor: str, shot: Shot, nearer_than: float) -> float:
