@@ -3,6 +3,7 @@ PYTHON ?= python3
 JSON ?= bench.json
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input install --quiet
+DEVICES := oak kinect realsense import
 COMPILE := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --fork-strategy fewest \
 	--generate-hashes --no-annotate --custom-compile-command "make constraints" $(ARGS)
 
@@ -26,7 +27,9 @@ proto: .venv/.dev ## regenerate the wire code from proto/abs/v1/*.proto
 constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
 	@$(COMPILE) --group dev --constraints constraints.txt --output-file constraints-dev.txt
-	@$(COMPILE) --all-extras --constraints constraints-dev.txt --output-file constraints-devices.txt
+	@$(COMPILE) $(DEVICES:%=--extra %) --constraints constraints-dev.txt --output-file constraints-devices.txt
+	@$(COMPILE) --extra peers --constraints constraints-dev.txt --output-file constraints-peers.txt
+peers: .venv/.peers ## install what `abs-service evaluate peers` compares with; without, those rows are left out
 devices: .venv/.devices ## install every device SDK as well; the tests of their drivers are skipped without
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
@@ -43,4 +46,6 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-dev.txt && touch $@
 .venv/.devices: .venv/.dev constraints-devices.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-devices.txt && touch $@
-.PHONY: help run test check lint format bench cost proto constraints devices clean
+.venv/.peers: .venv/.dev constraints-peers.txt
+	@$(PIP) --require-hashes --only-binary :all: -r constraints-peers.txt && touch $@
+.PHONY: help run test check lint format bench cost proto constraints devices peers clean

@@ -16,9 +16,10 @@ import abs_service
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("abs_service", "drivers", "calib")
-CONSTRAINTS = ("constraints.txt", "constraints-dev.txt", "constraints-devices.txt")
+CONSTRAINTS = ("constraints.txt", "constraints-dev.txt", "constraints-devices.txt", "constraints-peers.txt")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-EXTRAS = [line for extra in PROJECT["project"]["optional-dependencies"].values() for line in extra]
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+DEVICES = [line for name, extra in EXTRAS.items() if name != "peers" for line in extra]
 
 # Where a path means the same on every Linux machine.
 STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
@@ -52,7 +53,8 @@ def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
     [
         ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
         ("constraints-dev.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
-        ("constraints-devices.txt", EXTRAS),
+        ("constraints-devices.txt", DEVICES),
+        ("constraints-peers.txt", EXTRAS["peers"]),
     ],
 )
 def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> None:
@@ -70,9 +72,10 @@ def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
 
 
 def test_running_and_testing_use_the_same_versions() -> None:
-    tested, devices = _pins("constraints-dev.txt"), _pins("constraints-devices.txt")
+    tested = _pins("constraints-dev.txt")
     assert _pins("constraints.txt").items() <= tested.items()
-    assert {pin: version for pin, version in devices.items() if tested.get(pin, version) != version} == {}
+    for more in (_pins("constraints-devices.txt"), _pins("constraints-peers.txt")):
+        assert {pin: version for pin, version in more.items() if tested.get(pin, version) != version} == {}
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)
@@ -100,7 +103,8 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
 
 
 def test_what_the_packages_import_is_required_by_name() -> None:
-    declared = {_normal(Requirement(line).name) for line in [*PROJECT["project"]["dependencies"], *EXTRAS]}
+    wanted = [*PROJECT["project"]["dependencies"], *DEVICES, *EXTRAS["peers"]]
+    declared = {_normal(Requirement(line).name) for line in wanted}
     distributions = dict(packages_distributions()) | {"pydantic_core": ["pydantic"]}  # pydantic's own, documented by it
     undeclared = {
         f"{path.relative_to(ROOT)}: {module}"

@@ -23,7 +23,7 @@ BEST, GAUSS_NEWTON = "hybrid, NURBS 5 × 4, degree 3", "Gauss–Newton, NumPy"
 TOLD = "Gauss–Newton, told of the hole"
 
 #: Frames until a sheet that leapt has to be found again; the leap is after the third.
-LEAP_FRAMES = 25
+LEAP_FRAMES = 20
 
 SCENES: Mapping[str, Scene] = {
     scene.name: scene
@@ -55,12 +55,12 @@ class Settings:
     frames: int = 40
     setups: tuple[str, ...] = tuple(SETUPS)
     peers: tuple[str, ...] = tuple(rivals.KNOWN)
-    slow: tuple[str, ...] = ("pycpd", "trimesh nricp_amberg", "trimesh nricp_sumner")
+    slow: tuple[str, ...] = ("pycpd", "rustcpd, full rank", "trimesh nricp_amberg", "trimesh nricp_sumner")
     leaps: int = 20
     leapers: tuple[str, ...] = (BEST, "descent alone, NURBS 5 × 4", "cma_es, 100 generations")
 
 
-QUICK = Settings(1, 8, (BEST, "hybrid, FlexPad"), ("rustcpd, rank 60, k 10, f32",), (), 2, (BEST,))
+QUICK = Settings(1, 6, (BEST,), ("rustcpd, rank 60, k 10, f32",), (), 2, (BEST,))
 
 
 def run(settings: Settings, context: Context) -> Findings:
@@ -136,7 +136,8 @@ def _goals(
     def mean(scene: str, what: str) -> float:
         return float(np.mean([getattr(one, what).mean() for one in best[scene]]))
 
-    lost = {title: sum(one.lost for one in runs) for title, runs in leapt.items()}
+    lost = [one.lost for one in leapt[GAUSS_NEWTON]]
+    both = sum(here.lost for here, there in zip(leapt[BEST], lost) if there)
     return (
         at_most(
             f"Time a frame, {BEST}, median", np.median(np.concatenate([one.cpu_ms for one in best["5 mm"]])), 4, "ms"
@@ -148,5 +149,5 @@ def _goals(
         at_most(
             "Turns by 90° in 0.25 s that are lost", sum(one.lost for name in ("turn", "spin") for one in best[name]), 0
         ),
-        at_most(f"Leaps of {len(leapt[BEST])} that are lost (Gauss–Newton: {lost[GAUSS_NEWTON]})", lost[BEST], 0),
+        at_most(f"Of {sum(lost)} leaps that Gauss–Newton loses, those that are lost here, too", both, 0),
     )

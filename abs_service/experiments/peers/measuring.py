@@ -11,8 +11,9 @@ from abs_service.evaluation import closest_points
 from abs_service.experiments.peers.rivals import Follower
 from abs_service.experiments.peers.scene import SIDE, Shot, places
 
-#: A follower that is farther from the material on average than this has lost the object [m].
-LOST_M = 0.01
+#: A follower whose vertices are on average farther than this from their material, in so many frames in a row, has lost
+#: the object [m]; five frames are a sixth of a second.
+LOST_M, LOST_FRAMES = 0.01, 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +32,15 @@ class Followed:
     cpu_ms: NDArray[np.float64]
 
     @property
+    def far(self) -> int:
+        """Frames until the last one that is far off, from the first such one on."""
+        away = np.flatnonzero(self.vertex_mm > LOST_M * 1e3)
+        return int(away[-1] - away[0] + 1) if len(away) else 0
+
+    @property
     def lost(self) -> bool:
-        """Whether the object is lost in the end."""
-        return bool(self.vertex_mm[-1] > LOST_M * 1e3)
+        """Whether the object was lost."""
+        return self.far > LOST_FRAMES
 
 
 def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -> Followed:
