@@ -42,12 +42,12 @@ class Settings:
     geometries: int = 10
     frames: int = 500
     seeds: int = 3
-    repeat_frames: int = 40
-    prior_frames: int = 40
-    mesh_frames: int = 20
-    search_frames: int = 6
+    repeat_frames: int = 20
+    prior_frames: int = 30
+    mesh_frames: int = 10
+    search_frames: int = 4
     search_geometries: int = 1
-    bound_frames: int = 3
+    bound_frames: int = 2
     calibration_frames: int = 30
     processes: int = 2
 
