@@ -5,6 +5,7 @@
   abs-service evaluate all --out results --quick           every experiment
   abs-service evaluate list                                what experiments there are
   abs-service evaluate recordings --out results --data D   one that needs recordings which are not part of the program
+  abs-service evaluate geometries --out results --set frames=100 --set seeds=1    with other settings than its own
 
 Writes OUT/EXPERIMENT/report.html with tables and pictures, and report.json with the same numbers. Equal seeds give
 equal numbers, but for measured times.
@@ -19,8 +20,9 @@ import json
 import pkgutil
 import sys
 import time
+import tomllib
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -47,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of everything random (default: 0)")
     parser.add_argument("--data", metavar="DIR", type=Path, help="recordings that are not part of the program")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], help="a setting of the experiment, as in TOML"
+    )
     parser.add_argument(
         "--json", action="store_true", help="verdicts and numbers as JSON, one line for each experiment"
     )
@@ -87,8 +92,27 @@ def _check(arguments: argparse.Namespace, chosen: Sequence[str], known: dict[str
         raise EvaluateOptionError(f'there is no experiment "{unknown[0]}"; there are, and all:\n{titles}')
     if arguments.out is None:
         raise EvaluateOptionError("--out DIR is needed: the folder that the reports go to")
+    if arguments.set and arguments.experiment == "all":
+        raise EvaluateOptionError("--set changes one experiment's settings; all have settings of their own")
     if arguments.data is not None and not arguments.data.is_dir():
         raise EvaluateOptionError(f"--data {arguments.data}: there is no such folder")
+
+
+def _settings(usual: Any, changes: Sequence[str]) -> Any:
+    """An experiment's settings with some of them changed."""
+    values, known = {}, {field.name: type(getattr(usual, field.name)) for field in fields(usual)}
+    for change in changes:
+        key = change.partition("=")[0].strip()
+        try:
+            value = tomllib.loads(change)[key]
+        except (tomllib.TOMLDecodeError, KeyError) as error:
+            raise EvaluateOptionError(f"--set {change}: must be KEY=VALUE, such as frames=100") from error
+        if key not in known:
+            raise EvaluateOptionError(f"--set {change}: there is no such setting; there are: {', '.join(known)}")
+        values[key] = tuple(value) if isinstance(value, list) else value
+        if not isinstance(values[key], known[key]):
+            raise EvaluateOptionError(f"--set {change}: must be {known[key].__name__}, as in {getattr(usual, key)!r}")
+    return replace(usual, **values)
 
 
 def _folder(out: Path, name: str) -> Path:
@@ -103,8 +127,9 @@ def _measure(name: str, experiment: Any, arguments: argparse.Namespace) -> Repor
     """Runs one experiment."""
     said = ["evaluate", name, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
     said += ["--data", str(arguments.data)] if arguments.data is not None else []
+    said += [word for pair in arguments.set for word in ("--set", pair)]
     trace = provenance.trace([*said, "--out", str(arguments.out)], [])
-    settings = experiment.QUICK if arguments.quick else experiment.Settings()
+    settings = _settings(experiment.QUICK if arguments.quick else experiment.Settings(), arguments.set)
     begun = time.monotonic()
     with Console(stderr=True).status(name) as status:
         context = base.Context(arguments.seed, arguments.data, lambda text: status.update(f"{name}: {text}"))

@@ -89,6 +89,36 @@ def test_json_is_one_line_for_each_experiment(experiment, tmp_path: Path, capsys
     assert [(line["experiment"], line["verdict"]) for line in lines] == [("a", "met"), ("b", "missed")]
 
 
+def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -> None:
+    experiment("good", found(2.5))
+    given = ["evaluate", "good", "--out", str(tmp_path), "--quick", "--set", "frames=40"]
+    assert cli.main(given) == Exit.OK
+    report = json.loads((tmp_path / "good" / "report.json").read_text(encoding="utf-8"))
+    assert report["values"]["settings"] == {"frames": 40}
+    assert "--set frames=40" in report["provenance"]["command"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("frames", "KEY=VALUE"),
+        ("frames=", "KEY=VALUE"),
+        ("shots=3", "there are: frames"),
+        ("frames='x'", "must be int"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(experiment, given: str, said: str, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5))
+    assert cli.main(["evaluate", "good", "--out", str(tmp_path), "--set", given]) == Exit.USER
+    assert said in capsys.readouterr().err
+
+
+def test_all_have_settings_of_their_own(experiment, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5))
+    assert cli.main(["evaluate", "all", "--out", str(tmp_path), "--set", "frames=3"]) == Exit.USER
+    assert "--set" in capsys.readouterr().err
+
+
 def test_an_unknown_experiment_is_answered_with_all_there_are(experiment, tmp_path: Path, capsys) -> None:
     experiment("good", found(2.5))
     assert cli.main(["evaluate", "god", "--out", str(tmp_path)]) == Exit.USER
