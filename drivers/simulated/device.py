@@ -16,6 +16,9 @@ from drivers.simulated.simulation import Simulation
 #: Waits until the event is set or so many seconds have passed; tells whether it is set.
 Wait = Callable[[threading.Event, float], bool]
 
+#: Exposures that wait for a program that is held up.
+BUFFERED = 3
+
 #: A device without a fault.
 SOUND = Misbehaviour()
 
@@ -23,8 +26,9 @@ SOUND = Misbehaviour()
 class SimulatedDevice:
     """Delivers exposure after exposure in real time.
 
-    An exposure that is due by more than a period before it can be begun is skipped and counted as `late`; its number is
-    skipped, too. Nothing else is ever dropped, unless the address asks for a fault.
+    Exposures that it falls behind with are delivered late, up to `BUFFERED` of them, as from the buffers of a real
+    camera. Beyond, all that are overdue are skipped and counted as `late`; their numbers are skipped, too. Nothing else
+    is ever dropped, unless the address asks for a fault.
 
     Args:
         uri: the address that describes the simulation.
@@ -104,7 +108,7 @@ class SimulatedDevice:
         k = 0
         while True:
             behind = (self._clock() - first_ns - self._simulation.time_ns(k)) // period_ns
-            if behind > 0:
+            if behind > BUFFERED:
                 self._delivery.drop("late", behind)
                 k += behind
             frames, truths = self._simulation.frames(k), self._simulation.truths(k)

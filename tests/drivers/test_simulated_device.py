@@ -80,11 +80,20 @@ def test_exposures_arrive_when_they_are_due() -> None:
     assert [truth.t_host_ns for truth in sink.truths[:3]] == [frame.t_host_ns for frame in sink.frames[:9:3]]
 
 
-def test_exposures_that_are_overdue_are_skipped_and_counted() -> None:
-    device, sink = run(SMALL, Time(delays={1: 110_000_000}), 12)  # 3.3 periods at 30 Hz
-    sequence = [truth.seq for truth in sink.truths]
-    assert sequence[:4] == [0, 1, 4, 5]
-    assert device.counters["late"] == 2
+def test_exposures_that_are_overdue_are_delivered_late_and_with_their_own_stamps() -> None:
+    device, sink = run(SMALL, Time(delays={1: 110_000_000}), 18)  # 3.3 periods at 30 Hz
+    assert [truth.seq for truth in sink.truths][:6] == [0, 1, 2, 3, 4, 5]
+    assert [frame.t_host_ns for frame in sink.frames[::3]][:6] == [
+        5_000_000_000 + round(k * 1e9 / 30) for k in range(6)
+    ]
+    assert [frame.t_arrival_ns - frame.t_host_ns > 30_000_000 for frame in sink.frames[::3]][2:5] == [True, True, False]
+    assert device.counters["late"] == 0
+
+
+def test_exposures_for_which_there_is_no_buffer_are_skipped_and_counted() -> None:
+    device, sink = run(SMALL, Time(delays={1: 210_000_000}), 12)  # 6.3 periods at 30 Hz
+    assert [truth.seq for truth in sink.truths][:4] == [0, 1, 7, 8]
+    assert device.counters["late"] == 5
 
 
 def test_a_fault_that_passes_loses_what_it_says() -> None:
