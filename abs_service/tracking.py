@@ -1,7 +1,7 @@
 """One tracker from its first frame set on: finds the object, makes the mesh and the model, then tracks."""
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,8 @@ from abs_service.tracker.optimizers.base import Optimizer, Stop
 from abs_service.tracker.posterior import Posterior
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.regions.base import Region
+from abs_service.tracker.relief import FixedRelief, Relief
+from abs_service.tracker.relief import Settings as ReliefSettings
 from abs_service.tracker.sighting import Sighting, SightingError
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
@@ -80,7 +82,7 @@ class Plan:
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: how often a frame may compute the cost of a candidate.
         vertices: about how many vertices the mesh is to have.
-        priors, status, reinitialization: settings of the fixed parts.
+        priors, status, reinitialization, relief: settings of the fixed parts.
         seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
     """
 
@@ -95,6 +97,7 @@ class Plan:
     priors: priors.Settings
     status: status.Settings
     reinitialization: loss.Settings
+    relief: ReliefSettings = field(default_factory=ReliefSettings)
     seed: int = 0
 
 
@@ -116,6 +119,7 @@ class Tracking:
         self._region = plan.region.build()
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
+        self._relief: Relief = FixedRelief()
         self._watch = loss.LossWatch(plan.reinitialization)
         self._told = False
         self._unseen: frozenset[str] = frozenset()
@@ -147,6 +151,9 @@ class Tracking:
         if self._tracker is None:
             return _initializing(observation, notes)
         estimate = self._watch.judge(self._tracker.track(observation, in_time))
+        if estimate.status == Status.TRACKING:
+            surface = self._tracker.model.deform(estimate.theta[None])
+            self._relief.learn(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
         reasons = estimate.reasons + tuple(f"looked for the object again: {note}" for note in notes)
         return estimate if estimate.status == Status.TRACKING else replace(estimate, reasons=reasons)
 
@@ -167,6 +174,7 @@ class Tracking:
 
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
         self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
+        self._relief = self._plan.relief.build(tracker.model, self._rig.sensors[self._plan.reference])
         # What these see of the surface is not known: as soon as one of them delivers, it is time to begin anew.
         sensors = self._rig.sensors
         self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, PictureNoise))

@@ -7,6 +7,7 @@ from abs_service import plugins
 from abs_service.config import ServiceConfig
 from abs_service.readers import kinds
 from abs_service.synchroniser import Synchroniser
+from abs_service.tracker.models import nurbs
 from abs_service.tracking import Plan, streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
@@ -37,6 +38,11 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
             f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
             f'the sensor of the tracker\'s reference, "{reference}"'
         )
+    if table.relief.drift and not isinstance(table.model, nurbs.Settings):
+        raise PlanError(
+            f"trackers.{tracker}.relief.drift = {table.relief.drift:g} needs a model whose vertices have offsets: "
+            f'"nurbs", not "{model_name(config, tracker)}"; leave it out or set it to 0'
+        )
     return Plan(
         reference=reference,
         model=table.model,
@@ -49,6 +55,7 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         priors=table.priors,
         status=table.status,
         reinitialization=table.reinitialization,
+        relief=table.relief,
     )
 
 

@@ -119,6 +119,11 @@ class Nurbs:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
         return self._patches.deform(thetas)
 
+    def raise_vertices(self, by: NDArray[np.float64]) -> None:
+        """Adds lengths (n,) [m] to the offsets of the vertices along their normals, at rest and deformed."""
+        self._offset += by.astype(np.float32)
+        self._patches.raise_vertices(by)
+
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
         return self.moves(theta).jacobian

@@ -64,6 +64,10 @@ class Patches:
         _evaluate(coefficients, self._start, self._vertices, self._orders, vertices, normals)
         return Surface(vertices, normals)
 
+    def raise_vertices(self, by: NDArray[np.float64]) -> None:
+        """Adds lengths (n,) [m] to the offsets."""
+        self._vertices[2, : len(by)] += by.astype(np.float32)
+
 
 def _polynomials(
     coefficients: NDArray[np.float64], u: NDArray[np.float64], w: NDArray[np.float64]

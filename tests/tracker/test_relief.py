@@ -1,0 +1,102 @@
+"""Offsets of vertices are learnt as a Kalman filter would, and a toy tracker's mesh gets nearer to the truth by it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from abs_service.images import DepthImage
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.relief import FixedRelief, LearntRelief, Settings
+from calib.camera import Camera
+from calib.noise.constant import Constant
+from calib.rig import Sensor
+
+CAMERA = Camera(32, 24, 30.0, 30.0, 15.5, 11.5)
+SIGMA = 2e-3
+
+
+class Flat:
+    """Vertices in pixel centres, all at one distance along their sights, with offsets."""
+
+    def __init__(self, deviation: float):
+        rows, columns = np.mgrid[4:20:4, 4:28:4].reshape(2, -1)
+        self.sight = CAMERA.directions(np.stack([columns, rows], axis=-1).astype(float))
+        self.pixels = rows, columns
+        n = len(rows)
+        empty = np.zeros((0, 3), np.int32)
+        self.mesh = Mesh(self.sight, empty, np.zeros((n, 3), np.float32), np.zeros((n, 2)), {}, np.full(n, deviation))
+        self.offset = np.zeros(n)
+
+    def raise_vertices(self, by: np.ndarray) -> None:
+        self.offset += by
+
+    @property
+    def surface(self) -> Surface:
+        """The normals look back along the sights, so that an offset is a distance."""
+        vertices = self.sight * (1 - self.offset)[:, None]
+        return Surface(*(np.ascontiguousarray(part.T[None], np.float32) for part in (vertices, -self.sight)))
+
+    def image(self, distances: np.ndarray) -> DepthImage:
+        distance = np.full((24, 32), np.nan, np.float32)
+        distance[self.pixels] = distances
+        return DepthImage(distance, np.full_like(distance, np.nan))
+
+
+def learnt(model: Flat, drift: float) -> LearntRelief:
+    noise = Constant(SIGMA)
+    return LearntRelief(model, Sensor("depth", CAMERA, noise), noise, drift)
+
+
+@settings(max_examples=20)
+@given(st.floats(1e-4, 5e-3), st.floats(1e-4, 1e-2), st.integers(0, 2**32))
+def test_every_offset_is_what_its_own_kalman_filter_says(deviation, drift, seed):
+    model, generator = Flat(deviation), np.random.default_rng(seed)
+    relief = learnt(model, drift)
+    offset, variance = np.zeros(len(model.offset)), np.full(len(model.offset), deviation**2)
+    for k in range(5):
+        measured = 1 - 1e-3 * generator.standard_normal(len(offset))
+        measured[k] = np.nan  # nothing is learnt without a return
+        relief.learn(model.image(measured), model.surface, k * 50_000_000)
+        variance += drift**2 * (1 / 30 if k == 0 else 0.05)
+        gain = np.where(np.isnan(measured), 0, variance / (variance + SIGMA**2))
+        innovation = np.nan_to_num((1 - measured) - offset)
+        gain[innovation**2 > 9 * (variance + SIGMA**2)] = 0
+        offset, variance = offset + gain * innovation, (1 - gain) * variance
+    np.testing.assert_allclose(model.offset, offset, atol=2e-6)
+    np.testing.assert_allclose(relief.variance, variance, rtol=1e-6)
+
+
+def test_what_is_something_else_teaches_nothing():
+    model = Flat(1e-3)
+    relief = learnt(model, 1e-3)
+    relief.learn(model.image(np.full(len(model.offset), 0.9)), model.surface, 0)
+    relief.learn(None, model.surface, 1)
+    assert not model.offset.any()
+
+
+def test_without_drift_or_offsets_nothing_is_learnt():
+    model, sensor = Flat(1e-3), Sensor("depth", CAMERA, Constant(SIGMA))
+    assert isinstance(Settings().build(model, sensor), FixedRelief)
+    assert isinstance(Settings(1e-3).build(object(), sensor), FixedRelief)
+    assert isinstance(Settings(1e-3).build(model, sensor), LearntRelief)
+
+
+@pytest.mark.slow
+def test_a_simulated_sheet_s_surface_is_known_better():
+    from abs_service.tracking import Tracking
+    from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
+
+    simulation = simulate("simulated://sheet?seed=1")
+    fixed, adaptive = (
+        mean_errors(
+            list(drive(Tracking(rig_of(simulation), replace(default_plan(), relief=relief)), simulation, range(90)))[
+                30:
+            ]
+        )
+        for relief in (Settings(), Settings(1e-4))
+    )
+    assert adaptive[1] < 0.85 * fixed[1]
