@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.models.base import Surface
 from calib.noise.base import DepthNoise
 from calib.rig import Sensor
 
@@ -40,8 +40,8 @@ class Settings:
 
     drift: Annotated[float, Ge(0)] = 0.0
 
-    def build(self, model: DeformationModel, sensor: Sensor) -> "Relief":
-        """What learns the offsets of a model from a depth sensor."""
+    def build(self, model: object, sensor: Sensor) -> "Relief":
+        """What learns the offsets of a model, if it has any, from a depth sensor."""
         if self.drift == 0 or not (isinstance(model, Raisable) and isinstance(sensor.noise, DepthNoise)):
             return FixedRelief()
         return LearntRelief(model, sensor, sensor.noise, self.drift)
