@@ -70,7 +70,7 @@ def main() -> None:
     parts = {
         f"vertices ({POPULATION} candidates)": by_vertices,
         f"candidates ({VERTICES} vertices)": by_population,
-        f"time-of-flight cameras ({POPULATION} candidates, {VERTICES} vertices)": by_sensors,
+        f"ToF cameras ({POPULATION} × {VERTICES})": by_sensors,
     }
     for place, (label, cases) in enumerate(parts.items()):
         print(draw(axes[place], label, cases()))

@@ -34,6 +34,7 @@ def printed_by(arguments: list[str], threads: int) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # compiling for two threads takes most of it
 def test_kernels(benchmark):
     rounds = 1 if benchmark.disabled else 100
     counts = (1,) if benchmark.disabled else (1, 2)

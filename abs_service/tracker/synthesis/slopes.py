@@ -166,10 +166,11 @@ def _at_centers(
     result: NDArray[np.float32],
 ) -> None:
     """Value + slope · (centre of the pixel − projection of the vertex), eq. 10; the value itself in the border."""
-    one, two = np.float32(1), np.float32(2)
+    one, two, width, per_stride = np.float32(1), np.float32(2), np.int32(stride), 1 / stride
     fx, fy, cx, cy = matrix
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     for k in prange(pixel.shape[0]):
+        rights, downs = np.empty(pixel.shape[1], np.float32), np.empty(pixel.shape[1], np.float32)
         for v in range(pixel.shape[1]):
             right, down = np.float32(0), np.float32(0)
             if pixel[k, v] > 0:
@@ -181,11 +182,14 @@ def _at_centers(
                 radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
                 column = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
                 row = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
-                right = np.float32(pixel[k, v] % stride - 1) - column
-                down = np.float32(pixel[k, v] // stride - 1) - row
-            for channel in range(values.shape[1]):
-                change = slopes[v, channel, 0] * right + slopes[v, channel, 1] * down
-                result[k, v, channel] = values[v, channel] + change
+                line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
+                right = np.float32(pixel[k, v] - line * width) - one - column
+                down = np.float32(line) - one - row
+            rights[v], downs[v] = right, down
+        for channel in range(values.shape[1]):
+            own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
+            for v in range(np.uintp(looks.size)):
+                looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
 
 
 @kernel
@@ -201,9 +205,10 @@ def _at_centers_fisheye(
     result: NDArray[np.float32],
 ) -> None:
     """What `_at_centers` is with the four coefficients of a fisheye."""
-    one = np.float32(1)
+    one, width, per_stride = np.float32(1), np.int32(stride), 1 / stride
     fx, fy, cx, cy = matrix
     for k in prange(pixel.shape[0]):
+        rights, downs = np.empty(pixel.shape[1], np.float32), np.empty(pixel.shape[1], np.float32)
         for v in range(pixel.shape[1]):
             right, down = np.float32(0), np.float32(0)
             if pixel[k, v] > 0:
@@ -214,8 +219,11 @@ def _at_centers_fisheye(
                 bent_x, bent_y = bend_fisheye(x, y, lens)
                 column = fx * bent_x + cx
                 row = fy * bent_y + cy
-                right = np.float32(pixel[k, v] % stride - 1) - column
-                down = np.float32(pixel[k, v] // stride - 1) - row
-            for channel in range(values.shape[1]):
-                change = slopes[v, channel, 0] * right + slopes[v, channel, 1] * down
-                result[k, v, channel] = values[v, channel] + change
+                line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
+                right = np.float32(pixel[k, v] - line * width) - one - column
+                down = np.float32(line) - one - row
+            rights[v], downs[v] = right, down
+        for channel in range(values.shape[1]):
+            own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
+            for v in range(np.uintp(looks.size)):
+                looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
