@@ -44,6 +44,9 @@ class Settings:
 #: Share of the covariance that may be new before candidates are drawn with it.
 LEARNT = 0.1
 
+#: Share of the covariance that begins every frame anew, as the identity.
+FORGOTTEN = 0.5
+
 
 class Constants:
     """Weights and learning rates for a dimension and a population, in the tutorial's words and equations."""
@@ -107,9 +110,16 @@ class CmaEs:
         return self._mean.copy()
 
     def restart(self) -> None:
-        """Moves the mean to the prediction, ξ = 0; covariance and step size continue from the last frame."""
+        """Moves the mean to the prediction, ξ = 0; half of the covariance, and the step size, continue.
+
+        In ξ every frame's cost is nearly round by itself. What long searches learn beyond that is how rough the cost of
+        one frame is: where they have narrowed the covariance frame after frame, they cannot follow motion any more.
+        """
         self._mean[:] = 0
         self._sigma = float(np.clip(self._sigma, *self._steps))
+        self._covariance *= 1 - FORGOTTEN
+        self._covariance.flat[:: len(self._mean) + 1] += FORGOTTEN
+        _factorize(self._covariance, self._factor)
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
