@@ -12,10 +12,16 @@ from abs_service.experiments.live.rig import REFERENCE, STREAMS, TRACKER
 _LOST = frozenset({"dropped", "malformed", "missing", "refused", "rejected", "skipped", "unused"})
 
 
+def exposures(seen: Watched, sensor: str) -> range:
+    """The numbers of a sensor's exposures from the first to the last that is in an estimate; empty if none is."""
+    used = [one.sensors[sensor] for one in seen.arrivals if sensor in one.sensors]
+    return range(used[0], used[-1] + 1) if used else range(0)
+
+
 def untracked(seen: Watched) -> int:
     """Exposures of the reference between the first and the last estimate watched that are in no estimate."""
-    used = [one.sensors[REFERENCE] for one in seen.arrivals if REFERENCE in one.sensors]
-    return recording.holes(used, used[0], used[-1])
+    used = {one.sensors[REFERENCE] for one in seen.arrivals if REFERENCE in one.sensors}
+    return len(set(exposures(seen, REFERENCE)) - used)
 
 
 def partial(seen: Watched) -> int:
@@ -35,7 +41,7 @@ def unrecorded(seen: Watched) -> Mapping[str, int]:
     missing = {keys.state(TRACKER): recording.holes(seen.recorded[keys.state(TRACKER)], first.seq, last.seq)}
     for sensor, stream in STREAMS:
         topic = keys.image(sensor, stream)
-        missing[topic] = recording.holes(seen.recorded[topic], first.sensors[sensor], last.sensors[sensor])
+        missing[topic] = len(set(exposures(seen, sensor)) - seen.recorded[topic])
     return missing
 
 

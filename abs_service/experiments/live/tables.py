@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service import keys
+from abs_service.experiments.live.losses import exposures
 from abs_service.experiments.live.measurement import Start, Watched
 from abs_service.experiments.live.rig import STREAMS
 from abs_service.experiments.live.trend import Trend
@@ -26,10 +27,9 @@ def ages(numbers_ms: Mapping[str, NDArray[np.float64]]) -> Table:
 
 def frames(seen: Watched) -> Table:
     """How far the exposures came that lie between the first and the last estimate watched."""
-    first, last = seen.arrivals[0], seen.arrivals[-1]
     rows: list[tuple[str | float, ...]] = []
     for sensor, stream in STREAMS:
-        exposed = range(first.sensors[sensor], last.sensors[sensor] + 1)
+        exposed = exposures(seen, sensor)
         used = {one.sensors[sensor] for one in seen.arrivals if sensor in one.sensors}
         recorded = seen.recorded[keys.image(sensor, stream)].intersection(exposed)
         rows.append((f"{sensor}/{stream}", len(exposed), len(used), len(recorded)))
