@@ -21,11 +21,13 @@ class Followed:
     """What one tracker made of one sequence, the first frame, of which everything is known, left out.
 
     Attributes:
+        at: places (n, 2) [m] of the vertices on the flat sheet.
         vertices: of every frame (n, 3) [m].
         vertex_mm, surface_mm: mean distance of the vertices from their own material, and from the surface [mm].
         cpu_ms: processor time of every frame, all threads [ms].
     """
 
+    at: NDArray[np.float64]
     vertices: Sequence[NDArray[np.floating]]
     vertex_mm: NDArray[np.float64]
     surface_mm: NDArray[np.float64]
@@ -51,7 +53,7 @@ def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -
         at: places (n, 2) [m] of its vertices on the flat sheet.
         shots: the sequence.
     """
-    fine = places(121, 81)
+    fine = places(61, 41)
     tracked, vertex, surface, cpu = [], [], [], []
     for shot in shots[1:]:
         begun = time.process_time()
@@ -61,7 +63,7 @@ def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -
         vertex.append(np.linalg.norm(vertices - shot.moment.points(at), axis=1).mean())
         closest = closest_points(vertices, shot.moment.points(fine))
         surface.append(np.linalg.norm(vertices - closest, axis=1).mean())
-    return Followed(tracked, 1e3 * np.array(vertex), 1e3 * np.array(surface), 1e3 * np.array(cpu))
+    return Followed(at, tracked, 1e3 * np.array(vertex), 1e3 * np.array(surface), 1e3 * np.array(cpu))
 
 
 #: Makes a follower that knows the sheet in the first shot, and tells the places (n, 2) [m] of its vertices.

@@ -65,8 +65,7 @@ SETUPS: Mapping[str, Setup] = {
     "hybrid, FlexPad": Setup("flexpad", hybrid.Settings()),
     "descent alone, NURBS 5 × 4": Setup("nurbs", DESCENT),
     "cma_es, 20 generations": Setup("nurbs", cma_es.Settings()),
-    "cma_es, 100 generations": Setup("nurbs", cma_es.Settings(generations=100)),
-    "cma_es, FlexPad, 100 generations": Setup("flexpad", cma_es.Settings(generations=100)),
+    "cma_es, 60 generations": Setup("nurbs", cma_es.Settings(generations=60)),
 }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from abs_service.experiments.peers.measuring import LOST_FRAMES, LOST_M, Followed
-from abs_service.experiments.peers.scene import INTERVAL_S, Scene
+from abs_service.experiments.peers.scene import CAMERA, INTERVAL_S, Scene
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 
 Rows = Mapping[str, Sequence[Followed]]
@@ -16,6 +16,9 @@ _COLUMNS = (
     Column("vertex error", "mm", ".2f"), Column("SD of seeds", "mm", ".2f"), Column("worst frame", "mm", ".1f"),
     Column("surface error", "mm", ".2f"), Column("worst frame", "mm", ".2f"),
 )  # fmt: skip
+
+#: How the row that does not track is called.
+_STILL = "none"
 
 _TITLES = {
     "5 mm": "Bending to ±120°, 5 mm noise",
@@ -36,7 +39,7 @@ def sections(
         found: what every tracker made of every scene.
         leapt: what some made of sheets that leapt.
         missing: packages that are not installed.
-        slow: rivals that follow the first scene only.
+        slow: rivals that follow a few frames only.
     """
     said = [
         "A sheet of 300 × 200 mm, about 1 m before a depth camera of 176 × 144 pixels (f = 183 pixels), filmed at "
@@ -48,13 +51,16 @@ def sections(
         "material; surface error: from the nearest point of the surface."
     ]
     if missing:
-        said.append(f"Not installed here, so left out: {', '.join(missing)} (`pip install abs-service[peers]`).")
+        said.append(f"Not installed here, so left out: {', '.join(missing)} (`make peers`).")
     if slow:
-        said.append(f"Followed the first scene only, because they take so long: {', '.join(slow)}.")
+        said.append(f"Followed ten frames of one seed only, because they take so long: {', '.join(slow)}.")
     about = Section("What is compared", tuple(said))
     return (
         about,
-        *(Section(_TITLES[name], (_table(_TITLES[name], rows), *_curves(name, rows))) for name, rows in found.items()),
+        *(
+            Section(_TITLES[name], (_table(_TITLES[name], rows), _curves(name, rows), _worst(scenes[name], rows)))
+            for name, rows in found.items()
+        ),
         _leaps(leapt),
     )
 
@@ -127,7 +133,7 @@ def _leaps(leapt: Rows) -> Section:
     return Section("Leaps", (text, Table("Sheets that leap", columns, tuple(rows))))
 
 
-def _curves(name: str, rows: Rows) -> tuple[Picture, ...]:
+def _curves(name: str, rows: Rows) -> Picture:
     """Vertex error over time of the first seed."""
     from matplotlib.figure import Figure  # noqa: PLC0415  only reports draw
 
@@ -137,4 +143,26 @@ def _curves(name: str, rows: Rows) -> tuple[Picture, ...]:
         axes.plot(np.arange(1, len(runs[0].vertex_mm) + 1) * INTERVAL_S, runs[0].vertex_mm, label=title)
     axes.set(xlabel="time / s", ylabel="vertex error / mm", yscale="log")
     axes.legend(fontsize="x-small", ncols=2, loc="center left", bbox_to_anchor=(1, 0.5))
-    return (drawing(figure, "Vertex error over time, first seed", f"Vertex error of every tracker over time: {name}"),)
+    return drawing(figure, "Vertex error over time, first seed", f"Vertex error of every tracker over time: {name}")
+
+
+def _worst(scene: Scene, rows: Rows) -> Picture:
+    """Vertices and their material, in the camera's view, in each tracker's worst frame of the first seed."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  only reports draw
+
+    shown = [title for title in rows if not title.startswith(_STILL)][:6]
+    figure: Figure = Figure(figsize=(2.6 * len(shown), 2.4), layout="constrained")
+    for place, title in enumerate(shown, start=1):
+        one = rows[title][0]
+        k = int(np.argmax(one.vertex_mm))
+        true = CAMERA.project(scene.motion((k + 1) * INTERVAL_S).points(one.at))
+        found = CAMERA.project(one.vertices[k])
+        axes = figure.add_subplot(1, len(shown), place)
+        axes.plot(*np.stack([true, found], axis=1).transpose(2, 1, 0), color="tab:red", linewidth=0.6, rasterized=True)
+        axes.plot(*true.T, ".", color="0.6", markersize=2, rasterized=True)
+        axes.plot(*found.T, ".", color="black", markersize=2, rasterized=True)
+        axes.set(aspect="equal", xticks=[], yticks=[])
+        axes.invert_yaxis()
+        axes.set_title(f"{title}\nframe {k + 1}, {one.vertex_mm[k]:.1f} mm", fontsize="xx-small")
+    caption = "Each tracker's worst frame: vertices (black), where their material is (grey), and the way between (red)"
+    return drawing(figure, caption, f"Found and true vertices in the worst frames: {scene.name}")
