@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization, split
-from calib.jit import kernel
+from calib.jit import kernel, prange
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
 FIRST_INTERVAL_S = 1 / 30
@@ -130,10 +130,6 @@ class MotionPrior:
         return 1 / (self._scales * self._settings.speed * self._elapsed_s)
 
 
-#: Members of a population whose edges are measured at once, in lanes of the processor.
-LANES = 8
-
-
 @kernel
 def _stretch_cost(
     vertices: NDArray[np.float32],
@@ -142,25 +138,14 @@ def _stretch_cost(
     out: NDArray[np.float64],
 ) -> None:
     """Sum over edges of the squared relative change of length, for every member of the population."""
-    population, _, n = vertices.shape
-    for block in range((population + LANES - 1) // LANES):
-        first = block * LANES
-        count = min(LANES, population - first)
-        place, total = np.zeros((3, n, LANES), np.float32), np.zeros(LANES, np.float32)
-        for k in range(count):
-            for i in range(3):
-                for v in range(n):
-                    place[i, v, k] = vertices[first + k, i, v]
+    for k in prange(vertices.shape[0]):
+        place, total = vertices[k], np.float32(0)
         for e in range(edges.shape[0]):
-            ax, ay, az = place[0, edges[e, 0]], place[1, edges[e, 0]], place[2, edges[e, 0]]
-            bx, by, bz = place[0, edges[e, 1]], place[1, edges[e, 1]], place[2, edges[e, 1]]
-            inverse = inverse_lengths[e]
-            for k in range(LANES):
-                x, y, z = ax[k] - bx[k], ay[k] - by[k], az[k] - bz[k]
-                change = np.sqrt(x * x + y * y + z * z) * inverse - np.float32(1)
-                total[k] += change * change
-        for k in range(count):
-            out[first + k] = total[k]
+            i, j = np.uintp(edges[e, 0]), np.uintp(edges[e, 1])  # unsigned: else each is tested for being negative
+            x, y, z = place[0, i] - place[0, j], place[1, i] - place[1, j], place[2, i] - place[2, j]
+            change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[e] - np.float32(1)
+            total += change * change
+        out[k] = total
 
 
 @kernel

@@ -8,6 +8,9 @@ import pytest
 #: Where a benchmark leaves rows of its own: {part: {threads: ns per vertex and candidate}}.
 KEY = "kernels"
 
+#: Likewise whole frames: {threads: {part: {ms, cpu_ms, search_share}}}.
+FRAMES = "frames"
+
 Row = dict[str, str | float]
 
 
@@ -17,10 +20,10 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
     if not rows or not session or session.disabled:
         return
     terminalreporter.write_sep("-", "minima; ns per vertex and candidate, ratio to the C++ yardstick")
-    heads = ("part", "ms", "1 thread, ns", "ratio", "2 threads, ns", "ratio")
+    heads = ("part", "ms", "CPU ms", "search share", "1 thread, ns", "ratio", "2 threads, ns", "ratio")
     terminalreporter.write_line(f"{heads[0]:<58}" + "".join(f"{head:>15}" for head in heads[1:]))
     for row in rows:
-        cells = [row.get(key) for key in ("ms", "ns_1", "ratio_1", "ns_2", "ratio_2")]
+        cells = [row.get(key) for key in ("ms", "cpu_ms", "search_share", "ns_1", "ratio_1", "ns_2", "ratio_2")]
         line = f"{row['part']:<58}" + "".join(f"{'' if cell is None else f'{cell:.3g}':>15}" for cell in cells)
         terminalreporter.write_line(line.rstrip())
 
@@ -38,5 +41,8 @@ def _rows(benchmarks: Any) -> Iterator[Row]:
             for threads, ns in times.items():
                 row |= {f"ns_{threads}": ns, f"ratio_{threads}": ns / kernels["yardstick"][threads]}
             yield row
-        if not kernels:
+        frames = bench.extra_info.get(FRAMES, {})
+        for threads, parts in frames.items():
+            yield from ({"part": f"{part}, {threads} thr."} | measured for part, measured in parts.items())
+        if not (kernels or frames):
             yield {"part": bench.name.removeprefix("test_"), "ms": 1e3 * bench.stats.min}

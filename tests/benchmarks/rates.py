@@ -1,0 +1,146 @@
+"""What whole frames cost at the paper's full budgets and with `hybrid`, and which share of it is the search's own.
+
+    NUMBA_NUM_THREADS=2 python -m tests.benchmarks.rates --frames 10
+
+prints JSON. Frames are those of the simulated sheet, from frame set to estimate; the depth camera has 176 × 144 pixels,
+the colour camera 320 × 240. The minimum of the frames is told: machines, and hours on one machine, differ. Where
+other programs run as well, only the processor time of one thread says something.
+"""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.curvature import Quadratic
+from abs_service.tracker.models import flexpad, nurbs
+from abs_service.tracker.optimizers import cma, cma_es, hybrid
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Problem
+from abs_service.tracking import ModelSettings, OptimizerSettings, Tracking
+from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+
+Answer = TypeVar("Answer")
+
+#: The first exposure: the sheet is flat, as FlexPad wants it.
+FIRST = 0
+
+
+@dataclass
+class Clocked:
+    """A problem, and how long it took to answer [s]."""
+
+    problem: Problem
+    dimension: int
+    spent_s: float = 0.0
+
+    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._clocked(lambda: self.problem.cost(thetas))
+
+    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        return self._clocked(lambda: self.problem.linearize(theta))
+
+    def prior(self, theta: NDArray[np.float64]) -> Quadratic:
+        return self._clocked(lambda: self.problem.prior(theta))
+
+    def unexplained(self, theta: NDArray[np.float64]) -> float:
+        return self._clocked(lambda: self.problem.unexplained(theta))
+
+    def _clocked(self, ask: Callable[[], Answer]) -> Answer:
+        begin = time.thread_time()
+        answer = ask()
+        self.spent_s += time.thread_time() - begin
+        return answer
+
+
+@dataclass
+class Watched:
+    """Settings of a search whose own time [s], without its problem's, is added up."""
+
+    settings: OptimizerSettings
+    own_s: list[float] = field(default_factory=list)
+
+    def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
+        return WatchedSearch(self.settings.build(dimension, generator), self.own_s)
+
+
+@dataclass
+class WatchedSearch:
+    """See `Watched`."""
+
+    search: Optimizer
+    own_s: list[float]
+
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        clocked, begin = Clocked(problem, problem.dimension), time.thread_time()
+        found = self.search.follow(clocked, start, budget)
+        self.own_s.append(time.thread_time() - begin - clocked.spent_s)
+        return found
+
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        return self.search.explore(problem, start, budget)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Something to measure: a model, a search, about how many vertices, which sensors."""
+
+    part: str
+    model: ModelSettings
+    optimizer: OptimizerSettings
+    vertices: int = 300
+    sensors: tuple[str, ...] = ("tof",)
+
+
+def cases(scale: float) -> Iterator[Case]:
+    """All cases, with generations multiplied by `scale`; none converges before its budget is spent."""
+    sheet, pad, never = nurbs.Settings(control_points=(4, 4)), flexpad.Settings(), 1e-12
+    for name, model, population, generations in (("FlexPad", pad, 16, 400), ("NURBS 4x4", sheet, 32, 1000)):
+        budget = max(2, round(scale * generations))
+        full = cma_es.Settings(population=population, generations=budget, tolerance=never)
+        yield Case(f"{name}, {budget} x {population}, 300 vertices, depth", model, full)
+        tenth = max(2, budget // 10)
+        beside = cma.Settings(population=population, generations=tenth, tolerance=never)
+        yield Case(f"{name}, {tenth} x {population} by pycma, 300 vertices, depth", model, beside)
+    for vertices, sensors in ((400, ("tof",)), (1000, ("tof",)), (1000, ("tof", "color"))):
+        seen = "depth + colour" if len(sensors) > 1 else "depth"
+        yield Case(f"NURBS 4x4, hybrid, {vertices} vertices, {seen}", sheet, hybrid.Settings(), vertices, sensors)
+
+
+def measure(case: Case, frames: int) -> dict[str, float]:
+    """Least milliseconds of a frame, by the clock and of its thread's processor time, and the search's own share.
+
+    The share is the median of what the thread worked on asking, telling and between, over what it worked in the frame.
+    """
+    simulation = simulate("simulated://sheet?seed=1")
+    rig = rig_of(simulation)
+    rig = replace(rig, sensors={name: rig.sensors[name] for name in case.sensors})
+    watched = Watched(case.optimizer)
+    plan = default_plan(model=case.model, optimizer=watched, vertices=case.vertices, evaluations=10**9)
+    tracking, took_s, worked_s = Tracking(rig, plan), [], []
+    for k in range(FIRST, FIRST + frames + 3):
+        exposed = frame_set(simulation.expose(k)[0], k)
+        began, begin = time.thread_time(), time.perf_counter()
+        tracking.track(exposed, lambda: True)
+        took_s.append(time.perf_counter() - begin)
+        worked_s.append(time.thread_time() - began)
+    assert tracking.mesh is not None, case
+    shares = np.divide(watched.own_s[2:], worked_s[3:])
+    return {"ms": 1e3 * min(took_s[3:]), "cpu_ms": 1e3 * min(worked_s[3:]), "search_share": float(np.median(shares))}
+
+
+def main(arguments: list[str]) -> None:
+    """Prints {part: {ms, cpu_ms, search_share}}."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=10)
+    frames = parser.parse_args(arguments).frames
+    print(json.dumps({case.part: measure(case, frames) for case in cases(1.0)}, indent=1))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
