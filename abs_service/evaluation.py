@@ -12,6 +12,8 @@ Grid = NDArray[np.float64]
 
 #: Over so short a time a surface moves on a straight line, as far as a mesh on it can tell [ns].
 STRAIGHT_NS = 250_000_000
+#: A nearest point that moves by less than this is found [grid cells]: a thousandth is 0.01 mm of a sheet.
+STILL = 1e-3
 #: Truths kept while their estimate is still being searched for.
 KEPT = 256
 
@@ -120,12 +122,17 @@ def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np
     rows, columns = grid.shape[:2]
     nearest = scipy.spatial.KDTree(grid.reshape(-1, 3)).query(vertices)[1]
     place = np.stack(np.unravel_index(nearest, (rows, columns)), axis=1).astype(np.float64)
+    moving = np.arange(len(place))
     for _ in range(8):
-        points, tangents = _bilinear(grid, place)
+        points, tangents = _bilinear(grid, place[moving])
         normal_matrix = np.einsum("nij,nik->njk", tangents, tangents)
-        gradient = np.einsum("nij,ni->nj", tangents, vertices - points)
+        gradient = np.einsum("nij,ni->nj", tangents, vertices[moving] - points)
         step = np.linalg.solve(normal_matrix, gradient[..., None])[..., 0]
-        place = np.clip(place + np.clip(step, -1, 1), 0, (rows - 1, columns - 1))
+        before = place[moving]
+        place[moving] = np.clip(before + np.clip(step, -1, 1), 0, (rows - 1, columns - 1))
+        moving = moving[np.abs(place[moving] - before).max(axis=1) > STILL]
+        if not len(moving):
+            break
     return place
 
 
