@@ -150,7 +150,8 @@ def _worst(scene: Scene, rows: Rows) -> Picture:
     """Vertices and their material, in the camera's view, in each tracker's worst frame of the first seed."""
     from matplotlib.figure import Figure  # noqa: PLC0415  only reports draw
 
-    shown = [title for title in rows if not title.startswith(_STILL)][:6]
+    ours, *others = (title for title in rows if not title.startswith(_STILL))
+    shown = [ours, *others[-5:]]
     figure: Figure = Figure(figsize=(2.6 * len(shown), 2.4), layout="constrained")
     for place, title in enumerate(shown, start=1):
         one = rows[title][0]
