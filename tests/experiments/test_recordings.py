@@ -41,7 +41,7 @@ def test_a_mesh_that_is_half_the_object_and_too_near_agrees_by_as_much():
                             np.stack([corners + 1, corners + 9, corners + 10], axis=-1)])  # fmt: skip
     found = agreement(vertices, faces, distance, mask, CAMERA)
     assert found.forward_mm == pytest.approx(10, abs=4)  # what half a pixel beside the vertex is farther away, besides
-    assert 0.45 < found.covered < 0.6
+    assert 0.4 < found.covered < 0.6
     assert found.inside > 0.8
     assert 10 < found.backward_mm < 60  # half of the points are beside the mesh
 
