@@ -52,7 +52,9 @@ def test_per_frame_linearize(benchmark, observation):
     objective = Likelihood().build(RIG, model.mesh, Sparse(RIG, model.mesh))
     objective.observe(observation, model.deform(model.rest[None]))
     surface, moves = model.deform(thetas[:1]), model.moves(thetas[0])
-    assert benchmark(objective.linearize, surface, moves)[0].moves.dimension == 48
+    linearizations = benchmark(objective.linearize, surface, moves)
+    assert [linear.jacobian.shape for linear in linearizations] == [(len(one.residual), 48) for one in linearizations]
+    assert len(linearizations) == len(RIG.sensors)
 
 
 @pytest.mark.parametrize("size", [(17, 18), (32, 32)], ids=["306", "1024"])
