@@ -133,6 +133,7 @@ OPTIONS = {
         _option("depth.pixel_polynomial", 'file = "pixels.npz"'),
         _option("depth.region_polynomial", 'file = "regions.npz"'),
         _option("depth.per_pixel", 'file = "own.npz", law = { type = "constant", sigma = 0.0045 }'),
+        _option("depth.measured", "factor = 1.5, floor = 0.001"),
         _option("depth.structured_light", "noise = 1.425e-3, step = 2.85e-3", **STRUCTURED_LIGHT),
         _option("picture.color", "sigma = 20.0"),
         _option("picture.grey", "sigma = 15.0"),

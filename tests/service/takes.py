@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from abs.v1.common_pb2 import Header
 from abs.v1.sensor_model_pb2 import SensorModel
@@ -12,15 +13,24 @@ from drivers import codec
 from drivers.device import Truth
 from drivers.frame import Frame
 from drivers.mcap_file import McapFile
-from drivers.simulated.simulation import Simulation
+from drivers.simulated.exposure import Head
 
 #: Wall-clock time at which the simulation starts [ns].
 WALL_NS = 1_700_000_000_000_000_000
 
 
+class Recordable(Protocol):
+    """What a recording is made of: a simulation, or something that changes what one shows."""
+
+    @property
+    def heads(self) -> Mapping[str, Head]: ...
+    def frames(self, k: int) -> list[Frame]: ...
+    def truths(self, k: int) -> list[Truth]: ...
+
+
 def write_take(
     path: Path,
-    simulation: Simulation,
+    simulation: Recordable,
     exposures: Iterable[int],
     names: Mapping[str, str],
     toml: str = "",

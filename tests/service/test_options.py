@@ -1,6 +1,8 @@
 """Everything that a rig file can choose runs: as `track` prepares it, and as `replay` tracks it."""
 
 import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -16,7 +18,11 @@ from calib.noise.constant import Constant
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial, blocks
+from drivers.device import Truth
+from drivers.frame import Frame, Kind
 from drivers.simulated.address import parse
+from drivers.simulated.exposure import Head
+from drivers.simulated.simulation import Simulation
 from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
 from tests.service.options import OPTIONS, PACKAGES
 from tests.service.takes import write_take
@@ -45,6 +51,29 @@ def folder(tmp_path_factory):
     return made
 
 
+@dataclass(frozen=True)
+class Telling:
+    """A simulation whose depth cameras also tell how much each of their distances deviates, as some sensors do."""
+
+    simulation: Simulation
+
+    @property
+    def heads(self) -> Mapping[str, Head]:
+        return self.simulation.heads
+
+    def truths(self, k: int) -> list[Truth]:
+        return self.simulation.truths(k)
+
+    def frames(self, k: int) -> list[Frame]:
+        frames = self.simulation.frames(k)
+        return [*frames, *(_deviation(frame) for frame in frames if frame.kind == Kind.DEPTH)]
+
+
+def _deviation(depth: Frame) -> Frame:
+    steps = np.full_like(depth.data, round(0.0045 / depth.scale))
+    return replace(depth, stream="deviation", kind=Kind.DEVIATION, data=steps)
+
+
 @pytest.fixture(scope="module")
 def take(folder):
     """Makes the recording of a rig's device, once for all rigs with the same one."""
@@ -52,7 +81,7 @@ def take(folder):
     @cache
     def made(uri: str, heads: tuple[tuple[str, str], ...]) -> Path:
         path = folder / f"{len(list(folder.glob('*.mcap')))}.mcap"
-        return write_take(path, parse(uri).build(), EXPOSURES, dict(heads))
+        return write_take(path, Telling(parse(uri).build()), EXPOSURES, dict(heads))
 
     return made
 
