@@ -134,7 +134,7 @@ def test_the_demo_rig_s_noise_models_are_right(seed):
     said = watched(f"simulated://sheet?seed={seed}")
     assert said.level == OK
     assert said.gauges["residual_variance.tof"] == pytest.approx(1, abs=0.15)
-    assert said.gauges["residual_variance.color"] == pytest.approx(0.95, abs=0.15)
+    assert said.gauges["residual_variance.color"] == pytest.approx(0.75, abs=0.15)
 
 
 @pytest.mark.parametrize(("noise", "change"), [(2, "larger"), (0.5, "smaller")])

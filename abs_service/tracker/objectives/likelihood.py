@@ -36,7 +36,7 @@ class Settings:
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
-    misplacement_px: Annotated[float, Ge(0)] = 0.2
+    misplacement_px: Annotated[float, Ge(0)] = 0.0
     outline_px: Annotated[float, Interval(ge=0, le=3)] = 0.0
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
