@@ -3,7 +3,7 @@
 import numpy as np
 
 from calib.noise import tof_amplitude
-from calib.noise.samples import Samples, from_images
+from calib.noise.samples import Samples, from_images, joined
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.frame import Kind
 from drivers.simulated.address import parse
@@ -27,9 +27,7 @@ def learnt(sensor: str, frames: int, seed: int) -> TofAmplitude:
         for number, material in enumerate(MATERIALS):
             wall = f"distance={distance}&reflectivity={material}&seed={1000 * seed + 10 * place + number}"
             parts.append(_samples(parse(f"simulated://wall?sensors=tof&{wall}&{sensor}").build(), frames))
-    columns = ("measured", "true", "amplitude", "row", "column")
-    joined = Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in columns))
-    return tof_amplitude.fit(joined)
+    return tof_amplitude.fit(joined(parts))
 
 
 def _samples(walls: Simulation, frames: int) -> Samples:

@@ -1,5 +1,6 @@
 """Measurements of known distances, from which noise models are fitted and judged."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -63,6 +64,12 @@ class Samples:
         if not good.any():
             raise NoiseError(f"none of {len(self)} samples has a distance" + " and an amplitude" * with_amplitude)
         return self.take(good)
+
+
+def joined(parts: Iterable[Samples]) -> Samples:
+    """All samples of several parts, in their order."""
+    columns = zip(*([getattr(part, field.name) for field in fields(Samples)] for part in parts))
+    return Samples(*map(np.concatenate, columns))
 
 
 def from_images(measured: ArrayLike, true: ArrayLike, amplitude: ArrayLike) -> Samples:

@@ -1,13 +1,13 @@
 """What a sequence says of a sensor's noise: single measurements, and means of all that a pixel measured."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError
-from calib.noise.samples import Samples
+from calib.noise.samples import Samples, joined
 from calib.noise.shrinkage import Repeats
 from calib.sequences.reference import Reference
 from calib.sequences.static import Static
@@ -48,17 +48,13 @@ def gather(static: Static, reference: Reference, kept: slice = slice(None)) -> E
 def together(parts: Sequence[Evidence]) -> Evidence:
     """All evidence of several parts."""
     times, variance = (np.concatenate([getattr(part.repeats, name) for part in parts]) for name in Repeats._fields)
-    samples, means = (_joined([getattr(part, name) for part in parts]) for name in ("samples", "means"))
+    samples, means = (joined([getattr(part, name) for part in parts]) for name in ("samples", "means"))
     return Evidence(samples, means, Repeats(times, variance))
 
 
 def thinned(samples: Samples, most: int, generator: np.random.Generator) -> Samples:
     """At most so many of the samples, drawn at random."""
     return samples if len(samples) <= most else samples.take(generator.choice(len(samples), most, replace=False))
-
-
-def _joined(parts: Sequence[Samples]) -> Samples:
-    return Samples(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Samples)))
 
 
 def _averaged(samples: Samples, shape: tuple[int, ...]) -> tuple[Samples, Repeats]:

@@ -10,7 +10,7 @@ from abs_service import plugins
 from calib.noise import constant, fitting, gaussian_polynomial, measured, structured_light, tof_amplitude
 from calib.noise.base import NoiseError
 from calib.noise.quality import judge
-from calib.noise.samples import Samples, domain, from_images
+from calib.noise.samples import Samples, domain, from_images, joined
 from tests.calib import laws
 
 SEEDS = range(4)
@@ -140,9 +140,7 @@ def test_the_same_samples_give_the_same_model_and_no_returns_change_nothing(name
         np.full(6, 3000.0),
         *laws.somewhere(6),
     )
-    both = Samples(
-        *(np.concatenate([getattr(s, f.name) for s in (samples, lost)]) for f in dataclasses.fields(Samples))
-    )
+    both = joined([samples, lost])
     assert FITS[name](samples) == FITS[name](both) == FITS[name](samples)
 
 

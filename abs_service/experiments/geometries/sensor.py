@@ -1,10 +1,8 @@
 """The camera of E1: how it really errs, and what its calibration makes of that (section 5.1 of the paper)."""
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from abs_service.experiments.scenes.rendering import Renderer
 from abs_service.experiments.scenes.surfaces import Wall
@@ -14,7 +12,7 @@ from calib.noise.per_pixel import PerPixel
 from calib.noise.region_polynomial import blocks
 from calib.noise.samples import Samples, from_images
 from calib.noise.shrinkage import Repeats
-from calib.sequences.evidence import thinned
+from calib.sequences.evidence import Evidence, thinned, together
 
 #: Distances of the static sequences [m], as in the paper's figure 8, and reflectivities of the materials.
 DISTANCES, MATERIALS = (0.753, 1.185, 1.606, 2.193, 2.652), (0.9, 0.5, 0.17)
@@ -51,49 +49,27 @@ def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator
         frames: of every sequence.
         generator: draws the noise.
     """
-    walls = [_Static(sensor, depth, material, frames, generator) for depth in DISTANCES for material in MATERIALS]
-    law = tof_amplitude.fit(thinned(_joined([wall.singles for wall in walls]), LARGEST, generator))
-    repeats = Repeats(*(np.concatenate([getattr(wall.repeats, key) for wall in walls]) for key in Repeats._fields))
+    walls = [(depth, material) for depth in DISTANCES for material in MATERIALS]
+    found = together([_static(sensor, Wall(depth, material), frames, generator) for depth, material in walls])
+    law = tof_amplitude.fit(thinned(found.samples, LARGEST, generator))
     labels = blocks(SR4000.height, SR4000.width, REGION_PX)
-    model = per_pixel.fit(_joined([wall.means for wall in walls]), law, labels, repeats=repeats)
+    model = per_pixel.fit(found.means, law, labels, repeats=found.repeats)
     return replace(model, offset=np.zeros_like(model.offset))
 
 
-class _Static:
-    """A static sequence of a wall at right angles to the optical axis.
-
-    Attributes:
-        singles: measurements of the first frames.
-        means: of every pixel over all frames.
-        repeats: of the means.
-    """
-
-    def __init__(
-        self, sensor: TimeOfFlight, depth: float, material: float, frames: int, generator: np.random.Generator
-    ):
-        view = Renderer(SR4000, Wall(depth, material)).render()
-        measured = [sensor.measure(view, generator) for _ in range(frames)]
-        distance, amplitude = (
-            np.stack(part).astype(float) for part in zip(*((one.distance, one.amplitude) for one in measured))
-        )
-        self.singles = from_images(distance[:FEW], view.distance, amplitude[:FEW]).returns(with_amplitude=True)
-        times = np.isfinite(distance).sum(axis=0)
-        some = times > 1
-        mean = np.nanmean(distance[:, some], axis=0)
-        rows, columns = np.nonzero(some)
-        self.means = Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], rows, columns)
-        variance = np.nanmean((distance[:, some] - mean) ** 2, axis=0)
-        self.repeats = Repeats(times[some].astype(float), variance)
-
-
-def _joined(parts: Sequence[Samples]) -> Samples:
-    return Samples(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Samples)))
-
-
-def relative_error(
-    model: PerPixel, sensor: TimeOfFlight, distance: NDArray[np.float64], amplitude: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """σ of the model over the true one, less 1, at every pixel (height, width)."""
-    rows, columns = np.indices(distance.shape)
-    found = model.deviation(distance.ravel(), amplitude.ravel(), (rows.ravel(), columns.ravel()))
-    return found.reshape(distance.shape) / sensor.deviation(distance, amplitude) - 1
+def _static(sensor: TimeOfFlight, wall: Wall, frames: int, generator: np.random.Generator) -> Evidence:
+    """What a static sequence of a wall tells; single measurements are those of the first frames."""
+    view = Renderer(SR4000, wall).render()
+    measured = [sensor.measure(view, generator) for _ in range(frames)]
+    distance, amplitude = (
+        np.stack(part).astype(float) for part in zip(*((one.distance, one.amplitude) for one in measured))
+    )
+    times = np.isfinite(distance).sum(axis=0)
+    some = times > 1
+    mean = np.nanmean(distance[:, some], axis=0)
+    variance = np.nanmean((distance[:, some] - mean) ** 2, axis=0)
+    return Evidence(
+        samples=from_images(distance[:FEW], view.distance, amplitude[:FEW]).returns(with_amplitude=True),
+        means=Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], *np.nonzero(some)),
+        repeats=Repeats(times[some].astype(float), variance),
+    )
