@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from abs_service.experiments import plots
-from abs_service.experiments.tracked import Followed, Shot
+from abs_service.experiments.tracked import Followed, Shot, effort
 from abs_service.report.content import Column, Picture, Table, drawing
 
 
@@ -16,10 +16,7 @@ def figures(runs: Sequence[Followed]) -> dict[str, float]:
         "vertex_mm": float(np.mean(vertex)),
         "vertex_sd_mm": float(np.std(vertex)),
         "surface_mm": float(np.mean([one.surface_mm for one in runs])),
-        "worst_mm": max(one.worst_mm for one in runs),
-        "evaluations": float(np.mean([one.evaluations for one in runs])),
-        "median_ms": float(np.median([one.median_ms for one in runs])),
-        "tracked": float(np.mean([one.tracked for one in runs])),
+        **effort(runs),
         "residual_variance": float(
             np.mean([e.fits[0].normalized_residual ** 2 for one in runs for e in one.estimates if e.fits])
         ),

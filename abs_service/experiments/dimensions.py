@@ -8,7 +8,7 @@ import numpy as np
 from abs_service.experiments import plots
 from abs_service.experiments.base import Context, Findings, Goal, at_most
 from abs_service.experiments.scenes.time_of_flight import SR4000
-from abs_service.experiments.tracked import Followed, Shot, demo_plan, follow
+from abs_service.experiments.tracked import Followed, Shot, demo_plan, effort, follow
 from abs_service.experiments.waves import Waves
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import nurbs
@@ -123,10 +123,7 @@ def _figures(runs: Sequence[Followed]) -> dict[str, float]:
         "vertex_mm": float(np.mean([one.vertex_mm for one in runs])),
         "surface_mm": float(np.mean([one.surface_mm for one in runs])),
         "control_mm": float(np.mean([control_error_mm(one) for one in runs])),
-        "worst_mm": max(one.worst_mm for one in runs),
-        "evaluations": float(np.mean([one.evaluations for one in runs])),
-        "median_ms": float(np.median([one.median_ms for one in runs])),
-        "tracked": float(np.mean([one.tracked for one in runs])),
+        **effort(runs),
         "found_again": float(np.sum([one.found_again for one in runs])),
     }
 

@@ -139,6 +139,16 @@ class Followed:
         return np.stack([estimate.theta for estimate in self.estimates])
 
 
+def effort(runs: Sequence[Followed]) -> dict[str, float]:
+    """What several sequences cost, and how well they held."""
+    return {
+        "worst_mm": max(one.worst_mm for one in runs),
+        "evaluations": float(np.mean([one.evaluations for one in runs])),
+        "median_ms": float(np.median([one.median_ms for one in runs])),
+        "tracked": float(np.mean([one.tracked for one in runs])),
+    }
+
+
 def follow(rig: Rig, plan: Plan, shots: Sequence[Shot]) -> Followed:
     """Tracks a sequence.
 
