@@ -17,8 +17,7 @@ from abs.v1.health_pb2 import Health
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus.contract import Sample
-from abs_service.bus.session import BusError, Role
-from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.experiments.live.listener import connect
 
 #: The first start on a machine compiles the kernels.
 START_S = 150.0
@@ -50,7 +49,7 @@ class Ear:
 
     def __init__(self, endpoint: str, pattern: str = "**", rig: str = "demo"):
         self.heard: list[Heard] = []
-        self._bus = _connect(endpoint, rig)
+        self._bus = connect(endpoint, rig)
         self._bus.subscribe(pattern, self._take)
 
     def _take(self, sample: Sample) -> None:
@@ -99,27 +98,6 @@ def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any
         assert time.monotonic() < deadline_s, f"{what} did not happen within {timeout_s:g} s"
         time.sleep(0.05)  # looks at processes and files, which wake nobody up
     return result
-
-
-def _connect(endpoint: str, rig: str) -> ZenohBus:
-    """A client session, as soon as the router listens."""
-    for _ in range(9):
-        try:
-            return ZenohBus.open(rig, endpoint, Role.CLIENT)
-        except BusError:
-            continue  # after three seconds
-    return ZenohBus.open(rig, endpoint, Role.CLIENT)
-
-
-def children(pid: int) -> dict[str, int]:
-    """Process numbers of the children of `run`, by their command."""
-    listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
-    found: dict[str, int] = {}
-    for child in map(int, listed):
-        words = Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0")
-        if "abs_service" in words:
-            found[words[words.index("abs_service") + 1]] = child
-    return found
 
 
 def is_running(pid: int) -> bool:

@@ -7,7 +7,8 @@ import pytest
 from abs.v1.frame_info_pb2 import FrameInfo
 from mcap.reader import make_reader
 
-from tests.system.running import children, is_running, kill, wait_until
+from abs_service.experiments.live.proc import children
+from tests.system.running import is_running, kill, wait_until
 
 pytestmark = pytest.mark.slow
 

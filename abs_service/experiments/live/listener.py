@@ -60,7 +60,7 @@ class Listener:
     def __init__(self, endpoint: str, rig: str, tracker: str) -> None:
         self.arrivals: list[Arrival] = []
         self.health: dict[str, list[Health]] = {}
-        self._bus = _connect(endpoint, rig)
+        self._bus = connect(endpoint, rig)
         self._bus.subscribe(keys.state(tracker), self._take_state)
         self._bus.subscribe(keys.health("**"), self._take_health)
 
@@ -105,7 +105,12 @@ def counted(health: Iterable[Health], until_ns: int) -> Mapping[str, int]:
     return counters
 
 
-def _connect(endpoint: str, rig: str) -> ZenohBus:
+def connect(endpoint: str, rig: str) -> ZenohBus:
+    """A client of a rig whose router may begin to listen later.
+
+    Raises:
+        BusError: nothing ever listened at the endpoint.
+    """
     for _ in range(ATTEMPTS - 1):
         try:
             return ZenohBus.open(rig, endpoint, Role.CLIENT)
