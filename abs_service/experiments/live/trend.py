@@ -23,10 +23,6 @@ class Trend:
     slope: float
     half_width: float
 
-    def exceeds(self, limit: float) -> bool:
-        """Whether the whole interval lies above a limit."""
-        return self.slope - self.half_width > limit
-
 
 def trend(times: NDArray[np.floating], values: NDArray[np.floating]) -> Trend:
     """The straight line through values (n,) at times (n,), n at least `BLOCKS`, by least squares of block means."""
