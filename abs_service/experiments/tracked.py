@@ -139,6 +139,36 @@ class Followed:
         return np.stack([estimate.theta for estimate in self.estimates])
 
 
+class Judge:
+    """Compares what a tracking finds with the truth.
+
+    Args:
+        tracking: the tracker. Whoever asks lets it track, so that nothing of the comparison counts as its time.
+    """
+
+    def __init__(self, tracking: Tracking):
+        self._tracking = tracking
+        self._truths = TruthComparison()
+        self._known = tracking.mesh_version
+
+    def errors(self, estimate: Estimate, points: NDArray[np.floating]) -> Errors | None:
+        """How far the tracking's newest estimate is from the truth; None where that is unknown.
+
+        Args:
+            estimate: the newest.
+            points: where the surface's material points (rows, columns, 3) really were [m] at its moment.
+        """
+        self._truths.add_truth(estimate.t_host_ns, points)
+        if self._tracking.mesh is not None and self._tracking.mesh_version != self._known:
+            self._known = self._tracking.mesh_version
+            self._truths.add_topology(self._tracking.mesh.vertices, self._tracking.made_ns)
+        return self._truths.compare(estimate.t_host_ns, estimate.vertices)
+
+    def material_points(self, estimate: Estimate) -> NDArray[np.float64] | None:
+        """Where the vertices' own material points (n, 3) really were [m] at a judged estimate; None where unknown."""
+        return self._truths.material_points(estimate.t_host_ns)
+
+
 def effort(runs: Sequence[Followed]) -> dict[str, float]:
     """What several sequences cost, and how well they held."""
     return {
@@ -155,16 +185,14 @@ def follow(rig: Rig, plan: Plan, shots: Sequence[Shot]) -> Followed:
     Raises:
         UntrackedError: no object is in sight in its first shot.
     """
-    tracking, truths = Tracking(rig, plan), TruthComparison()
+    tracking = Tracking(rig, plan)
+    judge = Judge(tracking)
     models, estimates, errors, material, cpu_ms = [], [], [], [], []
     for shot in shots:
-        t_ns, known, begun = shot.frames.stamp_ns, tracking.mesh_version, time.process_time()
+        begun = time.process_time()
         estimate = tracking.track(shot.frames, lambda: True)
         cpu_ms.append((time.process_time() - begun) * 1e3)
-        truths.add_truth(t_ns, shot.points)
-        if tracking.mesh is not None and tracking.mesh_version != known:
-            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
-        error, points = truths.compare(t_ns, estimate.vertices), truths.material_points(t_ns)
+        error, points = judge.errors(estimate, shot.points), judge.material_points(estimate)
         if error is None or points is None or tracking.model is None:
             raise UntrackedError(f"exposure {shot.frames.seq}: {', '.join(estimate.reasons)}")
         models.append(tracking.model)

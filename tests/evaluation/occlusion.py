@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.evaluation import TruthComparison
-from abs_service.tracking import Tracking
+from abs_service.experiments.tracked import follow, shoot
 from drivers.simulated.simulation import Simulation
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+from tests.tracker.driving import default_plan, rig_of, simulate
 
 #: Frames in which less of the sheet is hidden do not count as occluded.
 LEAST_SHARE = 0.05
@@ -53,18 +52,10 @@ def occlusion(seed: int, frames: int) -> Occlusion:
 
 def errors(simulation: Simulation, frames: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Error of every vertex [mm] and whether it is hidden from the time-of-flight head, each (frames, n)."""
-    tracking, truths = Tracking(rig_of(simulation), default_plan()), TruthComparison()
+    followed = follow(rig_of(simulation), default_plan(), shoot(simulation, range(frames)))
     eye = simulation.heads["tof"].camera.center
     distances, hidden = [], []
-    for k in range(frames):
-        images, truth = simulation.expose(k)
-        truths.add_truth(truth.t_host_ns, truth.points_r)
-        estimate = tracking.track(frame_set(images, k), lambda: True)
-        if k == 0 and tracking.mesh is not None:
-            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
-        points = truths.material_points(truth.t_host_ns)
-        if points is None:
-            raise RuntimeError(f"no mesh in exposure 0 of {simulation}")
+    for k, (estimate, points) in enumerate(zip(followed.estimates, followed.material)):
         distances.append(np.linalg.norm(estimate.vertices - points, axis=1) * 1e3)
         moment = simulation.scene.at(simulation.time_ns(k) * 1e-9)
         # A hair's breadth before the sheet, which else would hide its own points.

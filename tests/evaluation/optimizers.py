@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from abs_service.evaluation import TruthComparison
+from abs_service.experiments.tracked import Judge
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracking import OptimizerSettings, Tracking
@@ -61,17 +61,14 @@ class Run:
 def track(simulation: Simulation, exposures: Sequence[int], settings: OptimizerSettings, budget_ms: float) -> Run:
     """Tracks exposures, each with a budget of real time."""
     tracking = Tracking(rig_of(simulation), default_plan(optimizer=settings))
-    truths = TruthComparison()
+    judge = Judge(tracking)
     steps, times = [], []
     for k in exposures:
         frames, truth = simulation.expose(k)
-        truths.add_truth(truth.t_host_ns, truth.points_r)
-        known, begin, begin_cpu = tracking.mesh_version, time.monotonic(), time.process_time()
+        begin, begin_cpu = time.monotonic(), time.process_time()
         estimate = tracking.track(frame_set(frames, k), partial(_in_time, begin + budget_ms * 1e-3))
         times.append((time.process_time() - begin_cpu) * 1e3)
-        if tracking.mesh is not None and tracking.mesh_version != known:
-            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
-        steps.append(Step(estimate, truths.compare(truth.t_host_ns, estimate.vertices)))
+        steps.append(Step(estimate, judge.errors(estimate, truth.points_r)))
     return Run(steps, times[1:])
 
 

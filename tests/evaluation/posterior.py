@@ -12,7 +12,6 @@ the first, which defines the material points:
 """
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,16 +19,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.stats import chi2
 
-from abs_service.evaluation import TruthComparison
+from abs_service.experiments.tracked import follow, shoot
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel, Moves
 from abs_service.tracker.priors import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.uncertainty import propagated
-from abs_service.tracking import Tracking
-from drivers.simulated.simulation import Simulation
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate, with_color_deviation
+from tests.tracker.driving import default_plan, rig_of, simulate, with_color_deviation
 
 SHARE = 0.95
 #: Deviation of a colour in the default rig [levels of 256].
@@ -59,77 +56,37 @@ class Coverage:
     true_mm: float
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One frame of a sequence: the model, its estimate, and where the vertices' material points (n, 3) are [m]."""
-
-    model: DeformationModel
-    estimate: Estimate
-    points: NDArray[np.float64]
-
-
 def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     """Tracks a simulated device with the default tracker and `sigma` as deviation of its colours [levels]."""
     simulation = simulate(uri)
+    rig = with_color_deviation(rig_of(simulation), sigma)
+    found = follow(rig, default_plan(model=nurbs.Settings()), shoot(simulation, range(frames)))
     rows, said, true = [], [], []
-    for frame in list(tracked(simulation, frames, sigma))[1:]:
-        error, known = frame.points - frame.estimate.vertices, frame.estimate.covariance
-        jacobian = frame.model.jacobian(frame.estimate.theta)
+    for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
+        error, known = points - estimate.vertices, estimate.covariance
+        jacobian = model.jacobian(estimate.theta)
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
-        sensed = _sensed(known, _prior(frame, jacobian, 1 / simulation.rate_hz))
+        sensed = _sensed(known, _prior(model, estimate, jacobian, 1 / simulation.rate_hz))
         within = [
-            _inside(error, frame.estimate.vertex_covariance),
+            _inside(error, estimate.vertex_covariance),
             _inside(error, propagated(Moves.full(jacobian), known)),
             _inside((sensed @ off)[None], (sensed @ known @ sensed.T)[None]),
             len(sensed),
             _inside(off[None], known[None]),
         ]
         rows.append([np.mean(part) for part in within])
-        said.append(np.trace(frame.estimate.vertex_covariance, axis1=1, axis2=2))
+        said.append(np.trace(estimate.vertex_covariance, axis1=1, axis2=2))
         true.append(np.sum(error**2, axis=1))
     lengths_mm = (float(np.sqrt(np.mean(squares)) * 1e3) for squares in (said, true))
     return Coverage(*np.mean(rows, axis=0).tolist(), *lengths_mm)
 
 
-def tracked(simulation: Simulation, frames: int, sigma: float) -> Iterator[Frame]:
-    """Every frame of a simulation; the mesh is made from the first."""
-    model = _KeptModel()
-    tracking, truths = (
-        Tracking(with_color_deviation(rig_of(simulation), sigma), default_plan(model=model)),
-        TruthComparison(),
-    )
-    for k in range(frames):
-        images, truth = simulation.expose(k)
-        truths.add_truth(truth.t_host_ns, truth.points_r)
-        estimate = tracking.track(frame_set(images, k), lambda: True)
-        if k == 0 and tracking.mesh is not None:
-            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
-        points = truths.material_points(truth.t_host_ns)
-        if points is None or model.made is None:
-            raise RuntimeError(f"no mesh in exposure 0 of {simulation}")
-        yield Frame(model.made, estimate, points)
-
-
-class _KeptModel:
-    """The default model's settings, which keep what they built.
-
-    Attributes:
-        made: the newest model; None before the first.
-    """
-
-    def __init__(self) -> None:
-        self.made: DeformationModel | None = None
-
-    def build(self, sighting):
-        """The model of an object as it is first seen."""
-        self.made = nurbs.Settings().build(sighting)
-        return self.made
-
-
-def _prior(frame: Frame, jacobian: NDArray[np.float64], interval_s: float) -> NDArray[np.float64]:
+def _prior(
+    model: DeformationModel, estimate: Estimate, jacobian: NDArray[np.float64], interval_s: float
+) -> NDArray[np.float64]:
     """Curvature (dim, dim) of the priors alone at an estimate, for the derivatives (n, 3, dim) of its vertices."""
-    settings, model = default_plan().priors, frame.model
-    surface = model.deform(frame.estimate.theta[None])
+    settings = default_plan().priors
+    surface = model.deform(estimate.theta[None])
     parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, Moves.full(jacobian))
     stretch = stack(parts, jacobian.shape[2]).jacobian
     motion = np.diag(1 / (model.scales * settings.speed * interval_s))

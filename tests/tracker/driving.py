@@ -8,7 +8,8 @@ import numpy as np
 
 from abs_service import config
 from abs_service.commands import plans
-from abs_service.evaluation import Errors, TruthComparison
+from abs_service.evaluation import Errors
+from abs_service.experiments.tracked import Judge
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking import Plan, Tracking
 from calib.noise.color import GaussianColor
@@ -63,15 +64,11 @@ def drive(
     in_time: Callable[[], bool] = lambda: True,
 ) -> Iterator[Step]:
     """Tracks exposures; `change` alters the frames of an exposure before the tracker sees them."""
-    truths = TruthComparison()
+    judge = Judge(tracking)
     for k in exposures:
         frames, truth = simulation.expose(k)
-        truths.add_truth(truth.t_host_ns, truth.points_r)
-        known = tracking.mesh_version
         estimate = tracking.track(frame_set(change(k, frames), k), in_time)
-        if tracking.mesh is not None and tracking.mesh_version != known:
-            truths.add_topology(tracking.mesh.vertices, tracking.made_ns)
-        yield Step(estimate, truths.compare(truth.t_host_ns, estimate.vertices))
+        yield Step(estimate, judge.errors(estimate, truth.points_r))
 
 
 def mean_errors(steps: list[Step]) -> tuple[float, float]:
