@@ -1,13 +1,23 @@
 """What a reader asks: what does each part contribute, and how much does it matter how much of it there is?"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from abs_service.experiments import ablations_report as report
 from abs_service.experiments.base import Context, Findings, Goal, at_least, at_most
 from abs_service.experiments.cold import Cold, Forgetful
-from abs_service.experiments.tracked import Followed, Shot, demo_plan, demo_rig, follow, shoot, simulate
+from abs_service.experiments.tracked import (
+    Followed,
+    Shot,
+    demo_plan,
+    demo_rig,
+    follow,
+    moving,
+    shoot,
+    simulate,
+    with_noise,
+)
 from abs_service.report.content import Section
 from abs_service.tracker import priors
 from abs_service.tracker.models import flexpad, nurbs
@@ -148,8 +158,7 @@ def believed(noise: float, factor: float) -> Rig:
 
 
 def _with_noise(noise: DepthNoise) -> Rig:
-    rig = demo_rig(simulate("simulated://sheet"))
-    return replace(rig, sensors={**rig.sensors, "tof": replace(rig.sensors["tof"], noise=noise)})
+    return with_noise(demo_rig(simulate("simulated://sheet")), "tof", noise)
 
 
 def _question(title: str, rig: Rig, lines: Mapping[str, Mapping[str, Any]]) -> Question:
@@ -178,8 +187,8 @@ def run(settings: Settings, context: Context) -> Findings:
 
 def _shots(settings: Settings, seed: int) -> list[Shot]:
     motion = f"bend={settings.bend:g}&speed={settings.speed:g}&noise={settings.noise:g}"
-    exposures = [0, *range(40, 40 + settings.every * settings.frames, settings.every)]
-    return shoot(simulate(f"simulated://sheet?seed={seed}&{motion}"), exposures)
+    simulation = simulate(f"simulated://sheet?seed={seed}&{motion}")
+    return shoot(simulation, moving(settings.frames, settings.every))
 
 
 def _goals(values: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[Goal, ...]:

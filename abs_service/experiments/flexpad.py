@@ -14,7 +14,7 @@ from abs_service.experiments import flexpad_report as report
 from abs_service.experiments.base import Context, Findings, at_least
 from abs_service.experiments.flexpad_report import Errors, Tracked
 from abs_service.experiments.static_walls import learnt
-from abs_service.experiments.tracked import Followed, Shot, demo_plan, follow, mean_deviation, shoot, squares
+from abs_service.experiments.tracked import Followed, Shot, demo_plan, follow, mean_deviation, moving, shoot, squares
 from abs_service.tracker.models import flexpad
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import likelihood
@@ -139,21 +139,19 @@ def run(settings: Settings, context: Context) -> Findings:
     """Follows all sequences with the Euclidean fitness, bounded and not, and with the likelihood."""
     context.progress("noise calibration")
     noise = learnt("", settings.still, context.seed)
-    tracked, sequences = [], []
+    bents, tracked, sequences = [], [], []
     for degrees in settings.directions:
         for number in range(settings.motions):
             context.progress(f"bends of {degrees}°, sequence {number + 1}")
-            bent = Bent(degrees, context.seed + 1 + 10 * degrees + number, settings.bend)
-            exposures = [0, *range(40, 40 + settings.every * settings.frames, settings.every)]
-            sequences.append(shoot(bent.simulation(), exposures))
-            tracked.append(_track(bent, sequences[-1], noise, hybrid.Settings()))
+            bents.append(Bent(degrees, context.seed + 1 + 10 * degrees + number, settings.bend))
+            sequences.append(shoot(bents[-1].simulation(), moving(settings.frames, settings.every)))
+            tracked.append(_track(bents[-1], sequences[-1], noise, hybrid.Settings()))
     few, budgets = sequences[0][: settings.published], {}
     if few:
         context.progress("the paper's budget")
-        bent = Bent(settings.directions[0], context.seed + 1 + 10 * settings.directions[0], settings.bend)
-        search = cma_es.Settings(population=16, generations=400)
-        budgets = {"hybrid": hybrid.Settings(), "CMA-ES, 400 × 16 at most": search}
-        budgets = {name: _track(bent, few, noise, settings) for name, settings in budgets.items()}
+        published = cma_es.Settings(population=16, generations=400)
+        searches = {"hybrid": hybrid.Settings(), "CMA-ES, 400 × 16 at most": published}
+        budgets = {name: _track(bents[0], few, noise, search) for name, search in searches.items()}
     goals = (
         at_least("Surface error, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "surface_mm"), 1.0),
         at_least("Error of the bends, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "bend"), 1.0),

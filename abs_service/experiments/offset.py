@@ -1,7 +1,7 @@
 """E3: a mean offset over the whole image is nothing to a likelihood that knows it, and an error to squares."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,17 @@ from abs_service.experiments.tracked import (
     demo_rig,
     follow,
     mean_deviation,
+    moving,
     shoot,
     simulate,
     squares,
+    with_noise,
 )  # fmt: skip
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracking import ModelSettings, ObjectiveSettings
 from calib.noise.tof_amplitude import TofAmplitude
-from calib.rig import Rig
 
 TITLE = "E3: a mean offset of 10 cm over the whole image"
 
@@ -88,7 +89,7 @@ def run(settings: Settings, context: Context) -> Findings:
         for offset in (0.0, settings.offset)
     )
     rig = demo_rig(simulate("simulated://sheet"))
-    equal = squares(mean_deviation(_knowing(rig, without), "tof", plain[0][0], BETWEEN_M))
+    equal = squares(mean_deviation(with_noise(rig, "tof", without), "tof", plain[0][0], BETWEEN_M))
     cases = {
         _REFERENCE: Case(plain, without, likelihood.Settings()),
         _KNOWN: Case(shifted, known, likelihood.Settings()),
@@ -100,7 +101,7 @@ def run(settings: Settings, context: Context) -> Findings:
         context.progress(model)
         found[model] = {
             name: [
-                follow(_knowing(rig, case.noise), demo_plan(MODELS[model], objective=case.objective), shots)
+                follow(with_noise(rig, "tof", case.noise), demo_plan(MODELS[model], objective=case.objective), shots)
                 for shots in case.shots
             ]
             for name, case in cases.items()
@@ -112,14 +113,8 @@ def run(settings: Settings, context: Context) -> Findings:
 
 
 def _shots(offset: float, seed: int, settings: Settings) -> list[Shot]:
-    begin = 40
-    exposures = [0, *range(begin, begin + settings.every * settings.frames, settings.every)]
-    return shoot(simulate(f"simulated://sheet?seed={seed}&offset={offset}"), exposures)
-
-
-def _knowing(rig: Rig, noise: TofAmplitude) -> Rig:
-    """The rig with a noise model of its time-of-flight sensor."""
-    return replace(rig, sensors={**rig.sensors, "tof": replace(rig.sensors["tof"], noise=noise)})
+    simulation = simulate(f"simulated://sheet?seed={seed}&offset={offset}")
+    return shoot(simulation, moving(settings.frames, settings.every))
 
 
 def _figures(runs: Sequence[Followed]) -> dict[str, float]:

@@ -19,7 +19,7 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracking import ModelSettings, Plan, Tracking
 from calib.noise.base import DepthNoise, pixels_where
-from calib.rig import Rig
+from calib.rig import Noise, Rig
 from drivers.frame import FrameSet
 from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation
@@ -27,6 +27,9 @@ from drivers.simulated.simulation import Simulation
 #: Euclidean fitness counts distances that differ by more like this much [m]. The published one has no such bound; this
 #: one is above all errors here, and keeps a search that has lost the object finite.
 CUTOFF_M = 0.1
+
+#: The exposure from which on simulated sheets move: until then they rest where the mesh is made.
+MOVING = 40
 
 
 class UntrackedError(RuntimeError):
@@ -56,6 +59,11 @@ def shoot(simulation: Simulation, exposures: Iterable[int]) -> list[Shot]:
     return shots
 
 
+def moving(frames: int, every: int) -> list[int]:
+    """Exposures of a simulated sheet: the first, in which nothing moves, and then `frames`, one in `every`."""
+    return [0, *range(MOVING, MOVING + every * frames, every)]
+
+
 def simulate(address: str) -> Simulation:
     """The simulation of an address."""
     return parse(address).build()
@@ -67,6 +75,11 @@ def demo_rig(simulation: Simulation) -> Rig:
     cameras = {name: head.camera for name, head in simulation.heads.items()}
     rig = plans.rig(settings, next(iter(settings.trackers)), cameras)
     return replace(rig, sensors={name: rig.sensors[name] for name in simulation.heads})
+
+
+def with_noise(rig: Rig, sensor: str, noise: Noise) -> Rig:
+    """A rig that believes another noise model of one of its sensors."""
+    return replace(rig, sensors={**rig.sensors, sensor: replace(rig.sensors[sensor], noise=noise)})
 
 
 def demo_plan(model: ModelSettings, **changes: object) -> Plan:

@@ -9,7 +9,7 @@ import numpy as np
 from abs_service import config
 from abs_service.commands import plans
 from abs_service.evaluation import Errors
-from abs_service.experiments.tracked import Judge
+from abs_service.experiments.tracked import Judge, with_noise
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking import Plan, Tracking
 from calib.noise.color import GaussianColor
@@ -34,8 +34,7 @@ def rig_of(simulation: Simulation) -> Rig:
 
 def with_color_deviation(rig: Rig, sigma: float) -> Rig:
     """A rig with a colour camera, whose colours deviate by `sigma` [levels of 256]."""
-    color = dataclasses.replace(rig.sensors["color"], noise=GaussianColor(sigma))
-    return dataclasses.replace(rig, sensors=dict(rig.sensors) | {"color": color})
+    return with_noise(rig, "color", GaussianColor(sigma))
 
 
 def simulate(uri: str) -> Simulation:
