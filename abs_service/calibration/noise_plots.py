@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.calibration.noise import Found
+from abs_service.report import plots
 from calib.noise.base import DepthNoise
 from calib.sequences.reference import Kind
 
@@ -27,7 +28,7 @@ def over_distance_and_amplitude(found: Found) -> "Figure":
 
 def histogram(found: Found) -> "Figure":
     """Held-out residuals over their deviations, against the normal distribution."""
-    figure = _figure(7.5, 3.6)
+    figure = plots.figure(7.5, 3.6)
     axes = figure.add_subplot()
     axes.hist(np.clip(found.z, -_EDGE, _EDGE), 101, density=True, color="0.75", label="held out")
     z = np.linspace(-_EDGE, _EDGE, 400)
@@ -51,7 +52,7 @@ def _maps(found: Found) -> "Figure":
     if found.kind.tells_offset:
         reach = float(np.abs(mu).max()) * 1e3 or 1.0
         shown.append(("μ [mm]", mu, [dot[3] for dot in dots], "RdBu_r", (-reach, reach)))
-    figure = _figure(5.5 * len(shown), 4.2)
+    figure = plots.figure(5.5 * len(shown), 4.2)
     for axes, (label, values, measured, colors, (low, high)) in zip(_row(figure, len(shown)), shown):
         image = values.reshape(x.shape) * 1e3
         mesh = axes.pcolormesh(x, a, image, cmap=colors, vmin=low, vmax=high, shading="gouraud", rasterized=True)
@@ -69,7 +70,7 @@ def _curves(found: Found) -> "Figure":
     x = np.linspace(*found.distances, _FINE)
     sigma, mu = _middle(found.model, found, x, np.zeros(_FINE))
     known = found.kind.tells_offset
-    figure = _figure(5.5 * (1 + known), 4.2)
+    figure = plots.figure(5.5 * (1 + known), 4.2)
     axes = _row(figure, 1 + known)
     distance = [row.distance for _, row in found.rows]
     axes[0].plot(x, sigma * 1e3, color="tab:blue", label="model, all of it")
@@ -104,9 +105,3 @@ def _known(value: float) -> float:
 
 def _row(figure: "Figure", n: int) -> "list[Axes]":
     return list(figure.subplots(1, n, squeeze=False)[0])
-
-
-def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
-
-    return Figure(figsize=(width, height), layout="constrained")

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from abs_service.report import plots
 from calib.solve.halves import Agreement
 from calib.solve.projection import Field
 from calib.solve.solution import ViewFit
@@ -17,7 +18,7 @@ _UNSEEN = "0.8"
 
 def uncertainty_map(field: Field, label: str) -> "Figure":
     """Deviation of projections over an image; hatched where no board was seen."""
-    figure = _figure(7.5, 5.4)
+    figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()
     u, v = field.pixels[..., 0], field.pixels[..., 1]
     inside = field.deviations[field.inside & np.isfinite(field.deviations)]
@@ -34,7 +35,7 @@ def uncertainty_map(field: Field, label: str) -> "Figure":
 
 def halves(agreement: Agreement) -> "Figure":
     """By how much projections of the two halves differ, as arrows over the image."""
-    figure = _figure(7.5, 5.4)
+    figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()
     u, v = agreement.pixels[..., 0], agreement.pixels[..., 1]
     du, dv = agreement.differences[..., 0], agreement.differences[..., 1]
@@ -51,7 +52,7 @@ def halves(agreement: Agreement) -> "Figure":
 
 def view_errors(views: Sequence[ViewFit], unit: str, scale: float) -> "Figure":
     """Root mean square of every view; views with outliers in another colour."""
-    figure = _figure(8, 3.2)
+    figure = plots.figure(8, 3.2)
     axes = figure.add_subplot()
     colors = ["tab:orange" if view.outliers.any() else "tab:blue" for view in views]
     axes.bar([str(view.shot) for view in views], [view.rms * scale for view in views], color=colors)
@@ -67,7 +68,7 @@ def distance_errors(views: Sequence[ViewFit], distances: Mapping[int, float]) ->
         views: distances of one sensor.
         distances: of the boards by shot [m].
     """
-    figure = _figure(11, 4.2)
+    figure = plots.figure(11, 4.2)
     image, plot = figure.subplots(1, 2)
     pixels = np.concatenate([view.pixels for view in views])
     residuals = np.concatenate([view.residuals for view in views]) * 1e3
@@ -83,9 +84,3 @@ def distance_errors(views: Sequence[ViewFit], distances: Mapping[int, float]) ->
     plot.axhline(0, color="0.6", linewidth=0.8)
     plot.set(xlabel="distance of the board [m]", ylabel="mean and deviation of a view [mm]")
     return figure
-
-
-def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
-
-    return Figure(figsize=(width, height), layout="constrained")

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from abs_service.hanging_strip import Profiles
+from abs_service.report import plots
 
 
 def draw(profiles: Profiles, title: str, path: Path) -> None:
@@ -14,9 +15,7 @@ def draw(profiles: Profiles, title: str, path: Path) -> None:
         ValueError: no such format.
         OSError: the file cannot be written.
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that no other command needs
-
-    figure = Figure(figsize=(11, 4.6), layout="constrained")
+    figure = plots.figure(11, 4.6)
     figure.suptitle(title)
     side, angle = figure.subplots(1, 2)
     side.plot(*(profiles.measured.T * 1e3), ".", color="0.7", markersize=3, label="depth pixels")

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from abs_service.experiments import plots
 from abs_service.experiments.tracked import Followed, Shot, effort
+from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Table, drawing
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.experiments import plots
 from abs_service.experiments.base import Context, Findings, Goal, at_most
 from abs_service.experiments.scenes.time_of_flight import SR4000
 from abs_service.experiments.tracked import Followed, Shot, demo_plan, effort, follow
 from abs_service.experiments.waves import Waves
+from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import cma, cma_es, hybrid

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.experiments import plots
 from abs_service.experiments.tracked import Followed, Shot
+from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.optimizers import cma_es
 from abs_service.tracking import OptimizerSettings

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.experiments.plots import figure
 from abs_service.experiments.tracked import Followed, Shot
 from abs_service.report.content import Column, Picture, Section, Table, drawing
+from abs_service.report.plots import figure
 from drivers.frame import Kind
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.experiments import plots
 from abs_service.experiments.base import Context, Findings, Goal, at_least, at_most
 from abs_service.experiments.static_walls import learnt
 from abs_service.experiments.tracked import (
@@ -22,6 +21,7 @@ from abs_service.experiments.tracked import (
     squares,
     with_noise,
 )  # fmt: skip
+from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.objectives import likelihood

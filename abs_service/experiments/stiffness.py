@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service.experiments.base import Context, Findings, at_least, at_most
-from abs_service.experiments.plots import figure
 from abs_service.experiments.tracked import demo_plan, demo_rig, follow, shoot, simulate
 from abs_service.report.content import Column, Picture, Section, Table, drawing
+from abs_service.report.plots import figure
 from abs_service.tracker.models import gravity
 from abs_service.tracker.stiffness import Stiffness, estimate_stiffness, hanging
 

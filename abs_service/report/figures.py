@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.report import plots
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -30,7 +32,7 @@ def coverage_map(
     counts = np.zeros(cells)
     for pixels in views:
         counts += np.histogram2d(pixels[:, 0], pixels[:, 1], bins=edges)[0] > 0
-    figure = _figure(7.5, 6.1 * height / width + 0.6)
+    figure = plots.figure(7.5, 6.1 * height / width + 0.6)
     axes = figure.add_subplot()
     shown = axes.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="YlGn", vmin=0)
     axes.set_facecolor(_NO_VALUE)
@@ -70,7 +72,7 @@ def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating]
     lengths = np.linalg.norm(residuals, axis=1)
     typical = float(np.sqrt(np.mean(lengths**2))) if len(lengths) else 0.0
     unit = typical or 1.0
-    figure = _figure(11, 6.6 * height / width + 0.7)
+    figure = plots.figure(11, 6.6 * height / width + 0.7)
     field, scatter = figure.subplots(1, 2, width_ratios=(7.5, 3.5))
     if len(pixels):
         arrows = field.quiver(
@@ -108,7 +110,7 @@ def difference_map(values: NDArray[np.floating], label: str, limit: float | None
 
 def _map(values: NDArray[np.floating], label: str, limits: tuple[float, float], colors: str) -> "Figure":
     height, width = values.shape
-    figure = _figure(7.5, 6.1 * height / width + 0.6)
+    figure = plots.figure(7.5, 6.1 * height / width + 0.6)
     axes = figure.add_subplot()
     axes.set_facecolor(_NO_VALUE)
     finite = np.isfinite(values)
@@ -127,12 +129,6 @@ def _percentiles(values: NDArray[np.floating]) -> tuple[float, float]:
     finite = values[np.isfinite(values)]
     low, high = np.percentile(finite, (1, 99)) if finite.size else (0.0, 1.0)
     return (float(low), float(high)) if high > low else (float(low) - 0.5, float(low) + 0.5)
-
-
-def _figure(width: float, height: float) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _as_image(axes: "Axes", width: int, height: int) -> None:

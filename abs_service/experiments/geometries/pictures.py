@@ -8,7 +8,7 @@ import numpy as np
 from abs_service.experiments.geometries.following import Scene
 from abs_service.experiments.geometries.measuring import Sequence
 from abs_service.experiments.scenes.surfaces import SplineSurface
-from abs_service.report import figures
+from abs_service.report import figures, plots
 from abs_service.report.content import Picture, drawing
 
 if TYPE_CHECKING:
@@ -36,11 +36,9 @@ def pictures(first: Several[Sequence]) -> tuple[Picture, ...]:
 
 
 def _over_time(first: Several[Sequence]) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
-
     columns = min(len(first), 5)
     rows = -(-len(first) // columns)
-    figure = Figure(figsize=(2.4 * columns, 1.9 * rows + 0.4), layout="constrained")
+    figure = plots.figure(2.4 * columns, 1.9 * rows + 0.4)
     for one, axes in zip(first, figure.subplots(rows, columns, squeeze=False, sharey=True).flat):
         for name, color in (("Euclidean", "tab:orange"), ("likelihood", "tab:blue")):
             axes.plot(one.followed[name].control, color=color, linewidth=0.7, label=name)
@@ -55,12 +53,10 @@ def _over_time(first: Several[Sequence]) -> "Figure":
 
 
 def _meshes(one: Sequence) -> "Figure":
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
     frames = len(one.followed["likelihood"].control)
     truth = one.job.sheet.control(frames / 30)
     surface = SplineSurface((4, 4), 2, np.linspace(0, 1, 16), np.linspace(0, 1, 22))
-    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    figure = plots.figure(9, 3.6)
     for place, name in enumerate(("Euclidean", "likelihood"), start=1):
         axes = figure.add_subplot(1, 2, place, projection="3d")
         axes.set_title(name, fontsize="medium")

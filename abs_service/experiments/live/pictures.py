@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.experiments.live.measurement import Watched
+from abs_service.report import plots
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,9 +24,7 @@ def ages(seen: Watched, arrived_ms: NDArray[np.float64], goals_ms: Mapping[str, 
         arrived_ms: age of each of its arrivals (n,) [ms].
         goals_ms: what is wanted, by the percentile's name [ms].
     """
-    from matplotlib.figure import Figure  # noqa: PLC0415  takes half a second
-
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    figure = plots.figure(9, 3.4)
     over_time, histogram = figure.subplots(1, 2, width_ratios=(2, 1), sharey=True)
     times_s = np.array([one.exposed_ns - seen.begin_ns for one in seen.arrivals]) * 1e-9
     span = np.floor(times_s / SPAN_S)
@@ -46,9 +45,7 @@ def ages(seen: Watched, arrived_ms: NDArray[np.float64], goals_ms: Mapping[str, 
 
 def memory(seen: Watched) -> "Figure":
     """What each process holds over time, less what it held at the beginning."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  takes half a second
-
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
+    figure = plots.figure(9, 3.4)
     axes = figure.subplots()
     for name, usages in seen.usages.items():
         held = np.array([one.resident_bytes for one in usages]) * 1e-6
@@ -60,9 +57,7 @@ def memory(seen: Watched) -> "Figure":
 
 def cpu(seen: Watched) -> "Figure":
     """Which share of a core each process uses, over time."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  takes half a second
-
-    figure = Figure(figsize=(9, 3.0), layout="constrained")
+    figure = plots.figure(9, 3.0)
     mean, over_time = figure.subplots(1, 2, width_ratios=(1, 2), sharey=True)
     middle = (seen.times_s[1:] + seen.times_s[:-1]) / 2
     for name, usages in seen.usages.items():

@@ -7,6 +7,7 @@ import numpy as np
 
 from abs_service.experiments.peers.measuring import LOST_FRAMES, LOST_M, Followed
 from abs_service.experiments.peers.scene import CAMERA, INTERVAL_S, Scene
+from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 
 Rows = Mapping[str, Sequence[Followed]]
@@ -135,9 +136,7 @@ def _leaps(leapt: Rows) -> Section:
 
 def _curves(name: str, rows: Rows) -> Picture:
     """Vertex error over time of the first seed."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  only reports draw
-
-    figure: Figure = Figure(figsize=(9, 3.2), layout="constrained")
+    figure = plots.figure(9, 3.2)
     axes = figure.add_subplot()
     for title, runs in rows.items():
         axes.plot(np.arange(1, len(runs[0].vertex_mm) + 1) * INTERVAL_S, runs[0].vertex_mm, label=title)
@@ -148,11 +147,9 @@ def _curves(name: str, rows: Rows) -> Picture:
 
 def _worst(scene: Scene, rows: Rows) -> Picture:
     """Vertices and their material, in the camera's view, in each tracker's worst frame of the first seed."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  only reports draw
-
     ours, *others = (title for title in rows if not title.startswith(_STILL))
     shown = [ours, *others[-5:]]
-    figure: Figure = Figure(figsize=(2.6 * len(shown), 2.4), layout="constrained")
+    figure = plots.figure(2.6 * len(shown), 2.4)
     for place, title in enumerate(shown, start=1):
         one = rows[title][0]
         k = int(np.argmax(one.vertex_mm))

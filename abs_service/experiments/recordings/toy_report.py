@@ -14,6 +14,7 @@ from abs_service.experiments.recordings import dropouts
 from abs_service.experiments.recordings.agreement import vertex_errors
 from abs_service.experiments.recordings.dropouts import Pace
 from abs_service.experiments.recordings.toy import CAMERA, RATE_HZ, Followed, Toy, medians, worst
+from abs_service.report import plots
 from abs_service.report.content import Cell, Column, Picture, Section, Table, drawing
 
 if TYPE_CHECKING:
@@ -121,9 +122,7 @@ def _values(runs: Mapping[str, Sequence[Followed]], kept: Pace, back: int | None
 
 def _picture(toy: Toy, frames: Sequence[Followed]) -> Picture:
     """The mesh over the edges of four frames, coloured by its depth residual."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  only who draws waits for it
-
-    figure = Figure(figsize=(14, 4.2), layout="constrained")
+    figure = plots.figure(14, 4.2)
     shown = [frames[i] for i in np.linspace(0, len(frames) - 1, 4).astype(int)]
     for axes, frame in zip(figure.subplots(1, 4), shown):
         _draw(axes, toy, frame)

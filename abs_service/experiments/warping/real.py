@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.experiments.plots import figure
 from abs_service.experiments.recordings.azure import Shot
 from abs_service.experiments.warping.comparison import methods
 from abs_service.report.content import Column, Picture, Section, Table, drawing
+from abs_service.report.plots import figure
 from calib.warp.mesh import MeshWarp
 from calib.warp.pictures import PictureLookup
 

@@ -1,4 +1,4 @@
-"""What the pictures of several experiments begin with."""
+"""What every drawn picture begins with."""
 
 from typing import TYPE_CHECKING
 
