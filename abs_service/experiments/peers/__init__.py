@@ -116,8 +116,7 @@ def _sequences(title: str, make: Make, scene: Scene, settings: Settings, seed: i
     followed = []
     for k in range(1 if slow else settings.seeds):
         shots = film(scene, range(SLOW_FRAMES if slow else settings.frames), np.random.default_rng([seed, k]))
-        follower, at = make(shots[0], scene.sigma, seed + k)
-        followed.append(follow(follower, at, shots))
+        followed.append(_follow(make, scene, shots, seed + k))
     return followed
 
 
@@ -127,9 +126,13 @@ def _leaps(make: Make, settings: Settings, seed: int) -> list[Followed]:
         generator = np.random.default_rng([seed, k])
         scene = Scene("leap", Leap(generator))
         shots = film(scene, range(LEAP_FRAMES), generator)
-        follower, at = make(shots[0], scene.sigma, seed + k)
-        followed.append(follow(follower, at, shots))
+        followed.append(_follow(make, scene, shots, seed + k))
     return followed
+
+
+def _follow(make: Make, scene: Scene, shots: Sequence[Shot], seed: int) -> Followed:
+    follower, at = make(shots[0], scene.sigma, seed)
+    return follow(follower, at, shots)
 
 
 def _goals(
