@@ -64,16 +64,26 @@ def methods(source: Camera, target: Camera, pool: ThreadPoolExecutor) -> dict[st
 
 
 def _register(source: Camera, target: Camera, *, dilate: bool) -> Method:
-    """OpenCV's registration, which takes z and knows no distortion of the source; the conversions are not its fault."""
-    K, L = (np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]) for c in (source, target))
-    T_ts = target.T_sr @ source.T_rs
-    lens, size, per_z = target.lens.coefficients, (target.width, target.height), target.lookup.ray_length
-    to_z = 1 / source.lookup.ray_length
+    """OpenCV's registration, from and to radial distances; the conversions are not its fault."""
+    register = _register_z(source, target, dilate=dilate)
+    to_z, per_z = 1 / source.lookup.ray_length, target.lookup.ray_length
 
-    def register(distance: NDArray[np.float64]) -> NDArray[np.float64]:
-        z = np.nan_to_num(distance * to_z).astype(np.float32)
-        registered = np.asarray(cv2.registerDepth(K, L, lens, T_ts, z, size, depthDilation=dilate), np.float32)
+    def convert(distance: NDArray[np.float64]) -> NDArray[np.float64]:
+        registered = register(np.nan_to_num(distance * to_z).astype(np.float32))
         return np.where(registered > 0, registered * per_z, np.nan)
+
+    return convert
+
+
+def _register_z(
+    source: Camera, target: Camera, *, dilate: bool
+) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
+    """OpenCV's registration of images of z [m], 0 where there is none; it knows no distortion of the source."""
+    K, L = (np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]) for c in (source, target))
+    T_ts, lens, size = target.T_sr @ source.T_rs, target.lens.coefficients, (target.width, target.height)
+
+    def register(z: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.asarray(cv2.registerDepth(K, L, lens, T_ts, z, size, depthDilation=dilate), np.float32)
 
     return register
 
@@ -82,10 +92,9 @@ def opencv_alone_ms(
     source: Camera, target: Camera, distance: NDArray[np.float64], *, dilate: bool, rounds: int = ROUNDS
 ) -> float:
     """What `cv2.registerDepth` takes without any conversion [ms]."""
-    K, L = (np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]) for c in (source, target))
+    register = _register_z(source, target, dilate=dilate)
     z = np.nan_to_num(distance / source.lookup.ray_length).astype(np.float32)
-    arguments = (K, L, target.lens.coefficients, target.T_sr @ source.T_rs, z, (target.width, target.height))
-    return least_ms(lambda: cv2.registerDepth(*arguments, depthDilation=dilate), rounds)
+    return least_ms(lambda: register(z), rounds)
 
 
 def least_ms(work: Callable[[], object], rounds: int = ROUNDS) -> float:
