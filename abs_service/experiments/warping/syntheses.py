@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.experiments.tracked import Followed, Shot, demo_plan, demo_rig, follow, shoot, simulate
+from abs_service.experiments.tracked import Shot, demo_plan, demo_rig, follow, shoot, simulate
 from abs_service.observation import Observer
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs
@@ -74,12 +74,8 @@ def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row
         tuple(one.vertex_mm for one in found),
         float(np.mean([one.surface_mm for one in found])),
         float(np.mean([one.median_ms for one in found])),
-        _candidate_us(sequences[0], synthesis, _mesh(found[0])),
+        _candidate_us(sequences[0], synthesis, found[0].model.mesh),
     )
-
-
-def _mesh(found: Followed) -> Mesh:
-    return found.model.mesh
 
 
 def _candidate_us(sequence: Recorded, synthesis: SynthesisSettings, mesh: Mesh) -> float:
