@@ -35,8 +35,7 @@ def logarithms(make: Callable[..., Strategy], function: str) -> NDArray[np.float
         strategy = make(DIMENSION, np.random.default_rng([run, 7]), 0.5, usual_population(DIMENSION), 0.5)
         column = 0
         for generation in range(1, moments[-1] + 1):
-            candidates = strategy.ask()
-            strategy.tell(candidates, cost(candidates))
+            strategy.tell(cost(strategy.ask()))
             if generation in moments:
                 found[run, column : column + 2] = np.log([cost(strategy.mean[None])[0], strategy.deviation])
                 column += 2

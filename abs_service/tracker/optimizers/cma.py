@@ -41,10 +41,10 @@ class Settings:
 
 
 class Cma:
-    """Mean, step size and covariance of one frame start the next; see `Strategy` for the interface.
+    """Step size and covariance of one frame start the next; see `Strategy` for the interface.
 
     Args:
-        dimension: of ξ.
+        dimension: of Θ.
         generator: source of all randomness.
         least_step: the step size never starts a frame below this.
         population: candidates per generation.
@@ -64,6 +64,8 @@ class Cma:
             "popsize": population,
         }
         self._search = CMAEvolutionStrategy(np.zeros(dimension), step, options)
+        self._origin, self._metric = np.zeros(dimension), np.eye(dimension)
+        self._asked: list[NDArray[np.float64]] = []
 
     @property
     def deviation(self) -> float:
@@ -73,17 +75,19 @@ class Cma:
     @property
     def mean(self) -> NDArray[np.float64]:
         """Centre (dim,) of the current distribution."""
-        return np.asarray(self._search.mean, np.float64)
+        return self._origin + self._metric @ np.asarray(self._search.mean, np.float64)
 
-    def restart(self) -> None:
-        """Moves the mean to the prediction, ξ = 0; covariance and step size continue from the last frame."""
+    def restart(self, origin: NDArray[np.float64], metric: NDArray[np.float64]) -> None:
+        """Moves the mean to the prediction; covariance and step size continue from the last frame."""
+        self._origin, self._metric = origin, metric
         self._search.mean = np.zeros_like(self._search.mean)
         self._search.sigma = float(np.clip(self._search.sigma, *self._steps))
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
-        return np.asarray(self._search.ask())
+        self._asked = self._search.ask()
+        return self._origin + np.asarray(self._asked) @ self._metric.T
 
-    def tell(self, candidates: NDArray[np.float64], costs: NDArray[np.float64]) -> None:
+    def tell(self, costs: NDArray[np.float64]) -> None:
         """Updates mean, step size and covariance."""
-        self._search.tell(list(candidates), costs.tolist())
+        self._search.tell(self._asked, costs.tolist())

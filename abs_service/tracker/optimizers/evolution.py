@@ -1,5 +1,6 @@
 """How a strategy behind ask and tell searches a frame: in the metric of the curvature, from a Newton step."""
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -25,7 +26,7 @@ SIGNIFICANT = 20.0
 
 
 class Strategy(Protocol):
-    """A search behind ask and tell over ξ ∈ R^dim, where the curvature of the cost is about one."""
+    """A search behind ask and tell: in ξ ∈ R^dim, where the curvature of the cost is about one, told in Θ."""
 
     @property
     def deviation(self) -> float:
@@ -37,15 +38,19 @@ class Strategy(Protocol):
         """Centre (dim,) of the current distribution."""
         ...
 
-    def restart(self) -> None:
-        """Begins a frame at ξ = 0 with what the last frame taught about step size and covariance."""
+    def restart(self, origin: NDArray[np.float64], metric: NDArray[np.float64]) -> None:
+        """Begins a frame at ξ = 0 with what the last frame taught about step size and covariance.
+
+        Args:
+            origin, metric: Θ = origin + metric ξ, (dim,) and (dim, dim); 0 and the identity before the first frame.
+        """
         ...
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
         ...
 
-    def tell(self, candidates: NDArray[np.float64], costs: NDArray[np.float64]) -> None:
+    def tell(self, costs: NDArray[np.float64]) -> None:
         """Learns the costs (population,) of the candidates that `ask` returned."""
         ...
 
@@ -101,7 +106,6 @@ class Evolution:
         costs = problem.cost(origins)
         budget.spend(len(origins))
         nearest = int(np.argmin(costs))
-        self._strategy.restart()
         return evolve(problem, origins[nearest], float(costs[nearest]), metric, self._strategy, self._schedule, budget)
 
     def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
@@ -135,22 +139,21 @@ def evolve(
     Returns:
         The better of the origin and the strategy's mean.
     """
-    stop, best, columns = None, [], np.ascontiguousarray(metric.T)
+    strategy.restart(origin, metric)
+    stop, best = None, deque[float](maxlen=PATIENCE)
     for _ in range(schedule.generations):
         if best and (stop := budget.exhausted()):
             break
-        candidates = strategy.ask()
-        thetas = candidates @ columns
-        thetas += origin
+        thetas = strategy.ask()
         costs = problem.cost(thetas)
-        strategy.tell(candidates, costs)
-        budget.spend(len(candidates), generations=1)
-        best = [*best, float(costs.min())][-PATIENCE:]
+        strategy.tell(costs)
+        budget.spend(len(thetas), generations=1)
+        best.append(float(costs.min()))
         steady = len(best) == PATIENCE and max(best) - min(best) < schedule.tolerance
-        if steady and np.ptp(costs) < schedule.tolerance:
+        if steady and costs.max() - best[-1] < schedule.tolerance:
             stop = Stop.CONVERGED
             break
-    theta = origin + metric @ strategy.mean
+    theta = strategy.mean
     found = float(problem.cost(theta[None])[0])
     budget.spend(1)
     if found > cost:

@@ -96,7 +96,6 @@ class Hybrid:
         if not self._searching:
             self._strategy = self._make(self._population, self._settings.step)
         metric = search_metric(problem.prior(start))
-        self._strategy.restart()
         sampled = evolve(problem, start, np.inf, metric, self._strategy, self._schedule, budget)
         polished = self._descend(problem, sampled.theta, budget)
         if polished.cost < near.cost - SIGNIFICANT:
