@@ -7,10 +7,11 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import NDArray
 
+from abs_service.tracker.edge_runs import EdgeRuns
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization, split
-from calib.jit import kernel, prange
+from calib.jit import kernel
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
 FIRST_INTERVAL_S = 1 / 30
@@ -40,13 +41,12 @@ class StretchPrior:
         self._edges = mesh.edges
         lengths = np.linalg.norm(mesh.vertices[self._edges[:, 0]] - mesh.vertices[self._edges[:, 1]], axis=1)
         self._inverse_lengths = (1 / lengths).astype(np.float32)
+        self._runs = EdgeRuns(self._edges, self._inverse_lengths, len(mesh.vertices))
         self._inverse_deviation = 1 / deviation
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Negative log-density (population,) of the edge lengths, up to a constant."""
-        out = np.empty(len(surface.vertices))
-        _stretch_cost(surface.vertices, self._edges, self._inverse_lengths, out)
-        return out * (0.5 * self._inverse_deviation**2)
+        return self._runs.sum_squares(surface.vertices, 0.5 * self._inverse_deviation**2)
 
     def linearize(self, surface: Surface, moves: Moves) -> list[Linearization]:
         """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""
@@ -128,24 +128,6 @@ class MotionPrior:
     def _told(self) -> NDArray[np.float64]:
         """Inverse deviation (dim,) of the parameters around the predicted ones."""
         return 1 / (self._scales * self._settings.speed * self._elapsed_s)
-
-
-@kernel
-def _stretch_cost(
-    vertices: NDArray[np.float32],
-    edges: NDArray[np.int32],
-    inverse_lengths: NDArray[np.float32],
-    out: NDArray[np.float64],
-) -> None:
-    """Sum over edges of the squared relative change of length, for every member of the population."""
-    for k in prange(vertices.shape[0]):
-        place, total = vertices[k], np.float32(0)
-        for e in range(edges.shape[0]):
-            i, j = np.uintp(edges[e, 0]), np.uintp(edges[e, 1])  # unsigned: else each is tested for being negative
-            x, y, z = place[0, i] - place[0, j], place[1, i] - place[1, j], place[2, i] - place[2, j]
-            change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[e] - np.float32(1)
-            total += change * change
-        out[k] = total
 
 
 @kernel
