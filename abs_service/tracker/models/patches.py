@@ -5,14 +5,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models import spline
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.tiles import LANES, TILE, write
 from calib.jit import kernel, prange
-
-#: Vertices whose results are collected before they are written: few enough to stay in the fastest cache. A constant,
-#: so that the compiler knows how far apart the rows of results are and need not fear that they overlap.
-_TILE = 256
-
-#: Vertices are computed so many at once, the last ones of a span with some of the next, which are then overwritten.
-_LANES = 8
 
 
 class Patches:
@@ -50,12 +44,12 @@ class Patches:
         place = np.clip([u, w], 0, 1) * spans[:, None] - np.divmod(span, spans[1]) - 0.5
         denominator = _polynomials(self._powers.sum(axis=2).reshape(-1, degree + 1, degree + 1)[span], *place)
         value, along_u, along_w = denominator
-        self._vertices = np.zeros((6, len(u) + _LANES), np.float32)
+        self._vertices = np.zeros((6, len(u) + LANES), np.float32)
         self._vertices[:, : len(u)] = [*place, offset, 1 / value, along_u, along_w]
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Vertices and normals for every row of `thetas` (population, 3 · control points) [m]."""
-        population, n = len(thetas), self._vertices.shape[1] - _LANES
+        population, n = len(thetas), self._vertices.shape[1] - LANES
         shape = (*self._powers.shape[:2], 3, population)
         coefficients = np.empty(shape, np.float32)
         control = np.ascontiguousarray(thetas.T, np.float64).reshape(-1, 3 * population)
@@ -142,16 +136,16 @@ def _evaluate(
     Args:
         coefficients: of the numerator (spans, (d + 1)², 3, population), powers of w within those of u.
         start: first vertex of every span, and the number of vertices, (spans + 1,).
-        places: u, w, offset, 1 / denominator and its derivatives by u and by w (6, n + `_LANES`).
+        places: u, w, offset, 1 / denominator and its derivatives by u and by w (6, n + `LANES`).
         orders: as long as a polynomial; the compiler knows a tuple's length and so unrolls what runs over it.
         vertices, normals: results (population, 3, n).
     """
     one, n = np.float32(1), vertices.shape[2]
     for k in prange(vertices.shape[0]):
-        result, c = np.empty((6, _TILE + _LANES), np.float32), np.empty((3, coefficients.shape[1]), np.float32)
+        result, c = np.empty((6, TILE + LANES), np.float32), np.empty((3, coefficients.shape[1]), np.float32)
         cx, cy, cz, s = c[0], c[1], c[2], 0
-        for first in range(0, n, _TILE):
-            last = min(first + _TILE, n)
+        for first in range(0, n, TILE):
+            last = min(first + TILE, n)
             begin = first
             while begin < last:
                 while start[s + 1] <= begin:
@@ -161,7 +155,7 @@ def _evaluate(
                     cx[q], cy[q], cz[q] = coefficients[s, q, 0, k], coefficients[s, q, 1, k], coefficients[s, q, 2, k]
                 u, w, offset = places[0, begin:], places[1, begin:], places[2, begin:]
                 share, by_u, by_w = places[3, begin:], places[4, begin:], places[5, begin:]
-                shift, lanes = np.uintp(begin - first), np.uintp((end - begin + _LANES - 1) // _LANES * _LANES)
+                shift, lanes = np.uintp(begin - first), np.uintp((end - begin + LANES - 1) // LANES * LANES)
                 for v in range(lanes):
                     x, ux, wx = _polynomial(cx, orders, u[v], w[v])
                     y, uy, wy = _polynomial(cy, orders, u[v], w[v])
@@ -177,9 +171,4 @@ def _evaluate(
                     result[0, at], result[1, at], result[2, at] = x, y, z
                     result[3, at], result[4, at], result[5, at] = a, b, d
                 begin = end
-            for i in range(3):
-                of_vertices, of_normals = vertices[k, i, first:], normals[k, i, first:]
-                for v in range(np.uintp(last - first)):  # twice as fast as the assignment of slices
-                    of_vertices[v] = result[i, v]
-                for v in range(np.uintp(last - first)):
-                    of_normals[v] = result[3 + i, v]
+            write(result, first, last - first, vertices[k], normals[k])
