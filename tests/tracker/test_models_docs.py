@@ -35,11 +35,11 @@ def test_a_table_names_all_keys_with_their_defaults(name):
             assert getattr(made, field.name) == field.default, field.name
 
 
-@pytest.mark.parametrize(("radius", "rows"), [(0.1, 77), (0.04, 191), (0.5, 17)])
-def test_the_tables_have_as_many_rows_as_the_page_says(radius, rows):
-    assert f"{rows} for {radius:g}" in PAGE or f"{rows} curvatures for `least_radius_m = {radius:g}`" in PAGE
-    reach = (0.297**2 + 0.210**2) ** 0.5 / 2
-    assert len(bends.curvatures(reach, radius)) == rows
+def test_the_degrees_and_turns_of_bends_are_as_the_page_says():
+    degrees = list(bends.DEGREES.values())
+    assert f"of degree {', '.join(map(str, degrees[:-1]))} or {degrees[-1]}" in PAGE
+    assert list(bends.DEGREES) == [1 / 3, 2 / 3, 4 / 3, 3]
+    assert "a third of a turn, two thirds, four thirds or three turns" in PAGE
 
 
 def test_what_is_no_sheet_is_as_the_page_says():

@@ -1,8 +1,12 @@
-"""Lookup tables of FlexPad's bends: a sheet rolled up on one side of a line through its centre, in four directions."""
+"""FlexPad's bends: a sheet rolled up on one side of a line through its centre, in four directions."""
+
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.base import ModelError
 from calib.jit import kernel
 
 #: Angles [rad] of the directions a along which the sheet bends, from its x axis towards its y axis.
@@ -16,93 +20,110 @@ SIDES = (
 #: Largest parameter of a bend: full bend towards (+) or away from (−) the sensor.
 FULL = 2.0
 
-#: Largest distance [m] between a vertex and where it would be without tables.
-TABLE_ERROR_M = 1e-4
+#: Turns by which a sheet rolls up at most, and degree of the polynomials that follow it so far with an error below
+#: 1e-7 of the distance from the centre. Few, because each degree is machine code of its own, which takes seconds to
+#: compile when a sheet of that size is first seen. Beyond the last, single precision would lose too many digits.
+DEGREES = {1 / 3: 4, 2 / 3: 6, 4 / 3: 10, 3.0: 16}
 
 
-def curvatures(reach: float, least_radius: float) -> NDArray[np.float64]:
-    """Curvatures (rows,) [1/m] of the tables, equidistant, zero in the middle.
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """sin t / t and (1 − cos t)/t², which are even and so polynomials of t², of u = scale · t² − 1 from −1 to 1.
 
-    Both coordinates of a point on an arc have second derivatives by the curvature of at most Q³/3, so interpolation
-    between rows that are Δκ apart errs by at most Δκ² Q³/24 in each; a point lies on four of the eight sides at most.
-
-    Args:
-        reach: largest distance Q of a vertex from the centre [m].
-        least_radius: radius at a parameter of `FULL` [m].
+    Attributes:
+        coefficients: of both (2, degree + 1), of the highest power first.
+        scale: of t².
     """
-    spacing = np.sqrt(24 * TABLE_ERROR_M / (4 * np.sqrt(2) * reach**3))
-    half = max(int(np.ceil(1 / least_radius / spacing)), 1)
-    return np.linspace(-1 / least_radius, 1 / least_radius, 2 * half + 1)
+
+    coefficients: NDArray[np.float32]
+    scale: float
 
 
-def tabulate(points: NDArray[np.float64], kappa: NDArray[np.float64]) -> NDArray[np.float32]:
-    """What every bend does to every vertex.
-
-    With Q the distance from the centre along the bent side, zero on the other side, a vertex moves to sin(κQ)/κ along
-    it and rises by (1 − cos κQ)/κ.
+def fit(reach: float, least_radius: float) -> Series:
+    """Polynomials that interpolate both functions as far as a sheet can be bent.
 
     Args:
-        points: places (n, 2) of the vertices on the flat sheet, from its centre [m].
-        kappa: curvatures (rows,) [1/m].
+        reach: largest distance of a vertex from the centre [m].
+        least_radius: radius at a parameter of `FULL` [m].
+
+    Raises:
+        ModelError: the sheet would roll up too often.
+    """
+    turns = reach / least_radius / (2 * np.pi)
+    limit = next((limit for limit in DEGREES if turns <= limit), None)
+    if limit is None:
+        most = max(DEGREES)
+        raise ModelError(
+            f"least_radius_m = {least_radius:g} would roll up a sheet that reaches {reach:.3g} m from its centre by "
+            f"{turns:.1f} turns; {most:g} are allowed, so least_radius_m must be at least {_above(reach, most):g}"
+        )
+    largest = 2 * np.pi * limit
+    powers = [
+        Chebyshev.interpolate(lambda u, f=f: f(largest * np.sqrt((1 + u) / 2)), DEGREES[limit]).convert(kind=Polynomial)
+        for f in (_sine, _versine)
+    ]
+    highest_first = np.array([series.coef[::-1] for series in powers], np.float32)
+    return Series(highest_first, 2 / largest**2)
+
+
+def _above(reach: float, turns: float) -> float:
+    """Least radius [m] that is allowed, rounded up to 1 mm."""
+    return np.ceil(1e3 * reach / (2 * np.pi * turns)) / 1e3
+
+
+def _sine(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The sine of t, by t; numpy.sinc(x) is sin(πx)/πx."""
+    return np.sinc(t / np.pi)
+
+
+def _versine(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The versine of t, 1 − cos t, by t²."""
+    return 0.5 * np.sinc(t / (2 * np.pi)) ** 2
+
+
+@kernel
+def bend(theta: NDArray[np.float64], direction: int, per_bend: float) -> tuple[np.float32, np.float32]:
+    """Mean of the curvatures ahead and behind in a direction, and half their difference [1/m].
+
+    With p the distance along it, mean · p + difference · |p| is κp on either side. The compiler would turn a choice of
+    one or the other into a choice in double precision for every vertex.
+
+    Args:
+        theta: parameters (15,).
+        direction: 0 to 3.
+        per_bend: curvature at a parameter of 1 [1/m].
+    """
+    ahead = min(max(theta[2 * direction], -FULL), FULL) * (0.5 * per_bend)
+    behind = min(max(theta[2 * direction + 1], -FULL), FULL) * (0.5 * per_bend)
+    return np.float32(ahead + behind), np.float32(ahead - behind)
+
+
+@kernel
+def roll(
+    p: np.float32,
+    kappa: tuple[np.float32, np.float32],
+    series: NDArray[np.float32],
+    scale: float,
+    orders: tuple[int, ...],
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """What the bends of a direction do to a vertex: with t = κp, it moves to sin(t)/κ and rises by (1 − cos t)/κ.
+
+    A vertex lies on one side only, and what the side's own direction is cancels.
+
+    Args:
+        p: signed distance from the centre along the direction [m].
+        kappa: as `bend` tells them.
+        series, scale: as in `Series`.
+        orders: as long as a polynomial; the compiler knows a tuple's length and so unrolls what runs over it.
 
     Returns:
-        (8 sides, rows, 4, n): shift along the side [m], rise [m], and the derivatives of both by Q.
+        Shift along the direction [m], rise [m], and the derivatives of both by p.
     """
-    q = np.maximum(SIDES @ points.T, 0.0)[:, None]
-    angle = kappa[:, None] * q
-    # sin(κQ)/κ = Q sinc and (1 − cos κQ)/κ = κ Q²/2 sinc², exact as κ → 0: numpy.sinc(x) is sin(πx)/πx.
-    shift = q * (np.sinc(angle / np.pi) - 1)
-    rise = 0.5 * angle * q * np.sinc(angle / (2 * np.pi)) ** 2
-    return np.stack([shift, rise, np.cos(angle) - 1, np.sin(angle)], axis=2).astype(np.float32)
-
-
-@kernel
-def look_up(
-    thetas: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    full_height: float,
-    half: float,
-    rows: int,
-    row: NDArray[np.int32],
-    fraction: NDArray[np.float32],
-    height: NDArray[np.float32],
-    motion: NDArray[np.float32],
-) -> None:
-    """From FlexPad's parameters to places in the tables, and what comes after them.
-
-    Args:
-        thetas: parameters (population, 15).
-        pose: of the sheet in the rig (3, 4).
-        full_height: largest parameter of the height map.
-        half: half the sheet's long side [m].
-        rows: of the tables.
-        row, fraction: place of every bend between two rows of its table (population, 8).
-        height: g/c of the height map (population,) [1/m].
-        motion: rotation and translation from sheet to rig (population, 3, 4).
-    """
-    turn = np.empty((3, 3))
-    for k in range(thetas.shape[0]):
-        theta = thetas[k]
-        for j in range(8):
-            bounded = min(max(theta[j], -FULL), FULL)
-            place = (bounded / FULL + 1) * ((rows - 1) / 2)
-            row[k, j] = min(int(place), rows - 2)
-            fraction[k, j] = place - row[k, j]
-        height[k] = min(max(theta[8], -full_height), full_height) / half
-        _turn(theta[9], theta[10], theta[11], turn)
-        for i in range(3):
-            for j in range(3):
-                motion[k, i, j] = turn[i, 0] * pose[0, j] + turn[i, 1] * pose[1, j] + turn[i, 2] * pose[2, j]
-            motion[k, i, 3] = pose[i, 3] + theta[12 + i]
-
-
-@kernel
-def _turn(x: float, y: float, z: float, turn: NDArray[np.float64]) -> None:
-    """The rotation (3, 3) of a rotation vector, by Rodrigues' formula; its series near zero."""
-    square = x * x + y * y + z * z
-    angle = np.sqrt(square)
-    a = np.sin(angle) / angle if square > 1e-8 else 1 - square / 6
-    b = (1 - np.cos(angle)) / square if square > 1e-8 else 0.5 - square / 24
-    turn[0, 0], turn[0, 1], turn[0, 2] = 1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
-    turn[1, 0], turn[1, 1], turn[1, 2] = b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x
-    turn[2, 0], turn[2, 1], turn[2, 2] = b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)
+    t = kappa[0] * p + kappa[1] * abs(p)
+    square = t * t
+    u = square * np.float32(scale) - np.float32(1)
+    sine, versine = series[0, 0], series[1, 0]
+    for i in range(1, len(orders)):
+        sine = sine * u + series[0, i]
+        versine = versine * u + series[1, i]
+    return p * sine - p, p * t * versine, -square * versine, t * sine

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from abs_service.tracker.models import bends
 from abs_service.tracker.models.arc import arc
 from abs_service.tracker.models.base import BOARD, Moves, Surface
+from abs_service.tracker.models.bends import bend, roll
+from abs_service.tracker.models.placing import place
+from abs_service.tracker.models.tiles import LANES, TILE, write
 from abs_service.tracker.rectangle import find_sheet
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracker.sighting import Sighting
@@ -25,6 +28,9 @@ FULL_HEIGHT = 0.5
 
 #: Standard deviation of the height map's parameter before any measurement.
 HEIGHT_DEVIATION = 0.2
+
+#: Share of x and of y in the directions between them, √½.
+_ROOT = np.float32(np.sqrt(0.5))
 
 
 @dataclass(frozen=True)
@@ -59,6 +65,7 @@ class Settings:
 
         Raises:
             SightingError: what is seen is no flat rectangle, or not of the given size.
+            ModelError: the sheet is too large for the least radius.
         """
         sheet = find_sheet(sighting)
         if self.width_m:
@@ -83,13 +90,14 @@ class FlexPad:
     def __init__(self, sheet: Sheet, vertices: int, least_radius: float, bend_deviation: float):
         mesh = sheet.mesh(vertices)
         points = pose.transform(pose.inverse(sheet.T_rp), mesh.vertices)[:, :2]
-        self._points = np.ascontiguousarray(points.T, np.float32)
+        self._points = points.T
+        self._padded = np.ascontiguousarray(np.pad(self._points, ((0, 0), (0, LANES))), np.float32)
         self._half = 0.5 * sheet.width
         self._rotation, self._center = sheet.T_rp[:3, :3], sheet.T_rp[:3, 3]
         self._pose = np.ascontiguousarray(sheet.T_rp[:3], np.float64)
-        self._sides = bends.SIDES.astype(np.float32)
-        self._kappa = bends.curvatures(np.linalg.norm(points, axis=1).max(), least_radius)
-        self._tables = bends.tabulate(points, self._kappa)
+        self._per_bend = 1 / (bends.FULL * least_radius)
+        self._series = bends.fit(float(np.linalg.norm(points, axis=1).max()), least_radius)
+        self._orders = (0,) * self._series.coefficients.shape[1]
         self.rest = np.zeros(DIMENSION)
         self.scales = _scales(points, least_radius, self._half)
         self.prior = np.eye(9, DIMENSION) / np.array([bend_deviation] * 8 + [HEIGHT_DEVIATION])[:, None]
@@ -97,13 +105,10 @@ class FlexPad:
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh with every row of `thetas` (population, 15)."""
-        population, n = len(thetas), self._points.shape[1]
-        row, fraction = np.empty((population, 8), np.int32), np.empty((population, 8), np.float32)
-        height, motion = np.empty(population, np.float32), np.empty((population, 3, 4), np.float32)
-        limits = FULL_HEIGHT, self._half
-        bends.look_up(thetas, self._pose, *limits, len(self._kappa), row, fraction, height, motion)
-        vertices, normals = np.empty((population, 3, n), np.float32), np.empty((population, 3, n), np.float32)
-        _deform(row, fraction, height, motion, self._points, self._sides, self._tables, vertices, normals)
+        shape = len(thetas), 3, self._points.shape[1]
+        vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        sheet = self._pose, self._per_bend, self._half, self._padded
+        _deform(thetas, *sheet, self._series.coefficients, self._series.scale, self._orders, vertices, normals)
         return Surface(vertices, normals)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -119,16 +124,12 @@ class FlexPad:
         return Moves.full(self.jacobian(theta))
 
     def _slopes(self, bend: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-        """Derivatives (n, 3, 9) of places on the sheet, z pointing away, by bends (8,) and height map.
-
-        They are those of the exact bends; the tables' own would jump from row to row.
-        """
-        per_bend = self._kappa[-1] / bends.FULL
+        """Derivatives (n, 3, 9) of places on the sheet, z pointing away, by bends (8,) and height map."""
         bounded, g = np.clip(bend, -bends.FULL, bends.FULL), np.clip(height, -FULL_HEIGHT, FULL_HEIGHT)
         q = np.maximum(bends.SIDES @ self._points, 0.0)
-        end, slope = arc((per_bend * bounded)[:, None] * q)
+        end, slope = arc((self._per_bend * bounded)[:, None] * q)
         rise = np.sum(q * end.imag, axis=0)
-        by_bends = np.where(bounded == bend, per_bend, 0.0)[:, None] * q**2 * slope
+        by_bends = np.where(bounded == bend, self._per_bend, 0.0)[:, None] * q**2 * slope
         result = np.zeros((len(rise), 3, 9))
         result[:, :2, :8] = by_bends.real.T[:, None] * bends.SIDES.T
         result[:, 2, :8] = -(by_bends.imag * (1 + 2 * g / self._half * rise)).T
@@ -147,70 +148,62 @@ def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> ND
 
 @kernel
 def _deform(
-    row: NDArray[np.int32],
-    fraction: NDArray[np.float32],
-    height: NDArray[np.float32],
-    motion: NDArray[np.float32],
+    thetas: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    per_bend: float,
+    half: float,
     points: NDArray[np.float32],
-    sides: NDArray[np.float32],
-    tables: NDArray[np.float32],
+    series: NDArray[np.float32],
+    scale: float,
+    orders: tuple[int, ...],
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
     """Sums the bends, maps the heights and applies the pose, for a population.
 
     Args:
-        row, fraction: place of every bend between two rows of its table (population, 8).
-        height: g/c of the height map (population,) [1/m].
-        motion: rotation and translation from sheet to rig (population, 3, 4); the sheet's z axis points away.
-        points: vertices on the flat sheet (2, n).
-        sides: in-plane directions (8, 2).
-        tables: as `tabulate` makes them.
+        thetas: parameters (population, 15).
+        pose: of the sheet in the rig (3, 4); its z axis points away from the sensor.
+        per_bend: curvature of a side at a parameter of 1 [1/m].
+        half: half the sheet's long side [m].
+        points: vertices on the flat sheet (2, n + `LANES`) [m].
+        series, scale, orders: as in `bends.roll`.
         vertices, normals: results (population, 3, n).
     """
-    one, two = np.float32(1), np.float32(2)
-    n = points.shape[1]
-    for k in prange(row.shape[0]):
-        work = np.empty((8, n), np.float32)
-        x, y, z, g, h = work[0], work[1], work[2], work[3], work[4]
-        stretch_x, shear, stretch_y = work[5], work[6], work[7]
-        work[2:] = 0
-        work[0], work[1] = points[0], points[1]
-        # Few arrays in each loop: else the compiler gives up proving that it may vectorise.
-        for j in range(8):
-            low, high, f = tables[j, row[k, j]], tables[j, row[k, j] + 1], fraction[k, j]
-            a, b = sides[j, 0], sides[j, 1]
-            for v in range(n):
-                shift = low[0, v] + f * (high[0, v] - low[0, v])
-                x[v] += a * shift
-                y[v] += b * shift
-            for v in range(n):
-                z[v] += low[1, v] + f * (high[1, v] - low[1, v])
-            for v in range(n):
-                shrink = low[2, v] + f * (high[2, v] - low[2, v])
-                stretch_x[v] += a * a * shrink
-                shear[v] += a * b * shrink
-                stretch_y[v] += b * b * shrink
-            for v in range(n):
-                slope = low[3, v] + f * (high[3, v] - low[3, v])
-                g[v] += a * slope
-                h[v] += b * slope
-        for v in range(n):
-            steep = one + two * height[k] * z[v]
-            g[v] *= steep
-            h[v] *= steep
-            z[v] += height[k] * z[v] * z[v]
-        # The cross product of the tangents by x and y, each the sum of the sides' derivatives.
-        for v in range(n):
-            across, along = one + stretch_x[v], one + stretch_y[v]
-            u = along * g[v] - shear[v] * h[v]
-            w = across * h[v] - shear[v] * g[v]
-            t = across * along - shear[v] * shear[v]
-            inverse = -one / np.sqrt(u * u + w * w + t * t + np.float32(1e-20))
-            g[v], h[v], stretch_x[v] = u * inverse, w * inverse, t * inverse
-        for i in range(3):
-            r0, r1, r2, r3 = motion[k, i, 0], motion[k, i, 1], motion[k, i, 2], motion[k, i, 3]
-            for v in range(n):
-                vertices[k, i, v] = r0 * x[v] + r1 * y[v] - r2 * z[v] + r3
-            for v in range(n):
-                normals[k, i, v] = r0 * g[v] + r1 * h[v] + r2 * stretch_x[v]
+    one, two, r, n = np.float32(1), np.float32(2), _ROOT, vertices.shape[2]
+    for k in prange(thetas.shape[0]):
+        theta, w = thetas[k], np.empty((8, TILE), np.float32)
+        e, se = bend(theta, 0, per_bend), bend(theta, 1, per_bend)
+        s, sw = bend(theta, 2, per_bend), bend(theta, 3, per_bend)
+        height = np.float32(min(max(theta[8], -FULL_HEIGHT), FULL_HEIGHT) / half)
+        of_x, of_y, of_z = place(theta[9:12], theta[12:15], pose)
+        for first in range(0, n, TILE):
+            count, xs, ys = min(TILE, n - first), points[0, first:], points[1, first:]
+            lanes = np.uintp((count + LANES - 1) // LANES * LANES)
+            # Two loops: in one, too few vertices would be under way at once for all units of the processor.
+            for v in range(lanes):
+                x, y = xs[v], ys[v]
+                shift_0, z_0, shrink_0, g_0 = roll(x, e, series, scale, orders)
+                shift_1, z_1, shrink_1, g_1 = roll(r * (x + y), se, series, scale, orders)
+                shift_2, z_2, shrink_2, g_2 = roll(y, s, series, scale, orders)
+                shift_3, z_3, shrink_3, g_3 = roll(r * (y - x), sw, series, scale, orders)
+                shear, both = (shrink_1 - shrink_3) / two, one + (shrink_1 + shrink_3) / two
+                w[0, v], w[1, v] = x + shift_0 + r * (shift_1 - shift_3), y + shift_2 + r * (shift_1 + shift_3)
+                w[2, v], w[3, v], w[4, v] = z_0 + z_1 + z_2 + z_3, g_0 + r * (g_1 - g_3), g_2 + r * (g_1 + g_3)
+                w[5, v], w[6, v], w[7, v] = both + shrink_0, both + shrink_2, shear
+            for v in range(lanes):
+                x, y, z, across, along, shear = w[0, v], w[1, v], w[2, v], w[5, v], w[6, v], w[7, v]
+                steep = one + two * height * z
+                z, g, h = z + height * z * z, w[3, v] * steep, w[4, v] * steep
+                # The cross product of the tangents by x and y, each the sum of the sides' derivatives.
+                a, b, d = along * g - shear * h, across * h - shear * g, across * along - shear * shear
+                inverse = -one / np.sqrt(a * a + b * b + d * d + np.float32(1e-20))
+                a, b, d = a * inverse, b * inverse, d * inverse
+                # Written out, since with a loop over the coordinates the compiler would not vectorise the one around.
+                w[0, v] = of_x[0] * x + of_x[1] * y - of_x[2] * z + of_x[3]
+                w[1, v] = of_y[0] * x + of_y[1] * y - of_y[2] * z + of_y[3]
+                w[2, v] = of_z[0] * x + of_z[1] * y - of_z[2] * z + of_z[3]
+                w[3, v] = of_x[0] * a + of_x[1] * b + of_x[2] * d
+                w[4, v] = of_y[0] * a + of_y[1] * b + of_y[2] * d
+                w[5, v] = of_z[0] * a + of_z[1] * b + of_z[2] * d
+            write(w, first, count, vertices[k], normals[k])
