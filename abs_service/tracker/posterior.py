@@ -42,7 +42,7 @@ class Posterior:
         self._fitted.clear()
         self._motion.predict(observation.t_host_ns)
         predicted = self._motion.predicted
-        self._objective.observe(observation, self._model.deform(predicted[None]))
+        self._objective.observe(observation, self._model.deform(predicted[None]), self._motion.reach_m)
         return predicted
 
     def restart(self, theta: NDArray[np.float64]) -> None:

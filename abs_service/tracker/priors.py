@@ -13,6 +13,9 @@ from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization, split
 from calib.jit import kernel
 
+#: No search gets farther from the prediction than so many deviations of the motion prior.
+FARTHEST = 10.0
+
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
 FIRST_INTERVAL_S = 1 / 30
 LONGEST_INTERVAL_S = 0.5
@@ -86,10 +89,12 @@ class MotionPrior:
 
     Attributes:
         predicted: predicted parameters (dim,) of the frame in hand.
+        reach_m: how far from there the surface may be [m].
     """
 
     def __init__(self, rest: NDArray[np.float64], scales: NDArray[np.float64], settings: Settings):
         self.predicted = rest
+        self.reach_m = np.inf
         self._settings, self._scales = settings, scales
         self._theta = rest
         self._velocity = np.zeros_like(rest)
@@ -99,10 +104,12 @@ class MotionPrior:
 
     def predict(self, t_ns: int) -> None:
         """Turns to the frame of time `t_ns` [ns]; the velocity fades with the age of the last estimate."""
+        began = self._t_ns is not None
         elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
         self._elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
         self._t_ns = t_ns
         self._inverse_deviation = self._told()
+        self.reach_m = FARTHEST * self._settings.speed * self._elapsed_s if began else np.inf
         travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
         self.predicted = self._theta + travel * self._velocity
 

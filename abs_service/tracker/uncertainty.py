@@ -22,8 +22,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.curvature import add_at
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization
+from calib.jit import kernel
 
 #: Least share of its noise that a residual keeps: below, rounding decides.
 LEAST_KEPT = 1e-6
@@ -40,7 +42,7 @@ def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> N
     for part in sensed:
         answer = part.jacobian @ inverse[part.square]
         kept = np.maximum(1 - np.einsum("md,md->m", answer, part.jacobian), LEAST_KEPT)
-        excess[part.square] += (part.jacobian.T * (part.residual**2 / kept - 1)) @ part.jacobian
+        add_at(part.parameters, (part.jacobian.T * (part.residual**2 / kept - 1)) @ part.jacobian, excess)
     return inverse + inverse @ excess @ inverse
 
 
@@ -52,8 +54,22 @@ def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.floa
         local = moves.local[vertices]
         # One product of matrices for all vertices: n small ones take several times as long.
         weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
-        result[vertices] = weighted @ local.transpose(0, 2, 1)
+        _multiply(weighted, local, vertices, result)
     return result
+
+
+@kernel
+def _multiply(
+    left: NDArray[np.float64], right: NDArray[np.float64], to: NDArray[np.int64], result: NDArray[np.float64]
+) -> None:
+    """Products left rightᵀ (3, 3) of pairs of matrices (n, 3, k), which are symmetric, to the places `to` (n,)."""
+    for v in range(to.size):
+        for i in range(3):
+            for j in range(i + 1):
+                total = 0.0
+                for d in range(left.shape[2]):
+                    total += left[v, i, d] * right[v, j, d]
+                result[to[v], i, j] = result[to[v], j, i] = total
 
 
 def own_offsets(surface: Surface, deviation: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -107,26 +107,44 @@ def render_texture(
     height, width = distance.shape
     texture = np.zeros((height + 2, width + 2, 8), np.float32)
     texture[..., 6] = uniform
-    rows = max(1, _BLOCK // max(width, 1))
-    for top in range(0, height, rows):
-        block = slice(top, top + rows)
-        _render_rows(model, distance[block], amplitude[block], top, texture)
+    write_texture(model, distance, amplitude, (0, 0), texture)
     return texture
+
+
+def write_texture(
+    model: DepthNoise,
+    distance: NDArray[np.float32],
+    amplitude: NDArray[np.float32],
+    corner: tuple[int, int],
+    texture: NDArray[np.float32],
+) -> None:
+    """Writes the texels of the pixels with returns in a part of an image, see `render_texture`.
+
+    Args:
+        model: the noise model.
+        distance, amplitude: of the part.
+        corner: row and column of its first pixel in the image.
+        texture: of the whole image, with its border.
+    """
+    rows = max(1, _BLOCK // max(distance.shape[1], 1))
+    for top in range(0, len(distance), rows):
+        block = slice(top, top + rows)
+        _render_rows(model, distance[block], amplitude[block], (corner[0] + top, corner[1]), texture)
 
 
 def _render_rows(
     model: DepthNoise,
     distance: NDArray[np.float32],
     amplitude: NDArray[np.float32],
-    top: int,
+    corner: tuple[int, int],
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes the texels of some rows of an image, of which the first is row `top`."""
+    """Writes the texels of so few pixels that what lies between the steps stays in the processor's memory."""
     pixels, returns = np.empty((2, distance.size), np.int64), np.empty((2, distance.size))
     n = _returns(
         np.ascontiguousarray(distance, np.float32),
         np.ascontiguousarray(amplitude, np.float32),
-        top,
+        *corner,
         model.uses_amplitude,
         pixels,
         returns,
@@ -143,6 +161,7 @@ def _returns(
     distance: NDArray[np.float32],
     amplitude: NDArray[np.float32],
     top: int,
+    left: int,
     uses_amplitude: bool,
     pixels: NDArray[np.int64],
     returns: NDArray[np.float64],
@@ -156,7 +175,7 @@ def _returns(
         for column in range(distance.shape[1]):
             x, a = distance[row, column], amplitude[row, column]
             if x > 0 and np.isfinite(x) and (np.isfinite(a) or not uses_amplitude):
-                pixels[0, n], pixels[1, n] = top + row, column
+                pixels[0, n], pixels[1, n] = top + row, left + column
                 returns[0, n], returns[1, n] = x, a
                 n += 1
     return n

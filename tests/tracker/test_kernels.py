@@ -216,15 +216,15 @@ def test_what_one_measurement_costs(distance, expected):
 @given(seeds)
 def test_pixels_that_say_nothing_of_distances_become_constants(seed):
     generator = np.random.default_rng(seed)
-    height, width = generator.integers(1, 8, 2)
-    texture = generator.normal(size=(height + 2, width + 2, 8)).astype(np.float32)
+    height, width, top, left = (*generator.integers(1, 8, 2), *generator.integers(0, 3, 2))
+    texture = generator.normal(size=(top + height + 3, left + width + 4, 8)).astype(np.float32)
     silent = generator.uniform(size=(height, width)) < 0.3
     free_m = (generator.uniform(0, 0.5, (height, width)) * (generator.uniform(size=(height, width)) < 0.3)).astype("f4")
     expected = texture.copy()
-    inner = expected[1:-1, 1:-1]
+    inner = expected[1 + top : 1 + top + height, 1 + left : 1 + left + width]
     inner[silent] = np.eye(8)[6] * -2.5
     inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
-    _write_constants(silent, free_m, -2.5, 7.0, texture)
+    _write_constants(silent, free_m, -2.5, 7.0, top, left, texture)
     np.testing.assert_allclose(texture, expected, rtol=1e-5)
 
 

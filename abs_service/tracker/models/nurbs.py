@@ -158,28 +158,23 @@ def _moves(
         offset: o of eq. 7 (n,).
         result: derivatives (n, 3, 3 · q) by the control points of each vertex's span.
     """
-    u, w, normal, a, b = np.empty((5, 3))
     for s in range(span_control.shape[0]):
         for v in range(span_start[s], span_start[s + 1]):
-            u[:] = 0
-            w[:] = 0
+            ux, uy, uz, wx, wy, wz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for q in range(span_control.shape[1]):
-                for i in range(3):
-                    u[i] += basis[1, q, v] * control[span_control[s, q], i]
-                    w[i] += basis[2, q, v] * control[span_control[s, q], i]
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                normal[i] = u[j] * w[k] - u[k] * w[j]
-            inverse = 1 / np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2 + 1e-20)
-            normal *= inverse
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                a[i] = (w[j] * normal[k] - w[k] * normal[j]) * inverse
-                b[i] = (normal[j] * u[k] - normal[k] * u[j]) * inverse
+                point, by_u, by_w = control[span_control[s, q]], basis[1, q, v], basis[2, q, v]
+                ux, uy, uz = ux + by_u * point[0], uy + by_u * point[1], uz + by_u * point[2]
+                wx, wy, wz = wx + by_w * point[0], wy + by_w * point[1], wz + by_w * point[2]
+            nx, ny, nz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+            inverse = 1 / np.sqrt(nx * nx + ny * ny + nz * nz + 1e-20)
+            nx, ny, nz = nx * inverse, ny * inverse, nz * inverse
+            back = -offset[v] * inverse
+            ax, ay, az = back * (wy * nz - wz * ny), back * (wz * nx - wx * nz), back * (wx * ny - wy * nx)
+            bx, by, bz = back * (ny * uz - nz * uy), back * (nz * ux - nx * uz), back * (nx * uy - ny * ux)
+            x_row, y_row, z_row = result[v, 0], result[v, 1], result[v, 2]
             for q in range(span_control.shape[1]):
-                first = 3 * q
-                for i in range(3):
-                    turn = -offset[v] * (basis[1, q, v] * a[i] + basis[2, q, v] * b[i])
-                    for j in range(3):
-                        result[v, i, first + j] = turn * normal[j]
-                    result[v, i, first + i] += basis[0, q, v]
+                here, by_u, by_w, d = basis[0, q, v], basis[1, q, v], basis[2, q, v], 3 * q
+                x, y, z = by_u * ax + by_w * bx, by_u * ay + by_w * by, by_u * az + by_w * bz
+                x_row[d], x_row[d + 1], x_row[d + 2] = x * nx + here, x * ny, x * nz
+                y_row[d], y_row[d + 1], y_row[d + 2] = y * nx, y * ny + here, y * nz
+                z_row[d], z_row[d + 1], z_row[d + 2] = z * nx, z * ny, z * nz + here

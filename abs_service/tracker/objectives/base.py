@@ -16,8 +16,14 @@ from abs_service.tracker.terms.linearization import Linear
 class Objective(Protocol):
     """A cost over deformed meshes, given one observation."""
 
-    def observe(self, observation: Observation, predicted: Surface) -> None:
-        """Takes the measurements that the following costs refer to, and the predicted mesh, a population of one."""
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
+        """Takes the measurements that the following costs refer to.
+
+        Args:
+            observation: the measurements.
+            predicted: the predicted mesh, a population of one.
+            reach_m: the costs of meshes that are farther from it may say no more than that they are wrong [m].
+        """
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -46,12 +52,12 @@ class TermSum:
         self._terms = terms
         self._active: list[Term] = []
 
-    def observe(self, observation: Observation, predicted: Surface) -> None:
+    def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
         """Hands every sensor's image to its term."""
         self._synthesizer.observe(observation)
         self._active = [term for term in self._terms if term.sensor in observation.images]
         for term in self._active:
-            term.observe(observation.images[term.sensor], predicted)
+            term.observe(observation.images[term.sensor], predicted, reach_m)
         occluders = np.concatenate([np.zeros((0, 3)), *(term.foreground() for term in self._active)])
         for term in self._active:
             term.hide(occluders)

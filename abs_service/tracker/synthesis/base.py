@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.window import Window
 from calib.camera import Camera
 
 
@@ -100,6 +101,16 @@ class Synthesizer(Protocol):
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """The mesh with attributes of the canvas (vertices, channels) through one sensor's camera."""
+        ...
+
+    def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
+        """The part of a sensor's image that a surface can be in, the same in that of its view's camera.
+
+        Args:
+            sensor: its name.
+            predicted: where the surface is expected, a population of one.
+            reach_m: how far it may be from there [m].
+        """
         ...
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:

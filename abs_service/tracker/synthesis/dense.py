@@ -14,6 +14,7 @@ from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.texturing import lattice, paint
+from abs_service.tracker.synthesis.window import Window, around
 from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
 from calib.camera import Camera
 from calib.rig import Rig
@@ -59,6 +60,7 @@ class Dense:
     def __init__(self, rig: Rig, mesh: Mesh, step: int, detail: int):
         self.canvas = lattice(mesh, detail)
         self._rig = rig
+        self._projections = {name: Projection(one.camera) for name, one in rig.sensors.items()}
         self._mesh = mesh
         self._step = step
         self._detail = detail
@@ -70,6 +72,10 @@ class Dense:
         """The mesh with attributes of the lattice (k, channels) through one sensor's camera."""
         camera = self._rig.sensors[sensor].camera
         return DenseView(camera, self._mesh.faces, attributes, self._step, self._detail)
+
+    def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
+        """What is around the surface."""
+        return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texture itself."""

@@ -9,9 +9,11 @@ from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sampling import sampler
 from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
+from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
 from calib.rig import Rig
 
@@ -39,6 +41,7 @@ class Sparse:
         self._step_m = half_pixel(rig, mesh)
         self.canvas = surroundings(mesh, self._step_m)
         self._rig = rig
+        self._projections = {name: Projection(one.camera) for name, one in rig.sensors.items()}
         self._mesh = mesh
 
     def observe(self, observation: Observation) -> None:
@@ -55,6 +58,10 @@ class Sparse:
         return SparseView(
             camera, self._mesh.faces, attributes[:n], Relief(camera, self._mesh, attributes[n:], self._step_m)
         )
+
+    def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
+        """What is around the surface."""
+        return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """The texture itself."""

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from abs_service.observation import Observation
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.synthesis.sparse import SparseView
+from abs_service.tracker.synthesis.window import WHOLE, Window
 from calib.camera import Camera
 from calib.rig import Rig
 from calib.warp.pinhole import pinhole_of, resampling
@@ -41,6 +43,10 @@ class Undistorted:
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """The vertices with attributes (n, channels) through one sensor's camera without its distortion."""
         return SparseView(self._pinholes[sensor], self.canvas.faces, attributes)
+
+    def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
+        """All: the images are resampled as a whole."""
+        return WHOLE
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """A rendered noise model (height + 2, width + 2, 8), resampled; its distances stay, since the centre does."""

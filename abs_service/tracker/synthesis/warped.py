@@ -11,6 +11,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
+from abs_service.tracker.synthesis.window import WHOLE, Window
 from calib.camera import Camera
 from calib.noise.base import DepthNoise, without_offset
 from calib.rig import Rig
@@ -80,6 +81,10 @@ class Warped:
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
         """The vertices with attributes (n, channels) through the common camera."""
         return _SharedView(self._projection, attributes)
+
+    def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
+        """All: the images are resampled as a whole."""
+        return WHOLE
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
         """A rendered noise model (height + 2, width + 2, 8) in the common view.

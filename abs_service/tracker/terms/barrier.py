@@ -29,7 +29,7 @@ class BarrierTerm:
         self._costs = np.zeros(2)  # for a mesh that leaves the beam free, and one that crosses it
         self._interrupted = False
 
-    def observe(self, image: Image, predicted: Surface) -> None:
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Takes a reading."""
         if not isinstance(image, BeamReading):
             raise TypeError(f"sensor {self.sensor} has noise of a light barrier but delivered {type(image).__name__}")

@@ -105,8 +105,14 @@ class Term(Protocol):
 
     sensor: str
 
-    def observe(self, image: Image, predicted: Surface) -> None:
-        """Takes the image that the following costs refer to, and the predicted mesh, a population of one."""
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+        """Takes the image that the following costs refer to.
+
+        Args:
+            image: what the sensor measured.
+            predicted: the predicted mesh, a population of one.
+            reach_m: the costs of meshes that are farther from it may say no more than that they are wrong [m].
+        """
         ...
 
     def foreground(self) -> NDArray[np.float64]:

@@ -62,7 +62,7 @@ class ChannelTerm:
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
 
-    def observe(self, image: Image, predicted: Surface) -> None:
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Takes an image; NaN, which the border is as well, stands for no measurement."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, placed
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
@@ -16,7 +17,7 @@ from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.camera import Camera
 from calib.jit import kernel, prange
-from calib.noise.base import WINDOW_M, DepthNoise, render_texture
+from calib.noise.base import WINDOW_M, DepthNoise, write_texture
 
 #: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
 #: errs by a Laplace distribution of this scale.
@@ -48,35 +49,53 @@ class DepthTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
+        # Unbounded and without a measurement, so that the search gains nothing where nobody has looked.
+        beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
+        self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
         self._texture = np.zeros((0, 8), np.float32)
         self._obscured = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
+        self._window = WHOLE
         self._foreground = np.zeros((0, 0), np.float32)
 
-    def observe(self, image: Image, predicted: Surface) -> None:
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Renders the noise model over a depth image; what is hidden is left out of this frame."""
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
-        texture = render_texture(self._noise, image.distance, image.amplitude, self._bounds.uniform)
-        texture = self._synthesizer.texture(self.sensor, texture)
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        texture = self._synthesizer.texture(self.sensor, self._render(image, window))
+        texels = texture[1:-1, 1:-1][window]
         self._view.look(predicted)
-        distance = np.where(texture[1:-1, 1:-1, 3] > 0, texture[1:-1, 1:-1, 0], np.float32(np.nan))
-        seen = classify(distance, self._view.render(predicted), self._view.camera.fx)
-        self._foreground = np.where(seen.foreground, distance, np.nan)
-        doubtful = self._outline.observe(distance, seen, predicted)
-        self._obscured = np.pad(seen.foreground | seen.hole, 1).ravel()
-        self._doubtful = np.pad(doubtful, 1).ravel()
-        self._free_m = np.pad(np.where(doubtful, np.float32(0), seen.free_m), 1)
+        distance = np.where(texels[..., 3] > 0, texels[..., 0], np.float32(np.nan))
+        seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
+        doubtful = self._outline.observe(distance, seen, predicted, window)
+        self._window, self._foreground = window, np.where(seen.foreground, distance, np.nan)
+        height, width = texture.shape[0] - 2, texture.shape[1] - 2
+        self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
+        self._doubtful = placed(window, doubtful, height, width).ravel()
+        self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)
         self._silence(texture, seen, doubtful)
         self._texture = texture.reshape(-1, 8)
+
+    def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+        """The noise model over a window of an image (height + 2, width + 2, 8)."""
+        texture = self._image.begin(image.distance.shape, window)
+        corner = window[0].start or 0, window[1].start or 0
+        write_texture(self._noise, image.distance[window], image.amplitude[window], corner, texture)
+        return texture
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of what stands before the object."""
         rows, columns = np.nonzero(np.isfinite(self._foreground))
-        camera = self._view.camera
-        sight = camera.directions(np.stack([columns, rows], axis=-1))
+        camera, (top, left) = self._view.camera, self._corner
+        sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
         return pose.transform(camera.T_rs, sight * self._foreground[rows, columns, None])
+
+    @property
+    def _corner(self) -> tuple[int, int]:
+        """Row and column of the window's first pixel."""
+        return self._window[0].start or 0, self._window[1].start or 0
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Nothing more: a depth sensor sees for itself what stands before the object."""
@@ -89,10 +108,10 @@ class DepthTerm:
         costs an outlier, and more the farther it is from the object.
         """
         silent = seen.foreground | seen.hole | doubtful
-        agreeing = float(np.median(texture[1:-1, 1:-1, 6][seen.object])) + 0.5 if seen.object.any() else 0.0
-        _write_constants(
-            silent, self._free_m[1:-1, 1:-1], agreeing, self._bounds.outlier - self._bounds.inlier, texture
-        )
+        normalizer = texture[1:-1, 1:-1, 6][self._window]
+        agreeing = float(np.median(normalizer[seen.object])) + 0.5 if seen.object.any() else 0.0
+        free_m, outlier = self._free_m[1:-1, 1:-1][self._window], self._bounds.outlier - self._bounds.inlier
+        _write_constants(silent, free_m, agreeing, outlier, *self._corner, texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) with what the outline says."""
@@ -128,6 +147,8 @@ class DepthTerm:
         pixel = self._view.synthesize(surface).pixel[0]
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
+        if not out.any():
+            return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), samples)
         vertices = self._view.spread(surface, surface.vertices[0].T)[out]
         distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
@@ -149,11 +170,10 @@ class DepthTerm:
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
         seen = self._view.synthesize(surface)
-        texels = self._texture[seen.pixel[0]].astype(np.float64)
-        t = texels[:, 0] - seen.distance[0]
-        inside = np.clip(t, -WINDOW_M, WINDOW_M)
-        inverse = texels[:, 3] + inside * (texels[:, 4] + inside * texels[:, 5])
-        return (t - texels[:, 1] - texels[:, 2] * inside) * inverse, inverse, (seen.pixel[0] > 0) & (texels[:, 3] > 0)
+        residual, inverse = np.empty((2, seen.pixel.shape[1]))
+        measured = np.empty(residual.size, np.bool_)
+        _normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, measured)
+        return residual, inverse, measured
 
 
 @kernel
@@ -162,6 +182,8 @@ def _write_constants(
     free_m: NDArray[np.float32],
     agreeing: float,
     outlier: float,
+    top: int,
+    left: int,
     texture: NDArray[np.float32],
 ) -> None:
     """Texels that cost `agreeing` where a pixel is silent, and outlier + d / s where it is d > 0 into free space."""
@@ -170,9 +192,28 @@ def _write_constants(
         for column in range(silent.shape[1]):
             free = free_m[row, column]
             if free > 0 or silent[row, column]:
-                texel = texture[row + 1, column + 1]
+                texel = texture[top + row + 1, left + column + 1]
                 texel[:] = 0
                 texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)
+
+
+@kernel
+def _normalize(
+    pixel: NDArray[np.int32],
+    distance: NDArray[np.float32],
+    texture: NDArray[np.float32],
+    residual: NDArray[np.float64],
+    inverse: NDArray[np.float64],
+    measured: NDArray[np.bool_],
+) -> None:
+    """Residuals of samples (n,) in their deviations, these deviations' inverses, and whether anything was measured."""
+    for v in range(pixel.size):
+        texel = texture[max(pixel[v], 0)]
+        t = np.float64(texel[0]) - distance[v]
+        inside = min(max(t, -WINDOW_M), WINDOW_M)
+        inverse[v] = texel[3] + inside * (texel[4] + inside * texel[5])
+        residual[v] = (t - texel[1] - texel[2] * inside) * inverse[v]
+        measured[v] = pixel[v] > 0 and texel[3] > 0
 
 
 @kernel

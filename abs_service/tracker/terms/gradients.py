@@ -31,10 +31,9 @@ def depth_rows(
         vertices, normals: positions [m] and unit normals (n, 3).
         center: camera centre c_s (3,) [m].
     """
-    sight = np.asarray(vertices, np.float64) - center
-    sight /= np.linalg.norm(sight, axis=1, keepdims=True)
-    cosine = np.einsum("ni,ni->n", normals, sight)
-    return -normals / np.minimum(cosine, -LEAST_COSINE)[:, None]
+    rows = np.empty((len(vertices), 3))
+    _depth_rows(np.asarray(vertices, np.float64), np.asarray(normals, np.float64), center, rows)
+    return rows
 
 
 def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -102,6 +101,19 @@ def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDA
     column = np.clip(pixels[:, :1] + steps, 0, shape[1] - 1)
     row = np.clip(pixels[:, 1:] + steps, 0, shape[0] - 1)
     return column[:, None, :], row[:, :, None]
+
+
+@kernel
+def _depth_rows(
+    vertices: NDArray[np.float64], normals: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64]
+) -> None:
+    """Normals (n, 3) over the cosines of the angles at which vertices (n, 3) are seen from a centre (3,)."""
+    for v in range(vertices.shape[0]):
+        x, y, z = vertices[v, 0] - center[0], vertices[v, 1] - center[1], vertices[v, 2] - center[2]
+        along = normals[v, 0] * x + normals[v, 1] * y + normals[v, 2] * z
+        cosine = min(along / np.sqrt(x * x + y * y + z * z), -LEAST_COSINE)
+        for i in range(3):
+            rows[v, i] = -normals[v, i] / cosine
 
 
 @kernel

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.window import WHOLE, Window
 from abs_service.tracker.terms.linearization import Linearization, PointLinearization
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
@@ -32,8 +33,17 @@ MOST_BEYOND = 2.0
 class Outline(Protocol):
     """What the outline says, for one camera."""
 
-    def observe(self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface) -> NDArray[np.bool_]:
-        """Takes what a depth image (height, width) [m] shows; the pixels beside the object that say nothing else."""
+    def observe(
+        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+    ) -> NDArray[np.bool_]:
+        """Takes what a window of a depth image shows; the pixels beside the object that say nothing else.
+
+        Args:
+            distance: measured distances (rows, columns) [m] in the window.
+            seen: what they show.
+            predicted: where the object is expected, a population of one.
+            window: of the image.
+        """
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64] | float:
@@ -48,7 +58,9 @@ class Outline(Protocol):
 class Unknown:
     """The outline of something that does not end at its mesh's rim: it says nothing."""
 
-    def observe(self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface) -> NDArray[np.bool_]:
+    def observe(
+        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+    ) -> NDArray[np.bool_]:
         """Nothing."""
         return np.zeros(distance.shape, np.bool_)
 
@@ -105,12 +117,16 @@ class RimOutline:
         self._rim = rim
         self._deviation = deviation
         self._inwards = np.zeros((0, 0), np.float32)
+        self._corner = np.zeros(2, np.int64)
         self._beyond = np.zeros(len(rim.outer))
         self._begun = False
 
-    def observe(self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface) -> NDArray[np.bool_]:
-        """Takes what a depth image (height, width) [m] shows; the pixels beside the object that say nothing else."""
+    def observe(
+        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+    ) -> NDArray[np.bool_]:
+        """Takes what a window of a depth image shows; the pixels beside the object that say nothing else."""
         self._inwards = inwards(distance, seen)
+        self._corner = np.array([window[1].start or 0, window[0].start or 0])
         if not self._begun:
             self._beyond, self._begun = self._measure(predicted), True
         return (seen.free_m > 0) & (self._inwards > -GRACE * self._deviation)
@@ -147,7 +163,7 @@ class RimOutline:
 
     def _look_up(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Distances inwards (population, k) [px] of points (population, k, 3), and slopes (population, k, 2)."""
-        places = self._camera.project(points)
+        places = self._camera.project(points) - self._corner
         values, slopes = np.empty(places.shape[:2]), np.empty(places.shape)
         look_up(self._inwards, places.reshape(-1, 2), values.reshape(-1), slopes.reshape(-1, 2))
         return values, slopes
