@@ -49,6 +49,17 @@ def test_usage_of_this_process():
     assert 30e6 < after.private_bytes - before.private_bytes <= after.resident_bytes
 
 
+def test_usage_of_the_machine():
+    before, own = proc.machine(), proc.usage(os.getpid())
+    begin_s = time.monotonic()
+    while time.monotonic() - begin_s < 0.3:
+        pass
+    after, elapsed_s = proc.machine(), time.monotonic() - begin_s
+    cpu_s = proc.usage(os.getpid()).cpu_s - own.cpu_s
+    assert cpu_s - 0.05 <= after.busy_s - before.busy_s <= (elapsed_s + 0.05) * (os.cpu_count() or 1)
+    assert 0 <= after.stolen_s - before.stolen_s <= (elapsed_s + 0.05) * (os.cpu_count() or 1)
+
+
 def test_usage_of_nobody():
     with pytest.raises(OSError, match="No such"):
         proc.usage(2**22 + 1)
@@ -134,6 +145,9 @@ def test_a_short_run_loses_nothing_unseen_and_says_what_each_process_used():
     processes = {row[0]: row[1:] for section in found.sections for row in rows(section, "Processes")}
     assert processes.keys() == {"run", "capture", "track", "record"}
     assert all(0 < share < 200 and 50 < held < 2000 for share, held, *_ in processes.values())
+    machine = {row[0]: row[1:] for section in found.sections for row in rows(section, "All processors of the machine")}
+    assert machine["the service"][0] == pytest.approx(sum(share for share, *_ in processes.values()), rel=0.1)
+    assert all(most >= average for average, most in machine.values())
     ages = {row[0]: row[1:] for row in rows(found.sections[0], "Age of the estimates")}
     assert np.all(np.diff(ages["publication"]) >= 0)
     assert ages["arrival at the subscriber"][0] > ages["publication"][0]

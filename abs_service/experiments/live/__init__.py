@@ -3,6 +3,7 @@
 Nothing of it is looked into: a subscriber on the bus, the operating system's numbers and the finished recording.
 """
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -89,7 +90,13 @@ def findings(settings: Settings, helps_s: Sequence[float], starts: Sequence[Star
         Section("Ages", (tables.ages(ages_ms), _drawn_ages(seen, arrived_ms, wanted_ms))),
         Section("Frames", (tables.frames(seen), tables.losses(whole - before, whole))),
         Section(
-            "Processes", (tables.processes(seen, growth, settings.warm_up_s), _drawn_cpu(seen), _drawn_memory(seen))
+            "Processes",
+            (
+                tables.processes(seen, growth, settings.warm_up_s),
+                tables.machine(seen),
+                _drawn_cpu(seen),
+                _drawn_memory(seen),
+            ),
         ),
         Section("Start", (tables.starts(starts, helps_s),)),
     )
@@ -149,4 +156,5 @@ def _values(seen: Watched, counted: Mapping[str, int], from_start: Mapping[str, 
         "share_tracking": float(np.mean([one.is_tracking for one in seen.arrivals])),
         "recorded_bytes": seen.recorded_bytes,
         "exit_code": seen.exit_code,
+        "processors": os.cpu_count(),
     }

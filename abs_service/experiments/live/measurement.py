@@ -46,6 +46,7 @@ class Watched:
         counted: what it counted until that time was over.
         times_s: moments of the usages (n,), from `begin_ns` [s].
         usages: what each process had used at those moments, by command.
+        machine: what all processors had done at those moments.
         recorded: numbers of the messages that the recording holds, by topic.
         recorded_bytes: size of the recording.
         exit_code: of the service.
@@ -59,6 +60,7 @@ class Watched:
     counted: Mapping[str, Mapping[str, int]]
     times_s: NDArray[np.float64]
     usages: Mapping[str, tuple[proc.Usage, ...]]
+    machine: tuple[proc.Machine, ...]
     recorded: Mapping[str, frozenset[int]]
     recorded_bytes: int
     exit_code: int
@@ -98,7 +100,7 @@ def watched(seed: int, settle_s: float, duration_s: float, sample_s: float, prog
         start = _await_tracking(service, listener)
         time.sleep(settle_s)
         begin_ns = time.monotonic_ns()
-        times_s, usages = _sample(service, duration_s, sample_s, progress)
+        times_s, usages, machine = _sample(service, duration_s, sample_s, progress)
         end_ns = time.monotonic_ns()
         time.sleep(1.5)  # until every component has said once more how it is
         exit_code = service.stop()
@@ -109,25 +111,27 @@ def watched(seed: int, settle_s: float, duration_s: float, sample_s: float, prog
         progress("reading the recording")
         recorded = recording.numbers(takes, [*(keys.image(*stream) for stream in STREAMS), keys.state(TRACKER)])
         size = sum(path.stat().st_size for path in takes.iterdir())
-    return Watched(start, arrivals, begin_ns, end_ns, before, all_, times_s, usages, recorded, size, exit_code)
+    return Watched(start, arrivals, begin_ns, end_ns, before, all_, times_s, usages, machine, recorded, size, exit_code)
 
 
 def _sample(
     service: Service, duration_s: float, sample_s: float, progress: Callable[[str], None]
-) -> tuple[NDArray[np.float64], Mapping[str, tuple[proc.Usage, ...]]]:
-    """Looks at the processes every `sample_s` from now on; moments (n,) from now [s], and usages by command."""
+) -> tuple[NDArray[np.float64], Mapping[str, tuple[proc.Usage, ...]], tuple[proc.Machine, ...]]:
+    """Looks at everything every `sample_s` from now on: moments (n,) from now [s], usages by command, the machine."""
     processes = service.processes()
     begin_s = time.monotonic()
     times_s: list[float] = []
     rows: list[dict[str, proc.Usage]] = []
+    machine: list[proc.Machine] = []
     while not times_s or times_s[-1] < duration_s:
         service.check()
         time.sleep(max(0.0, begin_s + len(times_s) * sample_s - time.monotonic()))
         times_s.append(time.monotonic() - begin_s)
         rows.append({name: proc.usage(pid) for name, pid in processes.items()})
+        machine.append(proc.machine())
         if len(times_s) % max(1, round(10 / sample_s)) == 0:
             progress(f"watched for {times_s[-1]:.0f} s of {duration_s:.0f} s")
-    return np.array(times_s), {name: tuple(row[name] for row in rows) for name in processes}
+    return np.array(times_s), {name: tuple(row[name] for row in rows) for name in processes}, tuple(machine)
 
 
 def _await_tracking(service: Service, listener: Listener) -> Start:

@@ -38,6 +38,27 @@ def usage(pid: int) -> Usage:
     return Usage(ticks * _TICK_S, resident * _PAGE_BYTES, (resident - shared) * _PAGE_BYTES)
 
 
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What all processors of the machine have done together since it began.
+
+    Attributes:
+        busy_s: time in which they computed, for whomever [s].
+        stolen_s: time in which they had something to compute, but the host that the machine is a guest of gave them to
+            others [s].
+    """
+
+    busy_s: float
+    stolen_s: float
+
+
+def machine() -> Machine:
+    """What the machine's processors have done so far."""
+    fields = Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()
+    user, nice, system, _, _, hard, soft, stolen = (int(field) * _TICK_S for field in fields[1:9])
+    return Machine(user + nice + system + hard + soft, stolen)
+
+
 def children(pid: int) -> Mapping[str, int]:
     """Process numbers of the commands of `abs-service` that a process has started, by command."""
     listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()

@@ -73,6 +73,26 @@ def processes(seen: Watched, growth: Mapping[str, Trend], growth_from_s: float) 
     return Table("Processes", columns, tuple(rows))
 
 
+def machine(seen: Watched) -> Table:
+    """What the machine's processors did meanwhile, on average and in the worst interval between two looks."""
+    took_s = np.diff(seen.times_s)
+    busy, stolen = (
+        100 * np.diff([getattr(one, name) for one in seen.machine]) / took_s for name in ("busy_s", "stolen_s")
+    )
+    own_s = np.sum([[one.cpu_s for one in usages] for usages in seen.usages.values()], axis=0)
+    own = 100 * np.diff(own_s) / took_s
+    rows = tuple(
+        (name, float(np.average(one, weights=took_s)), float(one.max()))
+        for name, one in {
+            "the service": own,
+            "all else, who watches included": busy - own,
+            "taken by the host (steal)": stolen,
+        }.items()
+    )
+    columns = Column("for"), Column("average", "% of a core", ".1f"), Column("most", "% of a core", ".1f")
+    return Table("All processors of the machine", columns, rows)
+
+
 def starts(starts: Sequence[Start], helps_s: Sequence[float]) -> Table:
     """How long everything took until there was something to see."""
     numbers_s = {
