@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.perspective import project_with_slopes
+from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window
-from abs_service.tracker.terms.linearization import Linearization, PointLinearization
+from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
 from calib.jit import kernel
@@ -114,11 +116,12 @@ class RimOutline:
 
     def __init__(self, camera: Camera, rim: Rim, deviation: float):
         self._camera = camera
+        self._projection = Projection(camera)
         self._rim = rim
         self._deviation = deviation
         self._inwards = np.zeros((0, 0), np.float32)
-        self._corner = np.zeros(2, np.int64)
-        self._beyond = np.zeros(len(rim.outer))
+        self._corner = np.zeros(2, np.float32)
+        self._beyond = np.zeros(len(rim.outer), np.float32)
         self._begun = False
 
     def observe(
@@ -126,7 +129,7 @@ class RimOutline:
     ) -> NDArray[np.bool_]:
         """Takes what a window of a depth image shows; the pixels beside the object that say nothing else."""
         self._inwards = inwards(distance, seen)
-        self._corner = np.array([window[1].start or 0, window[0].start or 0])
+        self._corner = np.array([window[1].start or 0, window[0].start or 0], np.float32)
         if not self._begun:
             self._beyond, self._begun = self._measure(predicted), True
         return (seen.free_m > 0) & (self._inwards > -GRACE * self._deviation)
@@ -140,30 +143,34 @@ class RimOutline:
         """Residuals of what is near the outline, and their derivatives."""
         points = self._points(surface)
         residual, slopes = (values[0] / self._deviation for values in self._look_up(points))
-        use = np.abs(residual) < FARTHEST
-        rows = np.einsum("vi,vij->vj", slopes[use], self._camera.projection_jacobian(points[0, use]))
-        beyond = self._beyond[use, None]
-        ends = ((1 + beyond) * rows, self._rim.outer), (-beyond * rows, self._rim.inner)
-        parts = [PointLinearization(residual[use], slope, of[use], moves).jacobian for slope, of in ends]
-        return Linearization(residual[use], parts[0] + parts[1])
+        use = np.flatnonzero(np.abs(residual) < FARTHEST)
+        places = points[0].T[use].astype(np.float64)
+        rows = np.einsum("vi,vij->vj", slopes[use], project_with_slopes(self._camera, places)[1])
+        ends = self._rim.outer[use], self._rim.inner[use], self._beyond[use]
+        jacobian = np.zeros((len(use), moves.dimension))
+        _chain(rows, *ends, moves.group, moves.parameters, moves.local, jacobian)
+        return Linearization(residual[use], jacobian)
 
-    def _points(self, surface: Surface) -> NDArray[np.float64]:
-        """Where the object ends (population, k, 3) [m]."""
-        outer, inner = (surface.vertices[:, :, i].transpose(0, 2, 1) for i in (self._rim.outer, self._rim.inner))
-        return outer + self._beyond[:, None] * (outer - inner)
+    def _points(self, surface: Surface) -> NDArray[np.float32]:
+        """Where the object ends (population, 3, k) [m]."""
+        outer, inner = surface.vertices[:, :, self._rim.outer], surface.vertices[:, :, self._rim.inner]
+        return np.asarray(outer + self._beyond * (outer - inner), np.float32)
 
-    def _measure(self, predicted: Surface) -> NDArray[np.float64]:
+    def _measure(self, predicted: Surface) -> NDArray[np.float32]:
         """How far (k,) the object goes on beyond the rim of the mesh, in distances from the next vertex."""
         outer, inner = (predicted.vertices[0].T[i].astype(np.float64) for i in (self._rim.outer, self._rim.inner))
         steps = self._camera.project(outer) - self._camera.project(inner)
-        away, slopes = (values[0] for values in self._look_up(outer[None]))
+        away, slopes = (values[0] for values in self._look_up(predicted.vertices[:, :, self._rim.outer]))
         per_step = -np.einsum("vi,vi->v", slopes, steps)
         known = per_step > 0
-        return np.where(known, np.clip(away / np.where(known, per_step, 1.0), 0.0, MOST_BEYOND), 0.0)
+        beyond = np.where(known, np.clip(away / np.where(known, per_step, 1.0), 0.0, MOST_BEYOND), 0.0)
+        return beyond.astype(np.float32)
 
-    def _look_up(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distances inwards (population, k) [px] of points (population, k, 3), and slopes (population, k, 2)."""
-        places = self._camera.project(points) - self._corner
+    def _look_up(self, points: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distances inwards (population, k) [px] of points (population, 3, k), and slopes (population, k, 2)."""
+        places, inverse_z = self._projection.project(np.ascontiguousarray(points))
+        places -= self._corner
+        places[np.isnan(inverse_z)] = np.nan
         values, slopes = np.empty(places.shape[:2]), np.empty(places.shape)
         look_up(self._inwards, places.reshape(-1, 2), values.reshape(-1), slopes.reshape(-1, 2))
         return values, slopes
@@ -187,9 +194,9 @@ def inwards(distance: NDArray[np.float32], seen: Visibility) -> NDArray[np.float
 
 @kernel
 def look_up(
-    image: NDArray[np.float32], places: NDArray[np.float64], values: NDArray[np.float64], slopes: NDArray[np.float64]
+    image: NDArray[np.float32], places: NDArray[np.floating], values: NDArray[np.float64], slopes: NDArray[np.float64]
 ) -> None:
-    """Values (n,) and slopes (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and beside NaN."""
+    """Values (n,) and slopes (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and at NaN."""
     height, width = image.shape
     for k in range(places.shape[0]):
         values[k], slopes[k, 0], slopes[k, 1] = 1e9, 0.0, 0.0
@@ -205,3 +212,31 @@ def look_up(
         values[k] = (1 - g) * ((1 - f) * a + f * b) + g * ((1 - f) * c + f * d)
         slopes[k, 0] = (1 - g) * (b - a) + g * (d - c)
         slopes[k, 1] = (1 - f) * (c - a) + f * (d - b)
+
+
+@kernel
+def _chain(
+    rows: NDArray[np.float64],
+    outer: NDArray[np.intp],
+    inner: NDArray[np.intp],
+    beyond: NDArray[np.float32],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+) -> None:
+    """How residuals change with the parameters (k, dim), from how they do with outer + beyond (outer − inner).
+
+    Args:
+        rows: derivatives (k, 3) by these points.
+        outer, inner, beyond: vertices and share (k,).
+        group, parameters, local: as in `Moves`.
+        jacobian: zeros before.
+    """
+    for k in range(rows.shape[0]):
+        for end in range(2):
+            v, share = (outer[k], 1.0 + beyond[k]) if end == 0 else (inner[k], 0.0 - beyond[k])
+            own = parameters[group[v]]
+            for d in range(own.size):
+                along = rows[k, 0] * local[v, 0, d] + rows[k, 1] * local[v, 1, d] + rows[k, 2] * local[v, 2, d]
+                jacobian[k, own[d]] += share * along
