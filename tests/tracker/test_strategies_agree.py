@@ -50,4 +50,4 @@ def test_costs_and_step_sizes_are_distributed_as_pycma_s(function):
     print(
         function, "medians", np.median(ours, axis=0).round(2), np.median(theirs, axis=0).round(2), "p", np.round(p, 3)
     )
-    assert min(p) > 0.01  # 24 comparisons in all; equal seeds keep the outcome
+    assert min(p) > 0.05 / 24  # at a level of 5 % for all 24 comparisons together; equal seeds keep the outcome

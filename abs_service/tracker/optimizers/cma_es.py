@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
-from abs_service.tracker.optimizers.generation import Constants, absorb, update
+from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
 
 
 @dataclass(frozen=True)
@@ -60,28 +60,25 @@ class CmaEs:
 
     Args:
         dimension: of Θ.
-        generator: source of all randomness.
+        generator: source of all randomness; its bits come 64 at a time, as those of NumPy's default do.
         least_step: the step size never starts a frame below this.
         population: candidates per generation.
         step: standard deviation of the first candidates.
     """
 
     def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
-        self._generator = generator
+        self._bits = generator.bit_generator
         self._steps = least_step, step
         self._constants = Constants(dimension, population)
         self._mean = np.zeros(dimension)
-        self._metric = np.eye(dimension)
         self._sigma = step
         self._paths = np.zeros((2, dimension))
         self._generation = 0
         self._gap = max(1, int(LEARNT / (self._constants.rates[2] + self._constants.rates[3])))
-        # Single precision takes half the time, and nobody needs to know a random number, or a step, better.
+        # Single precision takes half the time, and nobody needs to know a step better.
         self._z = np.zeros((population, dimension), np.float32)
-        self._moves = np.zeros((population, dimension), np.float32)
         self._factor = np.eye(dimension)
-        self._learnt = np.eye(dimension, dtype=np.float32)
-        self._aim()
+        self._learnt, self._axes = np.eye(dimension, dtype=np.float32), np.eye(dimension, dtype=np.float32)
 
     @property
     def deviation(self) -> float:
@@ -99,21 +96,22 @@ class CmaEs:
         In ξ every frame's cost is nearly round by itself. What long searches learn beyond that is how rough the cost of
         one frame is: where they have narrowed the covariance frame after frame, they cannot follow motion any more.
         """
-        self._mean, self._metric = origin.copy(), metric
+        self._mean = origin.copy()
         self._sigma = float(np.clip(self._sigma, *self._steps))
-        absorb(self._learnt, self._factor, self._paths[1])
+        absorb(self._learnt, self._factor, self._paths[1], self._axes)
         covariance = (1 - FORGOTTEN) * self._factor @ self._factor.T
         covariance.flat[:: len(covariance) + 1] += FORGOTTEN
         factor = np.asarray(np.linalg.cholesky(covariance), np.float64)
         self._paths[1] = np.linalg.solve(factor, self._factor @ self._paths[1])
         self._factor = factor
-        self._aim()
+        self._axes = np.matmul(factor.T, metric.T).astype(np.float32)
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
-        self._generator.standard_normal(dtype=np.float32, out=self._z)
-        np.matmul(self._z, self._axes, out=self._moves)
-        return self._sigma * self._moves + self._mean
+        bits = self._bits.random_raw((self._z.size + 1) // 2).view(np.uint32)
+        thetas = np.empty(self._z.shape)
+        propose(bits, normal_quantiles(), self._axes, self._sigma, self._mean, self._z, thetas)
+        return thetas
 
     def tell(self, costs: NDArray[np.float64]) -> None:
         """Updates mean, step size and covariance."""
@@ -121,7 +119,7 @@ class CmaEs:
         self._sigma = update(
             self._z,
             self._axes,
-            np.argsort(costs, kind="stable"),
+            costs,
             self._constants.weights,
             self._constants.rates,
             self._generation,
@@ -131,9 +129,4 @@ class CmaEs:
             self._learnt,
         )
         if self._generation % self._gap == 0:
-            absorb(self._learnt, self._factor, self._paths[1])
-            self._aim()
-
-    def _aim(self) -> None:
-        """Draws with the factor as it is, in the frame's metric, from now on."""
-        self._axes = np.matmul(self._factor.T, self._metric.T).astype(np.float32)
+            absorb(self._learnt, self._factor, self._paths[1], self._axes)

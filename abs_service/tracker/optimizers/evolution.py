@@ -148,7 +148,7 @@ def evolve(
         costs = problem.cost(thetas)
         strategy.tell(costs)
         budget.spend(len(thetas), generations=1)
-        best.append(float(costs.min()))
+        best.append(min(costs.tolist()))  # NumPy's own takes longer for so few
         steady = len(best) == PATIENCE and max(best) - min(best) < schedule.tolerance
         if steady and costs.max() - best[-1] < schedule.tolerance:
             stop = Stop.CONVERGED

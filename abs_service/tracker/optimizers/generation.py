@@ -1,4 +1,7 @@
-"""What a generation of CMA-ES teaches: rank-one and rank-μ updates with negative weights (Hansen's tutorial, 2016)."""
+"""How CMA-ES draws a generation, and what that teaches: rank-one and rank-μ updates (Hansen's tutorial, 2016)."""
+
+from functools import cache
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +29,63 @@ class Constants:
         self.rates = np.array([c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length])
 
 
+#: Quantiles of the normal distribution that random bits are looked up among: a power of two.
+_QUANTILES = 4096
+#: Where the outermost quantiles end; with that, the numbers deviate by 1 to four digits.
+_END = 4.0
+
+
+@cache
+def normal_quantiles() -> NDArray[np.float32]:
+    """What `propose` turns random bits into normal numbers with."""
+    inner = [NormalDist().inv_cdf(i / _QUANTILES) for i in range(1, _QUANTILES)]
+    return np.array([-_END, *inner, _END], np.float32)
+
+
+@kernel
+def propose(
+    bits: NDArray[np.uint32],
+    quantiles: NDArray[np.float32],
+    axes: NDArray[np.float32],
+    sigma: float,
+    mean: NDArray[np.float64],
+    z: NDArray[np.float32],
+    thetas: NDArray[np.float64],
+) -> None:
+    """Draws a population.
+
+    The library's normal numbers would take as long as all the rest of a generation. Between two quantiles, whose
+    probability is all that counts, the density is taken to be level; nobody needs to know a random number better.
+
+    Args:
+        bits: random (population · dim,), or more.
+        quantiles: see `normal_quantiles`.
+        axes, sigma, mean: as in `update`.
+        z: result, standard normal numbers (population, dim).
+        thetas: result (population, dim).
+    """
+    population, n = z.shape
+    step = np.zeros(n, np.float32)
+    for k in range(population):
+        z_k, own = z[k], bits[k * n :]
+        for i in range(np.uintp(n)):
+            place, between = np.uintp(own[i] >> np.uint32(20)), np.int32(own[i] & np.uint32(0xFFFFF))
+            low, high = quantiles[place], quantiles[place + np.uintp(1)]
+            z_k[i] = low + np.float32(between) * np.float32(2.0**-20) * (high - low)
+        step[:] = 0
+        for i in range(n):
+            length, axis = z_k[i], axes[i]
+            for j in range(n):
+                step[j] += length * axis[j]
+        for j in range(n):
+            thetas[k, j] = mean[j] + sigma * step[j]
+
+
 @kernel
 def update(
     z: NDArray[np.float32],
     axes: NDArray[np.float32],
-    order: NDArray[np.int64],
+    costs: NDArray[np.float64],
     weights: NDArray[np.float64],
     rates: NDArray[np.float64],
     generation: int,
@@ -44,7 +99,7 @@ def update(
     Args:
         z: standard normal numbers (population, dim).
         axes: what leads from them to Θ, a row for each (dim, dim).
-        order: indices of the candidates, the best first.
+        costs: of the candidates (population,).
         weights, rates: see `Constants`.
         generation: counts from one.
         sigma: step size.
@@ -57,6 +112,7 @@ def update(
     """
     c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length = rates
     population, n = z.shape
+    order = np.argsort(costs, kind="mergesort")
     p_sigma, p_c, z_mean = paths[0], paths[1], np.zeros(n)
     for rank in range(population // 2):
         w, z_k = weights[rank], z[order[rank]]
@@ -92,16 +148,19 @@ def update(
 
 
 @kernel
-def absorb(learnt: NDArray[np.float32], factor: NDArray[np.float64], path: NDArray[np.float64]) -> None:
+def absorb(
+    learnt: NDArray[np.float32], factor: NDArray[np.float64], path: NDArray[np.float64], axes: NDArray[np.float32]
+) -> None:
     """Changes to the coordinates in which what was learnt is the identity.
 
     Args:
         learnt: the covariance in the old coordinates (dim, dim), of which the lower half is read; then the identity.
         factor: lower Cholesky factor (dim, dim) of the covariance of ξ when the old coordinates were made, then now.
         path: (dim,) in these coordinates.
+        axes: what leads from them to Θ, a row for each (dim, dim).
     """
     n = path.size
-    root, row, sound = np.zeros((n, n)), np.empty(n), True
+    root, row, axis, sound = np.zeros((n, n)), np.empty(n), np.empty(n, np.float32), True
     for i in range(n):
         for j in range(i + 1):
             left, right, rest = root[i], root[j], np.float64(learnt[i, j])
@@ -119,6 +178,12 @@ def absorb(learnt: NDArray[np.float32], factor: NDArray[np.float64], path: NDArr
             for j in range(k + 1):
                 row[j] += factor[i, k] * root[k, j]
         factor[i] = row
+        axis[:] = 0
+        for k in range(i, n):
+            share = np.float32(root[k, i])
+            for j in range(n):
+                axis[j] += share * axes[k, j]
+        axes[i] = axis
         for j in range(i):
             path[i] -= root[i, j] * path[j]
         path[i] /= root[i, i]
