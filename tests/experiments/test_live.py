@@ -17,7 +17,7 @@ from abs_service.experiments import live
 from abs_service.experiments.base import Context
 from abs_service.experiments.live import listener, losses, proc, recording
 from abs_service.experiments.live.rig import write_rig
-from abs_service.experiments.live.trend import trend
+from abs_service.experiments.live.trend import least_within, trend
 from drivers.mcap_file import McapFile
 
 MINUTES = np.arange(600.0) / 60
@@ -28,6 +28,14 @@ def test_the_slope_of_what_grows_steadily(slope):
     found = trend(MINUTES, 300 + slope * MINUTES + 0.1 * np.random.default_rng(1).standard_normal(600))
     assert found.slope == pytest.approx(slope, abs=0.02)
     assert 0 < found.half_width < 0.02
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.5])
+def test_what_a_saw_tooth_stands_on_grows_as_fast_as_it_does(slope):
+    tooth = 20 * np.mod(MINUTES, 2.1)
+    found = trend(MINUTES, least_within(300 + slope * MINUTES + tooth, 150))
+    assert found.slope == pytest.approx(slope, abs=0.15)
+    assert (found.slope - found.half_width > 0.1) == (slope > 0)
 
 
 def test_one_step_is_no_steady_growth():

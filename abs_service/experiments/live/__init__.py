@@ -14,13 +14,16 @@ from numpy.typing import NDArray
 from abs_service.experiments.base import Context, Findings, Goal, at_most
 from abs_service.experiments.live import losses, measurement, pictures, tables
 from abs_service.experiments.live.measurement import Start, Watched
-from abs_service.experiments.live.trend import Trend, trend
+from abs_service.experiments.live.trend import Trend, least_within, trend
 from abs_service.report.content import Picture, Section, drawing
 
 TITLE = "End to end: losses, ages, processors, memory and start"
 
 #: What is wanted: age of half of the estimates and of 99 in 100 [ms], start and help [s], growth of memory [MB/min].
 P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.1
+
+#: The recorder holds the index of a file until the next one begins, at this rate after two minutes; with a margin [s].
+FILE_S = 150.0
 
 #: A shorter watch says nothing of growth that is to be told by the minute [s].
 LEAST_S = 120.0
@@ -43,7 +46,7 @@ class Settings:
     helps: int = 5
     settle_s: float = 5.0
     duration_s: float = 600.0
-    warm_up_s: float = 60.0
+    warm_up_s: float = FILE_S
     sample_s: float = 1.0
 
 
@@ -115,10 +118,11 @@ def _complete(seen: Watched, counted: Mapping[str, int]) -> tuple[Goal, ...]:
 
 
 def _growth(seen: Watched, process: str, from_s: float) -> Trend:
-    """How fast the resident memory of a process grows [MB/min]."""
+    """How fast what the resident memory of a process falls back to grows [MB/min]."""
     late = seen.times_s >= from_s
-    held = np.array([one.resident_bytes for one in seen.usages[process]]) * 1e-6
-    return trend(seen.times_s[late] / 60, held[late])
+    held = np.array([one.resident_bytes for one in seen.usages[process]])[late] * 1e-6
+    samples = round(FILE_S / float(np.mean(np.diff(seen.times_s))))
+    return trend(seen.times_s[late] / 60, least_within(held, samples))
 
 
 def _flat(process: str, growth: Trend) -> Goal:

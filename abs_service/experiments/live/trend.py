@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
 from scipy.stats import t
 
 #: Neighbouring measurements are averaged into this many before the line is fitted. Memory grows in steps and stays,
@@ -22,6 +23,11 @@ class Trend:
 
     slope: float
     half_width: float
+
+
+def least_within(values: NDArray[np.floating], samples: int) -> NDArray[np.floating]:
+    """The least of so many neighbouring values (n,): what a saw-tooth of that period, or less, stands on."""
+    return np.asarray(minimum_filter1d(values, min(samples, len(values)), mode="nearest"))
 
 
 def trend(times: NDArray[np.floating], values: NDArray[np.floating]) -> Trend:
