@@ -9,7 +9,7 @@ from abs_service.tracker.models.base import DeformationModel, Moves, Surface
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
-from abs_service.tracker.terms.linearization import Linearization, stack
+from abs_service.tracker.terms.linearization import Linearization
 
 
 class Posterior:
@@ -74,13 +74,13 @@ class Posterior:
         return self._linearized[0][2:]
 
     def answers(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
-        """JᵀJE (dim, k) at theta (dim,): the sensors' derivatives by Θ and by offsets of the vertices (n, 3, k) [m]."""
-        surface = self._model.deform(theta[None])
-        by_theta, by_offsets = (
-            stack(self._objective.linearize(surface, moves), moves.dimension).jacobian
-            for moves in (self._model.moves(theta), Moves.full(offsets))
-        )
-        return by_theta.T @ by_offsets
+        """JᵀJE (dim, n) at theta (dim,): the sensors' derivatives by Θ, and by steps of single vertices (n, 3) [m]."""
+        surface, each = self._model.deform(theta[None]), np.arange(len(offsets))
+        alone = Moves(np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each))
+        by_theta = self._objective.linearize(surface, self._model.moves(theta))
+        by_offset = self._objective.linearize(surface, alone)
+        pairs = zip(by_offset, by_theta)
+        return np.sum([one.transposed_times(other.jacobian, len(each)) for one, other in pairs], axis=0).T
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""

@@ -79,12 +79,11 @@ class Tracker:
         if not np.any(self.model.mesh.deviation):
             return self._own
         surface = self.model.deform(theta[None])
-        offsets = uncertainty.own_offsets(surface, self.model.mesh.deviation)
-        inverse = posterior_covariance(self._posterior.linearize(theta))
-        response = -inverse @ self._posterior.answers(theta, offsets)
-        jacobian = self.model.jacobian(theta)
         normals = surface.normals[0].T.astype(np.float64)
-        return np.einsum("ni,nij,nj->n", normals, uncertainty.remaining(offsets, jacobian, response), normals)
+        deviation = np.broadcast_to(self.model.mesh.deviation, len(normals))
+        inverse = posterior_covariance(self._posterior.linearize(theta))
+        response = -inverse @ self._posterior.answers(theta, normals * deviation[:, None])
+        return uncertainty.remaining(normals, deviation, self.model.jacobian(theta), response)
 
     def _estimate(self, observation: Observation, found: Outcome, budget: Budget) -> Estimate:
         surface = self.model.deform(found.theta[None])

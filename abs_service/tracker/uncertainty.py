@@ -13,7 +13,7 @@ with ε standard normal, and keeps that offset in all frames. The sensors see th
 moves Θ until the mesh lies on the surface as well as Θ can make it, and only the rest of the offsets remains. With the
 derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
 so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
-D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That takes a frame's time to tell, and is told
+D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That hardly changes with the frames, and is told
 once for a mesh, in the frame after the one that it was made from; its part along the normal goes with the vertices.
 """
 
@@ -72,21 +72,6 @@ def _multiply(
                 result[to[v], i, j] = result[to[v], j, i] = total
 
 
-def own_offsets(surface: Surface, deviation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """E (n, 3, k) [m]: how each of k independent standard normal errors of the mesh's making moves the vertices.
-
-    Args:
-        surface: the deformed mesh, a population of one.
-        deviation: σ of the vertices (n,) or of all alike () [m]; where all are exact, k is 0.
-    """
-    normals = surface.normals[0].T.astype(np.float64)
-    deviations = np.broadcast_to(deviation, len(normals))
-    offsets = np.zeros((len(normals), 3, len(normals)))
-    own = np.arange(len(normals))
-    offsets[own, :, own] = normals * deviations[:, None]
-    return offsets[:, :, deviations > 0]
-
-
 def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
     normals = surface.normals[0].T.astype(np.float64)
@@ -94,15 +79,19 @@ def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np
 
 
 def remaining(
-    offsets: NDArray[np.float64], jacobian: NDArray[np.float64], response: NDArray[np.float64]
+    normals: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+    response: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Covariance (n, 3, 3) [m²] of the part of the mesh's own errors that Θ does not correct.
+    """Variance (n,) [m²] along the normals of the part of the mesh's own errors that Θ does not correct.
 
     Args:
-        offsets: E (n, 3, k) [m].
+        normals: unit normals (n, 3).
+        deviation: σ of the vertices along them (n,) [m].
         jacobian: D, derivatives (n, 3, dim) of the vertices.
-        response: −Σ JᵀJE, the change (dim, k) of Θ with which the search answers each error.
+        response: −Σ JᵀJE, the change (dim, n) of Θ with which the search answers each vertex's error.
     """
-    n, axes, dimension = jacobian.shape
-    left = offsets + (jacobian.reshape(-1, dimension) @ response).reshape(n, axes, response.shape[1])
-    return left @ left.transpose(0, 2, 1)
+    left = np.einsum("ni,nid->nd", normals, jacobian) @ response
+    left.flat[:: len(left) + 1] += deviation
+    return np.einsum("nk,nk->n", left, left)

@@ -37,6 +37,12 @@ class Linearization:
         """Itself."""
         return [self]
 
+    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+        """Jᵀ times values (m, k) of the residuals (dimension, k)."""
+        result = np.zeros((dimension, values.shape[1]))
+        result[self.parameters] = self.jacobian.T @ values
+        return result
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLinearization:
@@ -60,6 +66,14 @@ class PointLinearization:
         order = np.argsort(self.moves.group[self.points], kind="stable")
         result = np.empty((len(order), self.moves.dimension))
         result[order] = stack(self.parts(), self.moves.dimension).jacobian
+        return result
+
+    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+        """Jᵀ times values (m, k) of the residuals (dimension, k), without making J."""
+        moves = self.moves
+        at_points, result = np.zeros((len(moves.local), 3, values.shape[1])), np.zeros((dimension, values.shape[1]))
+        _gather(self.rows, self.points, values, at_points)
+        _transpose(at_points, moves.group, moves.parameters, moves.local, result)
         return result
 
     def parts(self) -> list[Linearization]:
@@ -94,6 +108,12 @@ class Together:
         """Their derivatives by all parameters, in the order of the residuals."""
         return stack(self.all, self.dimension).jacobian
 
+    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+        """Jᵀ times values (m, k) of the residuals, in their order (dimension, k)."""
+        ends = np.cumsum([len(part.residual) for part in self.all])[:-1]
+        split_values = zip(self.all, np.split(values, ends))
+        return np.sum([part.transposed_times(own, dimension) for part, own in split_values], axis=0)
+
     def parts(self) -> list[Linearization]:
         """The parts of each."""
         return [part for linear in self.all for part in linear.parts()]
@@ -110,6 +130,15 @@ class Linear(Protocol):
     @property
     def jacobian(self) -> NDArray[np.float64]:
         """Their derivatives (m, dim or k) by the parameters that they depend on."""
+        ...
+
+    def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+        """Jᵀ times values (m, k) of the residuals, in their order (dimension, k).
+
+        Args:
+            values: of the residuals (m, k).
+            dimension: number of all parameters.
+        """
         ...
 
     def parts(self) -> list[Linearization]:
@@ -175,3 +204,33 @@ def _chain(
         x, y, z = rows[m, 0], rows[m, 1], rows[m, 2]
         for d in range(local.shape[2]):
             jacobian[to, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
+
+
+@kernel
+def _gather(
+    rows: NDArray[np.float64], points: NDArray[np.int64], values: NDArray[np.float64], at_points: NDArray[np.float64]
+) -> None:
+    """Adds rowᵀ times value (3, k) of every residual to its point's; zeros (n, 3, k) before."""
+    for m in range(points.size):
+        for i in range(3):
+            total = at_points[points[m], i]
+            for k in range(values.shape[1]):
+                total[k] += rows[m, i] * values[m, k]
+
+
+@kernel
+def _transpose(
+    at_points: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    result: NDArray[np.float64],
+) -> None:
+    """Moves transposed times what is at the points (n, 3, k), added up by parameter; zeros (dim, k) before."""
+    for v in range(group.size):
+        own = parameters[group[v]]
+        for d in range(own.size):
+            total = result[own[d]]
+            for i in range(3):
+                for k in range(total.size):
+                    total[k] += local[v, i, d] * at_points[v, i, k]
