@@ -5,18 +5,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ColorImage
+from abs_service.images import ChannelImage, ColorImage
+from abs_service.readers import BAYER_ORDERS
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.priors import MotionPrior, Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, around, placed
 from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.channel import ChannelTerm
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.illumination import Passive
 from abs_service.tracker.terms.outline import Rim, RimOutline
 from calib.camera import Camera
 from calib.noise.base import render_texture, write_texture
+from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.per_pixel import PerPixel
@@ -98,6 +102,26 @@ def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
                 np.testing.assert_array_equal(terms[1].cost(surface), terms[0].cost(surface))
 
 
+@pytest.mark.parametrize("order", ["rggb", "gbrg"])
+def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
+    """The window may begin at any pixel of the pattern."""
+    noise, pattern = GaussianBayer(60.0), BAYER_ORDERS[order]
+    whole, window = (ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, noise, Passive(), BOUNDS) for _ in range(2))
+    occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])
+    for seed, x in enumerate((0.0, 0.03, 0.0341)):
+        values = np.random.default_rng(seed).uniform(0, 255, (120, 200)).astype(np.float32)
+        whole.observe(ChannelImage(values, pattern), moved(x, 0, 0))
+        window.observe(ChannelImage(values, pattern), moved(x, 0, 0), REACH_M)
+        for hide in (np.zeros((0, 3)), occluder):
+            whole.hide(hide)
+            window.hide(hide)
+            for step in np.random.default_rng(1).uniform(-0.02, 0.02, (20, 3)):
+                surface = moved(x + step[0], step[1], 0.3 * step[2])
+                np.testing.assert_array_equal(window.cost(surface), whole.cost(surface))
+                found, wanted = window.fit(surface), whole.fit(surface)
+                assert (found.visible, found.hidden, found.inliers) == (wanted.visible, wanted.hidden, wanted.inliers)
+
+
 def test_beyond_the_window_nothing_is_explained():
     """Else a search could flee from a bad fit to where nobody has looked."""
     depth = depth_term()
@@ -106,6 +130,9 @@ def test_beyond_the_window_nothing_is_explained():
     color = ColorTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianColor(), BOUNDS)
     color.observe(ColorImage(np.full((120, 200, 3), 90, np.uint8)), moved(-0.15, 0, 0), 0.01)
     assert color.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
+    bayer = ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianBayer(), Passive(), BOUNDS)
+    bayer.observe(ChannelImage(np.full((120, 200), 90, np.float32), BAYER_ORDERS["rggb"]), moved(-0.15, 0, 0), 0.01)
+    assert bayer.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
 
 
 @settings(max_examples=30, deadline=None)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from abs_service.images import ChannelImage, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.window import WHOLE, Bordered
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
@@ -20,6 +21,10 @@ from calib.noise.base import LOG_SQRT_2PI
 
 #: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
 VALUE, CHANNEL, INVERSE, NORMALIZER = range(4)
+
+#: The texel of no measurement, and a value that no picture holds: so what is beside the window deviates from all.
+UNKNOWN = np.array([np.nan, 0, 0, 0], np.float32)
+NOTHING_HAS = 1e6
 
 
 class ChannelNoise(Protocol):
@@ -61,17 +66,23 @@ class ChannelTerm:
         self._image = np.zeros((1, 1, 4), np.float32)
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
+        self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
+        self._window = WHOLE
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Takes an image; NaN, which the border is as well, stands for no measurement."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
-        self._texels = texels = _fitting(self._texels, image.values.shape)
-        constant = LOG_SQRT_2PI + self._bounds.inlier
-        _fill(image.values, image.channels, self._noise.deviation(image.values), constant, texels)
-        self._image = self._synthesizer.image(self.sensor, texels)
-        texture = _fitting(self._texture, (self._image.shape[0] + 2, self._image.shape[1] + 2))
-        _border(self._image, texture)
+        self._window = window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
+            self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
+        values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
+        corner = window[0].start or 0, window[1].start or 0
+        _fill(values, image.channels, self._noise.deviation(values), constant, *corner, self._texels)
+        self._image = self._synthesizer.image(self.sensor, self._texels)
+        texture = self._bordered.begin(self._image.shape[:2], window)
+        rows, columns = (axis.indices(size) for axis, size in zip(window, self._image.shape))
+        _copy(self._image, *rows[:2], *columns[:2], texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         self._widening = NO_WIDENING
@@ -87,7 +98,8 @@ class ChannelTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
         if len(points):
-            self._texture[np.pad(self._shadow.mask(points), 1).ravel(), VALUE] = np.inf
+            texture = self._texture.reshape(self._image.shape[0] + 2, -1, 4)
+            texture[1:-1, 1:-1, VALUE][self._window][self._shadow.mask(points)[self._window]] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured values (population,)."""
@@ -146,44 +158,47 @@ class ChannelTerm:
         return np.where(measured, residual, np.inf), inverse, measured
 
 
-def _fitting(buffer: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """The last image's memory as (height, width, 4) if it has that size: new memory takes as long as filling it."""
-    size = (*shape, 4)
-    return buffer.reshape(size) if buffer.size == np.prod(size) else np.empty(size, np.float32)
-
-
 @kernel
 def _fill(
     values: NDArray[np.float32],
     channels: NDArray[np.uint8],
     deviation: NDArray[np.float32],
     constant: float,
+    top: int,
+    left: int,
     texels: NDArray[np.float32],
 ) -> None:
-    """Texels (height, width, 4) of an image, its pattern of channels and the deviation of each value."""
+    """Texels (height, width, 4) of an image from a part of it, the deviation there and the image's pattern of channels.
+
+    Args:
+        values, deviation: of the part (rows, columns).
+        channels: the pattern.
+        constant: added to the logarithm of the deviation.
+        top, left: the part's first pixel in the image.
+        texels: result.
+    """
     rows, columns = channels.shape
     last, inverse, normalizer = np.float32(-1), np.float32(0), np.float32(0)
     for row in range(values.shape[0]):
-        part = 0
+        part = left % columns
         for column in range(values.shape[1]):
-            texel, sigma = texels[row, column], deviation[row, column]
+            texel, sigma = texels[top + row, left + column], deviation[row, column]
             if sigma != last:  # most often they are all alike, and a logarithm takes as long as all the rest
                 last, inverse, normalizer = sigma, np.float32(1) / sigma, np.log(sigma) + np.float32(constant)
             texel[VALUE] = values[row, column]
-            texel[CHANNEL] = channels[row % rows, part]
+            texel[CHANNEL] = channels[(top + row) % rows, part]
             part = part + 1 if part + 1 < columns else 0
             texel[INVERSE] = inverse
             texel[NORMALIZER] = normalizer
 
 
 @kernel
-def _border(image: NDArray[np.float32], texture: NDArray[np.float32]) -> None:
-    """An image (height, width, 4) with a border that holds no values; what is unknown has the channel 0."""
-    height, width = image.shape[:2]
-    beside = np.array([np.nan, 0, 0, 0], np.float32)
-    texture[0], texture[-1], texture[:, 0], texture[:, -1] = beside, beside, beside, beside
-    for row in range(height):
-        for column in range(width):
+def _copy(
+    image: NDArray[np.float32], top: int, bottom: int, left: int, right: int, texture: NDArray[np.float32]
+) -> None:
+    """Rows and columns of an image (height, width, 4) into one with a border; what is unknown has the channel 0."""
+    for row in range(top, bottom):
+        for column in range(left, right):
             for part in range(4):
                 value = image[row, column, part]
                 texture[row + 1, column + 1, part] = np.float32(0) if part == CHANNEL and np.isnan(value) else value
