@@ -13,7 +13,8 @@ _FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 
 #: The range of a loop whose turns do not need each other: those over a population. Kernels divide it among as many
 #: threads as the environment says. The code for one and for several threads is compiled apart, so that sums may differ
-#: between them in the last digits of single precision; with either of them equal input gives equal bits.
+#: between them in the last digits of single precision. With one, equal input gives equal bits; with several it does in
+#: processes that read the compiled code from the cache, but not always in the one that compiled it.
 prange = range
 
 #: Says how many threads a kernel has; the compiler's own name for it. One if it is not set.
