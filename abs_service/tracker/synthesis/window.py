@@ -17,6 +17,9 @@ Window = tuple[slice, slice]
 
 WHOLE: Window = (slice(None), slice(None))
 
+#: A value that no picture holds: beside the window, where it stands, everything deviates from what is measured.
+NOTHING_HAS = 1e6
+
 
 def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: float) -> Window:
     """The rows and columns that a surface can be in.
@@ -38,10 +41,29 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     return slice(int(first[1]), int(last[1])), slice(int(first[0]), int(last[0]))
 
 
+def corner(window: Window) -> tuple[int, int]:
+    """Row and column of a window's first pixel."""
+    return window[0].start or 0, window[1].start or 0
+
+
+def limits(window: Window, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """First row, the one after the last, and likewise the columns of a window in an image of a shape."""
+    (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
+    return top, bottom, left, right
+
+
+def within(image: NDArray[Number], window: Window) -> NDArray[Number]:
+    """A view of a window's pixels in an image with a border of one pixel."""
+    return image[1:-1, 1:-1][window]
+
+
 class Bordered:
     """An image with a border of one pixel that is filled within a window; its memory serves frame after frame.
 
     New memory takes as long as filling it.
+
+    Attributes:
+        window: that of the last frame.
 
     Args:
         border: what the border holds (channels,).
@@ -52,7 +74,12 @@ class Bordered:
         self._border = border
         self._beyond = beyond
         self._image = np.zeros((0, 0, len(border)), np.float32)
-        self._window = WHOLE
+        self.window = WHOLE
+
+    @property
+    def inside(self) -> NDArray[np.float32]:
+        """A view of the window's pixels (rows, columns, channels)."""
+        return within(self._image, self.window)
 
     def begin(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
         """The image (height + 2, width + 2, channels) of a shape (height, width), with `border` in the window too."""
@@ -60,18 +87,17 @@ class Bordered:
         if self._image.shape[:2] != (height + 2, width + 2):
             self._image = np.empty((height + 2, width + 2, len(self._border)), np.float32)
             self._image[:] = self._border
-            self._window = WHOLE
-        for part, value in ((self._window, self._beyond), (window, self._border)):
-            rows, columns = (axis.indices(size) for axis, size in zip(part, (height, width)))
-            _fill(self._image, *rows[:2], *columns[:2], value)
-        self._window = window
+            self.window = WHOLE
+        for part, value in ((self.window, self._beyond), (window, self._border)):
+            _fill(self._image, *limits(part, shape), value)
+        self.window = window
         return self._image
 
 
 def placed(window: Window, values: NDArray[Number], height: int, width: int) -> NDArray[Number]:
     """Values of the pixels of a window in an image (height + 2, width + 2) with a border; zeros elsewhere."""
     image = np.zeros((height + 2, width + 2), values.dtype)
-    image[1:-1, 1:-1][window] = values
+    within(image, window)[:] = values
     return image
 
 

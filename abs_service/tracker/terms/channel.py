@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.images import ChannelImage, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.synthesis.window import WHOLE, Bordered
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
@@ -22,9 +22,8 @@ from calib.noise.base import LOG_SQRT_2PI
 #: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
 VALUE, CHANNEL, INVERSE, NORMALIZER = range(4)
 
-#: The texel of no measurement, and a value that no picture holds: so what is beside the window deviates from all.
+#: The texel of no measurement.
 UNKNOWN = np.array([np.nan, 0, 0, 0], np.float32)
-NOTHING_HAS = 1e6
 
 
 class ChannelNoise(Protocol):
@@ -67,22 +66,19 @@ class ChannelTerm:
         self._texels = np.zeros((0, 0, 4), np.float32)
         self._texture = np.zeros((0, 4), np.float32)
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
-        self._window = WHOLE
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Takes an image; NaN, which the border is as well, stands for no measurement."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
-        self._window = window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
-        corner = window[0].start or 0, window[1].start or 0
-        _fill(values, image.channels, self._noise.deviation(values), constant, *corner, self._texels)
+        _fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
         self._image = self._synthesizer.image(self.sensor, self._texels)
         texture = self._bordered.begin(self._image.shape[:2], window)
-        rows, columns = (axis.indices(size) for axis, size in zip(window, self._image.shape))
-        _copy(self._image, *rows[:2], *columns[:2], texture)
+        _copy(self._image, *limits(window, self._image.shape), texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         self._widening = NO_WIDENING
@@ -98,8 +94,7 @@ class ChannelTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
         if len(points):
-            texture = self._texture.reshape(self._image.shape[0] + 2, -1, 4)
-            texture[1:-1, 1:-1, VALUE][self._window][self._shadow.mask(points)[self._window]] = np.inf
+            self._bordered.inside[self._shadow.mask(points)[self._bordered.window], VALUE] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured values (population,)."""

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.images import ColorImage, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.synthesis.window import WHOLE, Bordered
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -15,9 +15,6 @@ from abs_service.tracker.terms.shadow import Shadow
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.color import GaussianColor
-
-#: Levels that no picture holds: what is beside the window deviates from every colour.
-NOTHING_HAS = 1e6
 
 
 class ColorTerm:
@@ -50,19 +47,18 @@ class ColorTerm:
         self._image = np.zeros((1, 1, 3), np.float32)
         self._levels = np.zeros((0, 0, 3), np.float32)
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
-        self._window = WHOLE
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Takes a colour image; the border is NaN, which stands for no measurement."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
-        self._window = window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
         if self._levels.shape != image.rgb.shape:
             self._levels = np.zeros(image.rgb.shape, np.float32)
         self._levels[window] = image.rgb[window]
         self._image = self._synthesizer.image(self.sensor, self._levels)
         texture = self._bordered.begin(self._image.shape[:2], window)
-        texture[1:-1, 1:-1][window] = self._image[window]
+        self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
         widening = self._misplacement.widening(self._view, predicted, self._sigma)
@@ -78,8 +74,7 @@ class ColorTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Marks the pixels that show points (k, 3) [m] before the object: their colours say nothing."""
         if len(points):
-            texture = self._texture.reshape(self._image.shape[0] + 2, -1, 3)
-            texture[1:-1, 1:-1][self._window][self._shadow.mask(points)[self._window]] = np.inf
+            self._bordered.inside[self._shadow.mask(points)[self._bordered.window]] = np.inf
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log of the density of the measured colours (population,)."""

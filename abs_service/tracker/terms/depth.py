@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, placed
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
@@ -65,7 +65,7 @@ class DepthTerm:
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         texture = self._synthesizer.texture(self.sensor, self._render(image, window))
-        texels = texture[1:-1, 1:-1][window]
+        texels = within(texture, window)
         self._view.look(predicted)
         distance = np.where(texels[..., 3] > 0, texels[..., 0], np.float32(np.nan))
         seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
@@ -81,21 +81,15 @@ class DepthTerm:
     def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
         """The noise model over a window of an image (height + 2, width + 2, 8)."""
         texture = self._image.begin(image.distance.shape, window)
-        corner = window[0].start or 0, window[1].start or 0
-        write_texture(self._noise, image.distance[window], image.amplitude[window], corner, texture)
+        write_texture(self._noise, image.distance[window], image.amplitude[window], corner(window), texture)
         return texture
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of what stands before the object."""
         rows, columns = np.nonzero(np.isfinite(self._foreground))
-        camera, (top, left) = self._view.camera, self._corner
+        camera, (top, left) = self._view.camera, corner(self._window)
         sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
         return pose.transform(camera.T_rs, sight * self._foreground[rows, columns, None])
-
-    @property
-    def _corner(self) -> tuple[int, int]:
-        """Row and column of the window's first pixel."""
-        return self._window[0].start or 0, self._window[1].start or 0
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Nothing more: a depth sensor sees for itself what stands before the object."""
@@ -108,10 +102,10 @@ class DepthTerm:
         costs an outlier, and more the farther it is from the object.
         """
         silent = seen.foreground | seen.hole | doubtful
-        normalizer = texture[1:-1, 1:-1, 6][self._window]
+        normalizer = within(texture, self._window)[..., 6]
         agreeing = float(np.median(normalizer[seen.object])) + 0.5 if seen.object.any() else 0.0
-        free_m, outlier = self._free_m[1:-1, 1:-1][self._window], self._bounds.outlier - self._bounds.inlier
-        _write_constants(silent, free_m, agreeing, outlier, *self._corner, texture)
+        free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
+        _write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) with what the outline says."""

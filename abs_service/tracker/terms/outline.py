@@ -15,7 +15,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.window import WHOLE, Window
+from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
@@ -129,7 +129,7 @@ class RimOutline:
     ) -> NDArray[np.bool_]:
         """Takes what a window of a depth image shows; the pixels beside the object that say nothing else."""
         self._inwards = inwards(distance, seen)
-        self._corner = np.array([window[1].start or 0, window[0].start or 0], np.float32)
+        self._corner = np.array(corner(window)[::-1], np.float32)
         if not self._begun:
             self._beyond, self._begun = self._measure(predicted), True
         return (seen.free_m > 0) & (self._inwards > -GRACE * self._deviation)
