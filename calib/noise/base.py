@@ -84,33 +84,6 @@ def without_offset(
     return (x - model.mean(x, a, (rows.ravel(), columns.ravel()))).reshape(distance.shape).astype(np.float32)
 
 
-def render_texture(
-    model: DepthNoise, distance: NDArray[np.float32], amplitude: NDArray[np.float32], uniform: float
-) -> NDArray[np.float32]:
-    """Renders eq. 18 for one frame into the coefficients that the likelihood kernel reads.
-
-    Every noise model becomes the same texture, so all of them run at the same speed. With y the measurement without
-    the mean offset that it has if it is right, and t = y − x, a texel holds [y, m0, m1, s0, s1, s2, n0, n1]: mean
-    offset beyond that one m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the negative logarithm of the normaliser
-    n0 + n1 t. A pixel without a return, and the border of one pixel that stands for everything outside the image, hold
-    the uniform density instead.
-
-    Args:
-        model: the noise model.
-        distance: measured radial distances (height, width) [m], NaN without return.
-        amplitude: measured amplitudes (height, width); ignored where the model does not depend on them.
-        uniform: negative log-density of a measurement that says nothing about the surface.
-
-    Returns:
-        Coefficients (height + 2, width + 2, 8).
-    """
-    height, width = distance.shape
-    texture = np.zeros((height + 2, width + 2, 8), np.float32)
-    texture[..., 6] = uniform
-    write_texture(model, distance, amplitude, (0, 0), texture)
-    return texture
-
-
 def write_texture(
     model: DepthNoise,
     distance: NDArray[np.float32],
@@ -118,13 +91,19 @@ def write_texture(
     corner: tuple[int, int],
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes the texels of the pixels with returns in a part of an image, see `render_texture`.
+    """Renders eq. 18 for a part of an image into the coefficients that the likelihood kernel reads.
+
+    Every noise model becomes the same texture, so all of them run at the same speed. With y the measurement without
+    the mean offset that it has if it is right, and t = y − x, a texel holds [y, m0, m1, s0, s1, s2, n0, n1]: mean
+    offset beyond that one m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the negative logarithm of the normaliser
+    n0 + n1 t. Pixels without a return keep what they hold.
 
     Args:
         model: the noise model.
-        distance, amplitude: of the part.
-        corner: row and column of its first pixel in the image.
-        texture: of the whole image, with its border.
+        distance: measured radial distances (rows, columns) [m], NaN without return.
+        amplitude: measured amplitudes (rows, columns); ignored where the model does not depend on them.
+        corner: row and column of the part's first pixel in the image.
+        texture: of the whole image, with a border of one pixel (height + 2, width + 2, 8).
     """
     rows = max(1, _BLOCK // max(distance.shape[1], 1))
     for top in range(0, len(distance), rows):

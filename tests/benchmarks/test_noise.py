@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib.noise import gaussian_polynomial, pixel_polynomial, tof_amplitude
-from calib.noise.base import DepthNoise, render_texture
+from calib.noise.base import DepthNoise
 from calib.noise.constant import Constant
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.pixel_polynomial import PixelPolynomial
@@ -17,6 +17,7 @@ from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
 from tests.calib import laws
 from tests.calib.test_noise_shrinkage import DEGREES, HEIGHT, LABELS, WIDTH, Head
+from tests.calib.texels import render_texture
 
 SIZES = {"176x144": (144, 176), "640x480": (480, 640)}
 SIGMA, MU = np.array(SIGMA_POLYNOMIAL), np.array([[0.01, -1e-6], [-2e-3, 0.0]])

@@ -1,8 +1,17 @@
-"""What a likelihood kernel makes of the texels that `render_texture` writes, as plain NumPy."""
+"""Textures of the texels that `write_texture` writes, and what a likelihood kernel makes of them in plain NumPy."""
 
 import numpy as np
 
-from calib.noise.base import WINDOW_M
+from calib.noise.base import WINDOW_M, DepthNoise, write_texture
+
+
+def render_texture(model: DepthNoise, distance: np.ndarray, amplitude: np.ndarray, uniform: float) -> np.ndarray:
+    """The texture (height + 2, width + 2, 8) of a whole image; the uniform density where there is no return."""
+    height, width = distance.shape
+    texture = np.zeros((height + 2, width + 2, 8), np.float32)
+    texture[..., 6] = uniform
+    write_texture(model, distance, amplitude, (0, 0), texture)
+    return texture
 
 
 def negative_log_density(texels: np.ndarray, t: np.ndarray | list[float]) -> np.ndarray:

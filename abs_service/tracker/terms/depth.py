@@ -221,7 +221,7 @@ def _depth_cost(
 ) -> None:
     """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured.
 
-    Texture as `render_texture` makes it.
+    Texture as `write_texture` makes it.
     """
     window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
     unbounded = np.float32(1e30)
