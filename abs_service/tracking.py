@@ -17,11 +17,12 @@ from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer, Stop
 from abs_service.tracker.posterior import Posterior
-from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior, ShapePrior
 from abs_service.tracker.regions.base import Region
 from abs_service.tracker.relief import FixedRelief, Relief
 from abs_service.tracker.relief import Settings as ReliefSettings
 from abs_service.tracker.sighting import Sighting, SightingError
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
 from calib.rig import PictureNoise, Rig, Sensor

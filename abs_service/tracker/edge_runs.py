@@ -5,6 +5,7 @@ from bisect import bisect_left
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from calib.jit import kernel, prange
 
 #: A run's length is a multiple of this, and the compiler knows it: two vectors of eight, so nothing is left over that
@@ -53,6 +54,10 @@ class EdgeRuns:
         out = np.empty(len(vertices))
         _sum_squares(vertices, self.runs, self.singles, self._inverse_lengths, factor, out)
         return out
+
+    def step(self, factor: float) -> Step:
+        """The same for one candidate of a chain."""
+        return Step(_judge, (self.runs, self.singles, self._inverse_lengths, factor))
 
 
 def _blocks(edges: NDArray[np.int64], vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -126,3 +131,19 @@ def _sum_squares(
             change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[done + e] - one
             total += change * change
         out[k] = factor * total
+
+
+@kernel
+def _judge(
+    thetas: NDArray[np.float64],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    runs: NDArray[np.int64],
+    singles: NDArray[np.int32],
+    inverse_lengths: NDArray[np.float32],
+    factor: float,
+) -> float:
+    """See `EdgeRuns.step`."""
+    out = np.empty(1)
+    _sum_squares(vertices, runs, singles, inverse_lengths, factor, out)
+    return out[0]

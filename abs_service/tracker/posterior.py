@@ -1,13 +1,17 @@
 """What a search minimises: the negative logarithm of likelihood times priors, for the observation in hand."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
+from abs_service.tracker.chain import Chain, step_of
 from abs_service.tracker.curvature import Quadratic, gauss_newton
 from abs_service.tracker.models.base import DeformationModel, Moves, Surface
 from abs_service.tracker.objectives.base import Objective
-from abs_service.tracker.priors import MotionPrior, ShapePrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior, ShapePrior
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 from abs_service.tracker.terms.linearization import Linearization
 
@@ -33,6 +37,7 @@ class Posterior:
         self._stretch = stretch
         self._shape = shape
         self._motion = motion
+        self._cost = self.cost_in_stages
         self._linearized: list[tuple[NDArray[np.float64], Quadratic, list[Linearization], Moves]] = []
         self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
 
@@ -43,6 +48,7 @@ class Posterior:
         self._motion.predict(observation.t_host_ns)
         predicted = self._motion.predicted
         self._objective.observe(observation, self._model.deform(predicted[None]), self._motion.reach_m)
+        self._cost = self._chained()
         return predicted
 
     def restart(self, theta: NDArray[np.float64]) -> None:
@@ -55,6 +61,15 @@ class Posterior:
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative logarithm (population,) of likelihood times priors."""
+        return self._cost(thetas)
+
+    @property
+    def is_chained(self) -> bool:
+        """Whether all parts can be steps of one compiled loop, which then finds the costs in this observation."""
+        return self._cost != self.cost_in_stages
+
+    def cost_in_stages(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The same, found by each part for the whole population."""
         surface = self._model.deform(thetas)
         priors = self._stretch.cost(surface) + self._shape.cost(thetas) + self._motion.cost(thetas)
         return self._objective.cost(surface) + priors
@@ -96,6 +111,11 @@ class Posterior:
     def unexplained(self, theta: NDArray[np.float64]) -> float:
         """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""
         return 1 - inlier_share(self.fits(theta))
+
+    def _chained(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        parts = self._model, self._stretch, self._shape, self._motion, self._objective
+        steps = [step for part in parts if (step := step_of(part))]
+        return Chain(*steps).cost if len(steps) == len(parts) else self.cost_in_stages
 
     def _priors(self, surface: Surface, moves: Moves, theta: NDArray[np.float64]) -> list[Linearization]:
         return [

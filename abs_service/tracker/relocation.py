@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.curvature import gauss_newton
 from abs_service.tracker.models.base import DeformationModel, Moves
-from abs_service.tracker.priors import ShapePrior, StretchPrior
+from abs_service.tracker.priors import ShapePrior
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization
 
 #: Steps of the rough fit, how far vertices and found points may be apart after it [m], and how much edges may stretch.

@@ -23,7 +23,7 @@ from abs_service.experiments.tracked import follow, shoot
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel, Moves
-from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from abs_service.tracker.uncertainty import propagated
 from tests.tracker.driving import default_plan, rig_of, simulate, with_color_deviation

@@ -9,7 +9,8 @@ from abs_service.images import ChannelImage, ColorImage
 from abs_service.readers import BAYER_ORDERS, ONE_CHANNEL
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.terms.channel import ChannelTerm, _copy, _fill
+from abs_service.tracker.terms.channel import ChannelTerm
+from abs_service.tracker.terms.channel_cost import copy, fill
 from abs_service.tracker.terms.illumination import Active, Passive, lambert
 from calib.noise.bayer import GaussianBayer
 from calib.noise.grey import GaussianGrey
@@ -137,11 +138,11 @@ def test_texels_are_value_channel_inverse_deviation_and_normaliser(seed, pattern
     found, image = np.empty((*shape, 4), np.float32), ChannelImage(values, pattern)
     (top, bottom), (left, right) = (np.sort(generator.integers(0, size + 1, 2)) for size in shape)
     part = slice(top, bottom), slice(left, right)
-    _fill(values, pattern, deviation, 0.7, 0, 0, found)
+    fill(values, pattern, deviation, 0.7, 0, 0, found)
     expected = np.stack([values, image.channel, 1 / deviation, np.log(deviation) + np.float32(0.7)], axis=-1)
     np.testing.assert_allclose(found, expected, rtol=1e-5)
     again = np.zeros_like(found)
-    _fill(np.ascontiguousarray(values[part]), pattern, np.ascontiguousarray(deviation[part]), 0.7, top, left, again)
+    fill(np.ascontiguousarray(values[part]), pattern, np.ascontiguousarray(deviation[part]), 0.7, top, left, again)
     np.testing.assert_array_equal(again[part], found[part])
     assert np.count_nonzero(again.any(axis=2)) <= (bottom - top) * (right - left)
     found[generator.random(shape) < 0.3] = np.nan
@@ -149,5 +150,5 @@ def test_texels_are_value_channel_inverse_deviation_and_normaliser(seed, pattern
     expected = bordered.copy()
     expected[1:-1, 1:-1][part] = found[part]
     expected[..., 1] = np.nan_to_num(expected[..., 1])
-    _copy(found, top, bottom, left, right, bordered)
+    copy(found, top, bottom, left, right, bordered)
     np.testing.assert_array_equal(bordered, expected)

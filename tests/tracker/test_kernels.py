@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from abs_service.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.priors import StretchPrior
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import FREE_SCALE_M, DepthTerm, _write_constants
+from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, write_constants
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -224,7 +225,7 @@ def test_pixels_that_say_nothing_of_distances_become_constants(seed):
     inner = expected[1 + top : 1 + top + height, 1 + left : 1 + left + width]
     inner[silent] = np.eye(8)[6] * -2.5
     inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
-    _write_constants(silent, free_m, -2.5, 7.0, top, left, texture)
+    write_constants(silent, free_m, -2.5, 7.0, top, left, texture)
     np.testing.assert_allclose(texture, expected, rtol=1e-5)
 
 

@@ -10,8 +10,9 @@ from abs_service.readers import BAYER_ORDERS
 from abs_service.tracker.models.base import Moves
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior
 from abs_service.tracker.priors import Settings as PriorSettings
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.channel import ChannelTerm

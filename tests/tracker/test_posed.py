@@ -21,9 +21,10 @@ from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
-from abs_service.tracker.priors import MotionPrior, StretchPrior
+from abs_service.tracker.priors import MotionPrior
 from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.sheet import Sheet
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization, stack
 from abs_service.tracking import Tracking
 from calib import pose

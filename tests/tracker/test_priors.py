@@ -12,8 +12,8 @@ from abs_service.tracker.priors import (
     MotionPrior,
     Settings,
     ShapePrior,
-    StretchPrior,
 )
+from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from tests.tracker.scenes import as_surface, flat, sheet
 

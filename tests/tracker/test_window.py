@@ -17,7 +17,8 @@ from abs_service.tracker.terms.channel import ChannelTerm
 from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
 from abs_service.tracker.terms.illumination import Passive
-from abs_service.tracker.terms.outline import Rim, RimOutline
+from abs_service.tracker.terms.outline import RimOutline
+from abs_service.tracker.terms.rim import Rim
 from calib.camera import Camera
 from calib.noise.base import write_texture
 from calib.noise.bayer import GaussianBayer

@@ -98,13 +98,16 @@ def bend(theta: NDArray[np.float64], direction: int, per_bend: float) -> tuple[n
     return np.float32(ahead + behind), np.float32(ahead - behind)
 
 
+#: Coefficients of a polynomial; a constant, so that the compiler unrolls what runs over them.
+ORDERS = 5
+
+
 @kernel
 def roll(
     p: np.float32,
     kappa: tuple[np.float32, np.float32],
     series: NDArray[np.float32],
     scale: float,
-    orders: tuple[int, ...],
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """What the bends of a direction do to a vertex: with t = κp, it moves to sin(t)/κ and rises by (1 − cos t)/κ.
 
@@ -114,7 +117,6 @@ def roll(
         p: signed distance from the centre along the direction [m].
         kappa: as `bend` tells them.
         series, scale: as in `Series`.
-        orders: as long as a polynomial; the compiler knows a tuple's length and so unrolls what runs over it.
 
     Returns:
         Shift along the direction [m], rise [m], and the derivatives of both by p.
@@ -123,7 +125,7 @@ def roll(
     square = t * t
     u = square * np.float32(scale) - np.float32(1)
     sine, versine = series[0, 0], series[1, 0]
-    for i in range(1, len(orders)):
+    for i in range(1, ORDERS):
         sine = sine * u + series[0, i]
         versine = versine * u + series[1, i]
     return p * sine - p, p * t * versine, -square * versine, t * sine

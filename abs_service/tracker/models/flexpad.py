@@ -1,12 +1,13 @@
 """FlexPad: a sheet that bends in four directions through its centre, each side on its own (Steimle, Jordt, Maes)."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from abs_service.tracker.models import bends
 from abs_service.tracker.models.arc import arc
 from abs_service.tracker.models.base import BOARD, Moves, Surface
@@ -17,7 +18,7 @@ from abs_service.tracker.rectangle import find_sheet
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracker.sighting import Sighting
 from calib import pose
-from calib.jit import kernel, prange
+from calib.jit import composed, kernel, prange
 
 #: Θ: bends of the eight sides, height map, rotation vector, translation.
 BENDS, HEIGHT, ROTATION, TRANSLATION = slice(0, 8), 8, slice(9, 12), slice(12, 15)
@@ -97,7 +98,8 @@ class FlexPad:
         self._pose = np.ascontiguousarray(sheet.T_rp[:3], np.float64)
         self._per_bend = 1 / (bends.FULL * least_radius)
         self._series = bends.fit(float(np.linalg.norm(points, axis=1).max()), least_radius)
-        self._orders = (0,) * self._series.coefficients.shape[1]
+        roll = composed(bends.roll, ORDERS=self._series.coefficients.shape[1])
+        self._deform = composed(_deform, roll=roll)
         self.rest = np.zeros(DIMENSION)
         self.scales = _scales(points, least_radius, self._half)
         self.prior = np.eye(9, DIMENSION) / np.array([bend_deviation] * 8 + [HEIGHT_DEVIATION])[:, None]
@@ -107,9 +109,17 @@ class FlexPad:
         """Deforms the mesh with every row of `thetas` (population, 15)."""
         shape = len(thetas), 3, self._points.shape[1]
         vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
-        sheet = self._pose, self._per_bend, self._half, self._padded
-        _deform(thetas, *sheet, self._series.coefficients, self._series.scale, self._orders, vertices, normals)
+        self._deform(thetas, *self._arguments, vertices, normals)
         return Surface(vertices, normals)
+
+    def step(self) -> Step:
+        """The same for a chain."""
+        return Step(composed(_step, _deform=self._deform), self._arguments)
+
+    @property
+    def _arguments(self) -> tuple[Any, ...]:
+        series = self._series
+        return self._pose, self._per_bend, self._half, self._padded, series.coefficients, series.scale
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, 15) of the vertices at theta (15,), by bends and g beyond their range none."""
@@ -155,7 +165,6 @@ def _deform(
     points: NDArray[np.float32],
     series: NDArray[np.float32],
     scale: float,
-    orders: tuple[int, ...],
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
@@ -167,7 +176,7 @@ def _deform(
         per_bend: curvature of a side at a parameter of 1 [1/m].
         half: half the sheet's long side [m].
         points: vertices on the flat sheet (2, n + `LANES`) [m].
-        series, scale, orders: as in `bends.roll`.
+        series, scale: as in `bends.roll`.
         vertices, normals: results (population, 3, n).
     """
     one, two, r, n = np.float32(1), np.float32(2), _ROOT, vertices.shape[2]
@@ -183,10 +192,10 @@ def _deform(
             # Two loops: in one, too few vertices would be under way at once for all units of the processor.
             for v in range(lanes):
                 x, y = xs[v], ys[v]
-                shift_0, z_0, shrink_0, g_0 = roll(x, e, series, scale, orders)
-                shift_1, z_1, shrink_1, g_1 = roll(r * (x + y), se, series, scale, orders)
-                shift_2, z_2, shrink_2, g_2 = roll(y, s, series, scale, orders)
-                shift_3, z_3, shrink_3, g_3 = roll(r * (y - x), sw, series, scale, orders)
+                shift_0, z_0, shrink_0, g_0 = roll(x, e, series, scale)
+                shift_1, z_1, shrink_1, g_1 = roll(r * (x + y), se, series, scale)
+                shift_2, z_2, shrink_2, g_2 = roll(y, s, series, scale)
+                shift_3, z_3, shrink_3, g_3 = roll(r * (y - x), sw, series, scale)
                 shear, both = (shrink_1 - shrink_3) / two, one + (shrink_1 + shrink_3) / two
                 w[0, v], w[1, v] = x + shift_0 + r * (shift_1 - shift_3), y + shift_2 + r * (shift_1 + shift_3)
                 w[2, v], w[3, v], w[4, v] = z_0 + z_1 + z_2 + z_3, g_0 + r * (g_1 - g_3), g_2 + r * (g_1 + g_3)
@@ -207,3 +216,20 @@ def _deform(
                 w[4, v] = of_y[0] * a + of_y[1] * b + of_y[2] * d
                 w[5, v] = of_z[0] * a + of_z[1] * b + of_z[2] * d
             write(w, first, count, vertices[k], normals[k])
+
+
+@kernel
+def _step(
+    thetas: NDArray[np.float64],
+    pose: NDArray[np.float64],
+    per_bend: float,
+    half: float,
+    points: NDArray[np.float32],
+    series: NDArray[np.float32],
+    scale: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Vertices and normals of one candidate."""
+    shape = 1, 3, points.shape[1] - LANES
+    vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    _deform(thetas, pose, per_bend, half, points, series, scale, vertices, normals)
+    return vertices, normals

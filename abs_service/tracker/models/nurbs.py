@@ -7,6 +7,7 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from abs_service.tracker.grid import grid_mesh
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import binding, spline
@@ -118,6 +119,10 @@ class Nurbs:
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
         return self._patches.deform(thetas)
+
+    def step(self) -> Step:
+        """The same for a chain."""
+        return self._patches.step()
 
     def raise_vertices(self, by: NDArray[np.float64]) -> None:
         """Adds lengths (n,) [m] to the offsets of the vertices along their normals, at rest and deformed."""

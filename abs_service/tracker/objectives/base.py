@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
+from abs_service.tracker.chain import Step, available, step_of
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import SensorFit, Term
@@ -68,6 +69,13 @@ class TermSum:
         for term in self._active:
             total += term.cost(surface)
         return total
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain, if all terms can be parts of it; sensors come and go in it."""
+        steps = [(term in self._active, step) for term in self._terms if (step := step_of(term))]
+        if len(steps) < len(self._terms):
+            return None
+        return steps[0][1] if len(self._active) == len(steps) == 1 else available(steps)
 
     def linearize(self, surface: Surface, moves: Moves) -> list[Linear]:
         """All sensors' normalised residuals and their derivatives."""

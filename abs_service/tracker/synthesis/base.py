@@ -1,12 +1,13 @@
 """What a synthesis is: samples of deformed meshes as a sensor would see them, and images that fit them."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
+from abs_service.tracker.chain import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.window import Window
@@ -82,6 +83,19 @@ class View(Protocol):
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
+        ...
+
+
+@runtime_checkable
+class CompiledView(View, Protocol):
+    """A view that can be a part of steps of a chain, since its samples are the vertices."""
+
+    def step(self) -> Step:
+        """From vertices and normals of one candidate to its pixels and distances, as in `Synthesis`."""
+        ...
+
+    def looks(self) -> Step:
+        """From vertices and pixels of one candidate to its attributes, as in `Synthesis`."""
         ...
 
 

@@ -10,14 +10,17 @@ from calib.jit import kernel
 
 
 class Projection:
-    """Eq. 10 for populations, in single precision."""
+    """Eq. 10 for populations, in single precision.
+
+    Attributes:
+        optics: what `project` takes between the vertices and the results.
+    """
 
     def __init__(self, camera: Camera):
-        self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        self._lens = camera.lens.coefficients.astype(np.float32)
-        self._kernel = _project_fisheye if isinstance(camera.lens, KannalaBrandt) else _project
-        self._limit = camera.field_radius**2
+        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+        lens = camera.lens.coefficients.astype(np.float32)
+        self.optics = isinstance(camera.lens, KannalaBrandt), pose, matrix, lens, camera.field_radius**2
 
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
@@ -26,7 +29,7 @@ class Projection:
         """
         population, _, n = vertices.shape
         place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
-        self._kernel(vertices, self._pose, self._matrix, self._lens, self._limit, place, inverse_z)
+        project(vertices, *self.optics, place, inverse_z)
         return place, inverse_z
 
 
@@ -49,6 +52,24 @@ def _count_inside(
             x, y = place[k, v, 0], place[k, v, 1]
             inside = x >= -half and x < right and y >= -half and y < bottom
             count[k] += 1 if inside and not np.isnan(inverse_z[k, v]) else 0
+
+
+@kernel
+def project(
+    vertices: NDArray[np.float32],
+    is_fisheye: bool,
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    place: NDArray[np.float32],
+    inverse_z: NDArray[np.float32],
+) -> None:
+    """Eq. 10 with the lens that there is; pose (3, 4) = T_sr, limit of r², results as `Projection.project` tells."""
+    if is_fisheye:
+        _project_fisheye(vertices, pose, matrix, lens, limit, place, inverse_z)
+    else:
+        _project(vertices, pose, matrix, lens, limit, place, inverse_z)
 
 
 @kernel

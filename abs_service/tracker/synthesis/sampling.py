@@ -16,9 +16,43 @@ LEAST_COSINE = 0.2
 
 def sampler(lens: LensModel) -> Callable[..., None]:
     """The kernel for cameras with a lens; all take the same arguments."""
+    return (_sample_pinhole, _sample, _sample_fisheye)[lens_kind(lens)]
+
+
+#: Which of the kernels a lens needs.
+PINHOLE, DISTORTED, FISHEYE = range(3)
+
+
+def lens_kind(lens: LensModel) -> int:
+    """`PINHOLE`, `DISTORTED` or `FISHEYE`."""
     if isinstance(lens, KannalaBrandt):
-        return _sample_fisheye
-    return _sample_pinhole if lens.is_pinhole else _sample
+        return FISHEYE
+    return PINHOLE if lens.is_pinhole else DISTORTED
+
+
+@kernel
+def see(
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    kind: int,
+    hidden: NDArray[np.bool_],
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    height: int,
+    width: int,
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Pixels and distances (population, n), for a chain: with a choice of the lens, of which any may come."""
+    pixel = np.empty((vertices.shape[0], vertices.shape[2]), np.int32)
+    distance = np.empty(pixel.shape, np.float32)
+    if kind == PINHOLE:
+        _sample_pinhole(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
+    elif kind == DISTORTED:
+        _sample(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
+    else:
+        _sample_fisheye(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
+    return pixel, distance
 
 
 @kernel

@@ -5,13 +5,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye, level, relief
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from calib.forward import bend_fisheye
-from calib.jit import kernel, prange
 from calib.rig import PictureNoise, Rig
 
 
@@ -73,6 +73,10 @@ class Slopes(Protocol):
         """
         ...
 
+    def step(self, values: NDArray[np.float32]) -> Step:
+        """The same for one candidate of a chain, from its vertices and pixels."""
+        ...
+
 
 class Level:
     """Around a vertex everything is taken to look like the vertex, for want of anything better."""
@@ -89,6 +93,10 @@ class Level:
     ) -> NDArray[np.float32]:
         """The values themselves (1, n, channels)."""
         return values[None]
+
+    def step(self, values: NDArray[np.float32]) -> Step:
+        """The values themselves."""
+        return Step(level, (values[None],))
 
 
 LEVEL = Level()
@@ -110,10 +118,10 @@ class Relief:
         self._camera = camera
         self._edges = mesh.edges
         self._lengths = _along(mesh, self._edges)
-        self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        self._lens = camera.lens.coefficients.astype(np.float32)
-        self._kernel = _at_centers_fisheye if isinstance(camera.lens, KannalaBrandt) else _at_centers
+        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+        self._optics = pose, matrix, camera.lens.coefficients.astype(np.float32), camera.width + 2
+        self._is_fisheye = isinstance(camera.lens, KannalaBrandt)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """As last looked; 0 at vertices whose surroundings were not seen."""
@@ -132,9 +140,13 @@ class Relief:
     ) -> NDArray[np.float32]:
         """Value + slope · (centre of the pixel − projection of the vertex) (population, n, channels)."""
         result = np.empty((*pixel.shape, values.shape[1]), np.float32)
-        where = (self._pose, self._matrix, self._lens, self._camera.width + 2)
-        self._kernel(surface.vertices, pixel, *where, values, self._per_pixel, result)
+        to_centers = at_centers_fisheye if self._is_fisheye else at_centers
+        to_centers(surface.vertices, pixel, *self._optics, values, self._per_pixel, result)
         return result
+
+    def step(self, values: NDArray[np.float32]) -> Step:
+        """The same for one candidate of a chain, from its vertices and pixels."""
+        return Step(relief, (self._is_fisheye, *self._optics, values, self._per_pixel))
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:
@@ -151,79 +163,3 @@ def _along(mesh: Mesh, edges: NDArray[np.int32]) -> NDArray[np.float64]:
     tangents, (first, second) = _tangents(mesh), edges.T
     edge = mesh.vertices[second] - mesh.vertices[first]
     return np.stack([np.einsum("kij,kj->ki", tangents[end], edge) for end in (first, second)])
-
-
-@kernel
-def _at_centers(
-    vertices: NDArray[np.float32],
-    pixel: NDArray[np.int32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    stride: int,
-    values: NDArray[np.float32],
-    slopes: NDArray[np.float32],
-    result: NDArray[np.float32],
-) -> None:
-    """Value + slope · (centre of the pixel − projection of the vertex), eq. 10; the value itself in the border."""
-    one, two, width, per_stride = np.float32(1), np.float32(2), np.int32(stride), 1 / stride
-    fx, fy, cx, cy = matrix
-    k1, k2, p1, p2, k3, k4, k5, k6 = lens
-    for k in prange(pixel.shape[0]):
-        rights, downs = np.empty(pixel.shape[1], np.float32), np.empty(pixel.shape[1], np.float32)
-        for v in range(pixel.shape[1]):
-            right, down = np.float32(0), np.float32(0)
-            if pixel[k, v] > 0:
-                a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-                inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
-                x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
-                y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
-                r2 = x * x + y * y
-                radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-                column = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
-                row = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
-                line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
-                right = np.float32(pixel[k, v] - line * width) - one - column
-                down = np.float32(line) - one - row
-            rights[v], downs[v] = right, down
-        for channel in range(values.shape[1]):
-            own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
-            for v in range(np.uintp(looks.size)):
-                looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
-
-
-@kernel
-def _at_centers_fisheye(
-    vertices: NDArray[np.float32],
-    pixel: NDArray[np.int32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    stride: int,
-    values: NDArray[np.float32],
-    slopes: NDArray[np.float32],
-    result: NDArray[np.float32],
-) -> None:
-    """What `_at_centers` is with the four coefficients of a fisheye."""
-    one, width, per_stride = np.float32(1), np.int32(stride), 1 / stride
-    fx, fy, cx, cy = matrix
-    for k in prange(pixel.shape[0]):
-        rights, downs = np.empty(pixel.shape[1], np.float32), np.empty(pixel.shape[1], np.float32)
-        for v in range(pixel.shape[1]):
-            right, down = np.float32(0), np.float32(0)
-            if pixel[k, v] > 0:
-                a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-                inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
-                x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
-                y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
-                bent_x, bent_y = bend_fisheye(x, y, lens)
-                column = fx * bent_x + cx
-                row = fy * bent_y + cy
-                line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
-                right = np.float32(pixel[k, v] - line * width) - one - column
-                down = np.float32(line) - one - row
-            rights[v], downs[v] = right, down
-        for channel in range(values.shape[1]):
-            own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
-            for v in range(np.uintp(looks.size)):
-                looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]

@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
+from abs_service.tracker.chain import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.raster import Raster
-from abs_service.tracker.synthesis.sampling import sampler
+from abs_service.tracker.synthesis.sampling import lens_kind, sampler, see
 from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
 from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
@@ -92,12 +93,11 @@ class SparseView:
         self._slopes = slopes
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
-        self._pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        self._matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        self._lens = camera.lens.coefficients.astype(np.float32)
+        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+        lens = camera.lens.coefficients.astype(np.float32)
+        self._optics = pose, matrix, lens, camera.field_radius**2, camera.height, camera.width
         self._sample = sampler(camera.lens)
-        self._size = (camera.height, camera.width)
-        self._limit = camera.field_radius**2
 
     def look(self, predicted: Surface) -> None:
         """Hides the vertices that face away, or are behind the mesh's own surface, in the predicted mesh."""
@@ -117,19 +117,16 @@ class SparseView:
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
-        self._sample(
-            surface.vertices,
-            surface.normals,
-            self._hidden,
-            self._pose,
-            self._matrix,
-            self._lens,
-            self._limit,
-            *self._size,
-            pixel,
-            distance,
-        )
+        self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
         return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
+
+    def step(self) -> Step:
+        """Pixels and distances of vertices and normals."""
+        return Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
+
+    def looks(self) -> Step:
+        """Attributes at the centres of the pixels, of vertices and pixels."""
+        return self._slopes.step(self._attributes)
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """As where the surface was expected."""

@@ -7,20 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import ChannelImage, Image
+from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.channel_cost import CHANNEL, INVERSE, VALUE, channel_cost, copy, fill
+from abs_service.tracker.terms.comparing import judging
 from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NO_WIDENING, NOT_AT_ALL, Misplacement
 from abs_service.tracker.terms.shadow import Shadow
-from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
-
-#: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
-VALUE, CHANNEL, INVERSE, NORMALIZER = range(4)
 
 #: The texel of no measurement.
 UNKNOWN = np.array([np.nan, 0, 0, 0], np.float32)
@@ -75,10 +74,10 @@ class ChannelTerm:
         if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
             self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
-        _fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
+        fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
         self._image = self._synthesizer.image(self.sensor, self._texels)
         texture = self._bordered.begin(self._image.shape[:2], window)
-        _copy(self._image, *limits(window, self._image.shape), texture)
+        copy(self._image, *limits(window, self._image.shape), texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         self._widening = NO_WIDENING
@@ -100,9 +99,19 @@ class ChannelTerm:
         """−Σ_v log of the density of the measured values (population,)."""
         seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         out = np.empty(len(seen.pixel))
+        channel_cost(seen.pixel, seen.attributes, *self._measured, out)
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        if not isinstance(self._view, CompiledView):
+            return None
+        return judging(self._view, channel_cost, self._measured, self._illumination.step())
+
+    @property
+    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
         uniform = self._bounds.inlier + self._bounds.uniform
-        _channel_cost(seen.pixel, self._texture, seen.attributes, *self._widening, self._bounds.outlier, uniform, out)
-        return self._view.balance(out, surface, uniform)
+        return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
         """The inliers' normalised residuals, and how they change with the parameters.
@@ -151,85 +160,3 @@ class ChannelTerm:
         residual = (texels[:, VALUE] - own) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
         return np.where(measured, residual, np.inf), inverse, measured
-
-
-@kernel
-def _fill(
-    values: NDArray[np.float32],
-    channels: NDArray[np.uint8],
-    deviation: NDArray[np.float32],
-    constant: float,
-    top: int,
-    left: int,
-    texels: NDArray[np.float32],
-) -> None:
-    """Texels (height, width, 4) of an image from a part of it, the deviation there and the image's pattern of channels.
-
-    Args:
-        values, deviation: of the part (rows, columns).
-        channels: the pattern.
-        constant: added to the logarithm of the deviation.
-        top, left: the part's first pixel in the image.
-        texels: result.
-    """
-    rows, columns = channels.shape
-    last, inverse, normalizer = np.float32(-1), np.float32(0), np.float32(0)
-    for row in range(values.shape[0]):
-        part = left % columns
-        for column in range(values.shape[1]):
-            texel, sigma = texels[top + row, left + column], deviation[row, column]
-            if sigma != last:  # most often they are all alike, and a logarithm takes as long as all the rest
-                last, inverse, normalizer = sigma, np.float32(1) / sigma, np.log(sigma) + np.float32(constant)
-            texel[VALUE] = values[row, column]
-            texel[CHANNEL] = channels[(top + row) % rows, part]
-            part = part + 1 if part + 1 < columns else 0
-            texel[INVERSE] = inverse
-            texel[NORMALIZER] = normalizer
-
-
-@kernel
-def _copy(
-    image: NDArray[np.float32], top: int, bottom: int, left: int, right: int, texture: NDArray[np.float32]
-) -> None:
-    """Rows and columns of an image (height, width, 4) into one with a border; what is unknown has the channel 0."""
-    for row in range(top, bottom):
-        for column in range(left, right):
-            for part in range(4):
-                value = image[row, column, part]
-                texture[row + 1, column + 1, part] = np.float32(0) if part == CHANNEL and np.isnan(value) else value
-
-
-@kernel
-def _channel_cost(
-    pixel: NDArray[np.int32],
-    texture: NDArray[np.float32],
-    appearance: NDArray[np.float32],
-    factor: NDArray[np.float32],
-    log_factor: NDArray[np.float32],
-    outlier: float,
-    uniform: float,
-    out: NDArray[np.float64],
-) -> None:
-    """Sum over samples of min(normaliser + ½e², outlier), with deviations widened as `Widening` says.
-
-    Where the value or the vertex's own is unknown (NaN) of `uniform`, and where something stands before the object (∞)
-    of what an agreeing value costs on average. Texels are [value, channel, inverse deviation, normaliser].
-    """
-    half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
-    farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
-    samples, channels = factor.shape
-    # No branches on what is measured, see `depth._depth_cost`.
-    for k in prange(pixel.shape[0]):
-        total, pixels, looks = 0.0, pixel[k], appearance[np.intp(k) % appearance.shape[0]]
-        for v in range(np.uintp(pixels.size)):
-            i = pixels[v]
-            texel = texture[np.uintp(max(i, 0))]
-            channel = np.uintp(np.int32(texel[1]))
-            row, column = (v if samples > 1 else np.uintp(0)), (channel if channels > 1 else np.uintp(0))
-            e = (texel[0] - looks[v, channel]) * texel[2] / factor[row, column]
-            normalizer = texel[3] + log_factor[row, column]
-            explained = min(half * e * e + normalizer, most)
-            cost = half + normalizer if abs(e) > farthest else explained
-            cost = unknown if np.isnan(e) else cost
-            total += cost if i >= 0 else np.float32(0)
-        out[k] = total

@@ -4,10 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import ColorImage, Image
+from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.comparing import judging
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
@@ -80,10 +82,17 @@ class ColorTerm:
         """−Σ_v log of the density of the measured colours (population,)."""
         seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
+        _color_cost(seen.pixel, seen.attributes, *self._measured, out)
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        return judging(self._view, _color_cost, self._measured) if isinstance(self._view, CompiledView) else None
+
+    @property
+    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
         uniform = self._bounds.inlier + self._bounds.uniform
-        noise = (self._inverse, self._normalizer, self._bounds.outlier, uniform)
-        _color_cost(seen.pixel, self._texture, seen.attributes, *noise, out)
-        return self._view.balance(out, surface, uniform)
+        return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
         """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
@@ -116,8 +125,8 @@ class ColorTerm:
 @kernel
 def _color_cost(
     pixel: NDArray[np.int32],
-    texture: NDArray[np.float32],
     colors: NDArray[np.float32],
+    texture: NDArray[np.float32],
     inverse: NDArray[np.float32],
     normalizer: NDArray[np.float32],
     outlier: float,

@@ -6,22 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.images import DepthImage, Image
+from abs_service.tracker.chain import Step, both
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, write_constants
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
 from abs_service.tracker.terms.outline import Outline, Unknown
 from abs_service.tracker.visibility import Visibility, classify
 from calib import pose
 from calib.camera import Camera
-from calib.jit import kernel, prange
-from calib.noise.base import WINDOW_M, DepthNoise, write_texture
-
-#: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
-#: errs by a Laplace distribution of this scale.
-FREE_SCALE_M = 0.01
+from calib.jit import composed
+from calib.noise.base import DepthNoise, write_texture
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
 LEAST_FREE_M = 0.005
@@ -105,7 +103,7 @@ class DepthTerm:
         normalizer = within(texture, self._window)[..., 6]
         agreeing = float(np.median(normalizer[seen.object])) + 0.5 if seen.object.any() else 0.0
         free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
-        _write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
+        write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) with what the outline says."""
@@ -115,8 +113,16 @@ class DepthTerm:
         """Of the measurements; the outlier share is mixed in by the larger of the two densities."""
         seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
-        _depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
+        depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        if not isinstance(self._view, CompiledView):
+            return None
+        seeing, bounds = self._view.step(), (self._bounds.inlier, self._bounds.outlier)
+        measured = Step(composed(judge, see=seeing.kernel), (self._texture, *bounds, *seeing.arguments))
+        return both(measured, self._outline.step())
 
     def linearize(self, surface: Surface, moves: Moves) -> Together:
         """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""
@@ -166,76 +172,5 @@ class DepthTerm:
         seen = self._view.synthesize(surface)
         residual, inverse = np.empty((2, seen.pixel.shape[1]))
         measured = np.empty(residual.size, np.bool_)
-        _normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, measured)
+        normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, measured)
         return residual, inverse, measured
-
-
-@kernel
-def _write_constants(
-    silent: NDArray[np.bool_],
-    free_m: NDArray[np.float32],
-    agreeing: float,
-    outlier: float,
-    top: int,
-    left: int,
-    texture: NDArray[np.float32],
-) -> None:
-    """Texels that cost `agreeing` where a pixel is silent, and outlier + d / s where it is d > 0 into free space."""
-    per_metre = np.float32(1 / FREE_SCALE_M)
-    for row in range(silent.shape[0]):
-        for column in range(silent.shape[1]):
-            free = free_m[row, column]
-            if free > 0 or silent[row, column]:
-                texel = texture[top + row + 1, left + column + 1]
-                texel[:] = 0
-                texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)
-
-
-@kernel
-def _normalize(
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-    texture: NDArray[np.float32],
-    residual: NDArray[np.float64],
-    inverse: NDArray[np.float64],
-    measured: NDArray[np.bool_],
-) -> None:
-    """Residuals of samples (n,) in their deviations, these deviations' inverses, and whether anything was measured."""
-    for v in range(pixel.size):
-        texel = texture[max(pixel[v], 0)]
-        t = np.float64(texel[0]) - distance[v]
-        inside = min(max(t, -WINDOW_M), WINDOW_M)
-        inverse[v] = texel[3] + inside * (texel[4] + inside * texel[5])
-        residual[v] = (t - texel[1] - texel[2] * inside) * inverse[v]
-        measured[v] = pixel[v] > 0 and texel[3] > 0
-
-
-@kernel
-def _depth_cost(
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-    texture: NDArray[np.float32],
-    inlier: float,
-    outlier: float,
-    out: NDArray[np.float64],
-) -> None:
-    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured.
-
-    Texture as `write_texture` makes it.
-    """
-    window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
-    unbounded = np.float32(1e30)
-    # No branches on what is measured: whether an outlier's bound is reached cannot be foreseen, and each wrong guess
-    # takes the processor as long as several samples.
-    for k in prange(pixel.shape[0]):
-        total, pixels, distances = 0.0, pixel[k], distance[k]
-        for v in range(np.uintp(pixels.size)):
-            i = pixels[v]
-            texel = texture[np.uintp(max(i, 0))]
-            t = texel[0] - distances[v]
-            inside = min(max(t, -window), window)
-            e = (t - texel[1] - texel[2] * inside) * (texel[3] + inside * (texel[4] + inside * texel[5]))
-            cost = np.float32(0.5) * e * e + texel[6] + texel[7] * inside
-            bounded = min(cost, ceiling if texel[3] > 0 else unbounded) + least
-            total += bounded if i >= 0 else np.float32(0)
-        out[k] = total

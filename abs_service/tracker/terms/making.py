@@ -12,7 +12,8 @@ from abs_service.tracker.terms.color import ColorTerm
 from abs_service.tracker.terms.depth import DepthTerm
 from abs_service.tracker.terms.illumination import Active, Passive
 from abs_service.tracker.terms.misplacement import NOT_AT_ALL, Misplacement
-from abs_service.tracker.terms.outline import Outline, Rim, RimOutline, Unknown
+from abs_service.tracker.terms.outline import Outline, RimOutline, Unknown
+from abs_service.tracker.terms.rim import Rim
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.bayer import GaussianBayer

@@ -4,26 +4,21 @@ Distances say nothing about how a smooth surface slides along itself. Where it e
 between the pixels that show the object and those that look past it.
 """
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.chain import NOTHING, Step
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracker.terms.rim import FARTHEST, Rim, chain, judge, look_up
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
-from calib.jit import kernel
-
-#: What is farther from the outline than so many deviations says no more about where the rim is: the outline may be that
-#: of something else.
-FARTHEST = 4.0
 
 #: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.
 GRACE = 3.0
@@ -52,6 +47,10 @@ class Outline(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
+    def step(self) -> Step:
+        """The same for one candidate of a chain."""
+        ...
+
     def linearize(self, surface: Surface, moves: Moves) -> Linearization:
         """Normalised residuals of a population of one and their derivatives, from how the vertices move."""
         ...
@@ -70,36 +69,13 @@ class Unknown:
         """Nothing."""
         return 0.0
 
+    def step(self) -> Step:
+        """Nothing."""
+        return NOTHING
+
     def linearize(self, surface: Surface, moves: Moves) -> Linearization:
         """No rows."""
         return Linearization(np.zeros(0), np.zeros((0, moves.dimension)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rim:
-    """The outermost vertices of a mesh.
-
-    Attributes:
-        outer: their indices (k,); corners, which have no neighbour inside, are left out.
-        inner: for each, the nearest vertex (k,) inside that it shares an edge with.
-    """
-
-    outer: NDArray[np.intp]
-    inner: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, mesh: Mesh) -> "Rim":
-        """The rim of a mesh: what is on an edge of one face only."""
-        sides = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
-        edges, count = np.unique(sides, axis=0, return_counts=True)
-        outside = np.zeros(len(mesh.vertices), np.bool_)
-        outside[edges[count == 1]] = True
-        across = np.concatenate([edges, edges[:, ::-1]])
-        across = across[outside[across[:, 0]] & ~outside[across[:, 1]]]
-        length = np.linalg.norm(mesh.vertices[across[:, 0]] - mesh.vertices[across[:, 1]], axis=1)
-        across = across[np.argsort(length, kind="stable")]
-        outer, nearest = np.unique(across[:, 0], return_index=True)
-        return cls(outer.astype(np.intp), across[nearest, 1].astype(np.intp))
 
 
 class RimOutline:
@@ -139,6 +115,11 @@ class RimOutline:
         residual = self._look_up(self._points(surface))[0] / self._deviation
         return 0.5 * np.sum(np.minimum(residual**2, FARTHEST**2), axis=1)
 
+    def step(self) -> Step:
+        """The same for one candidate of a chain."""
+        looking = *self._projection.optics, self._corner, self._inwards, self._deviation
+        return Step(judge, (self._rim.outer, self._rim.inner, self._beyond, *looking))
+
     def linearize(self, surface: Surface, moves: Moves) -> Linearization:
         """Residuals of what is near the outline, and their derivatives."""
         points = self._points(surface)
@@ -148,7 +129,7 @@ class RimOutline:
         rows = np.einsum("vi,vij->vj", slopes[use], project_with_slopes(self._camera, places)[1])
         ends = self._rim.outer[use], self._rim.inner[use], self._beyond[use]
         jacobian = np.zeros((len(use), moves.dimension))
-        _chain(rows, *ends, moves.group, moves.parameters, moves.local, jacobian)
+        chain(rows, *ends, moves.group, moves.parameters, moves.local, jacobian)
         return Linearization(residual[use], jacobian)
 
     def _points(self, surface: Surface) -> NDArray[np.float32]:
@@ -190,53 +171,3 @@ def inwards(distance: NDArray[np.float32], seen: Visibility) -> NDArray[np.float
     away = np.where(beside, 0.5 - outside, inside - 0.5).astype(np.float32)
     away[seen.foreground | seen.hole] = np.nan
     return away
-
-
-@kernel
-def look_up(
-    image: NDArray[np.float32], places: NDArray[np.floating], values: NDArray[np.float64], slopes: NDArray[np.float64]
-) -> None:
-    """Values (n,) and slopes (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and at NaN."""
-    height, width = image.shape
-    for k in range(places.shape[0]):
-        values[k], slopes[k, 0], slopes[k, 1] = 1e9, 0.0, 0.0
-        u, v = places[k, 0], places[k, 1]
-        if not (u >= 0 and v >= 0 and u < width - 1 and v < height - 1):
-            continue
-        column, row = int(u), int(v)
-        f, g = u - column, v - row
-        a, b = image[row, column], image[row, column + 1]
-        c, d = image[row + 1, column], image[row + 1, column + 1]
-        if np.isnan(a) or np.isnan(b) or np.isnan(c) or np.isnan(d):
-            continue
-        values[k] = (1 - g) * ((1 - f) * a + f * b) + g * ((1 - f) * c + f * d)
-        slopes[k, 0] = (1 - g) * (b - a) + g * (d - c)
-        slopes[k, 1] = (1 - f) * (c - a) + f * (d - b)
-
-
-@kernel
-def _chain(
-    rows: NDArray[np.float64],
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-) -> None:
-    """How residuals change with the parameters (k, dim), from how they do with outer + beyond (outer − inner).
-
-    Args:
-        rows: derivatives (k, 3) by these points.
-        outer, inner, beyond: vertices and share (k,).
-        group, parameters, local: as in `Moves`.
-        jacobian: zeros before.
-    """
-    for k in range(rows.shape[0]):
-        for end in range(2):
-            v, share = (outer[k], 1.0 + beyond[k]) if end == 0 else (inner[k], 0.0 - beyond[k])
-            own = parameters[group[v]]
-            for d in range(own.size):
-                along = rows[k, 0] * local[v, 0, d] + rows[k, 1] * local[v, 1, d] + rows[k, 2] * local[v, 2, d]
-                jacobian[k, own[d]] += share * along

@@ -1,0 +1,142 @@
+"""The rim of a mesh, and where it is in an image that tells how far every pixel is from an outline."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.synthesis.projection import project
+from calib.jit import kernel
+
+#: What is farther from the outline than so many deviations says no more about where the rim is: the outline may be that
+#: of something else.
+FARTHEST = 4.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rim:
+    """The outermost vertices of a mesh.
+
+    Attributes:
+        outer: their indices (k,); corners, which have no neighbour inside, are left out.
+        inner: for each, the nearest vertex (k,) inside that it shares an edge with.
+    """
+
+    outer: NDArray[np.intp]
+    inner: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> "Rim":
+        """The rim of a mesh: what is on an edge of one face only."""
+        sides = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
+        edges, count = np.unique(sides, axis=0, return_counts=True)
+        outside = np.zeros(len(mesh.vertices), np.bool_)
+        outside[edges[count == 1]] = True
+        across = np.concatenate([edges, edges[:, ::-1]])
+        across = across[outside[across[:, 0]] & ~outside[across[:, 1]]]
+        length = np.linalg.norm(mesh.vertices[across[:, 0]] - mesh.vertices[across[:, 1]], axis=1)
+        across = across[np.argsort(length, kind="stable")]
+        outer, nearest = np.unique(across[:, 0], return_index=True)
+        return cls(outer.astype(np.intp), across[nearest, 1].astype(np.intp))
+
+
+@kernel
+def look_up(
+    image: NDArray[np.float32], places: NDArray[np.floating], values: NDArray[np.float64], slopes: NDArray[np.float64]
+) -> None:
+    """Values (n,) and slopes (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and at NaN."""
+    height, width = image.shape
+    for k in range(places.shape[0]):
+        values[k], slopes[k, 0], slopes[k, 1] = 1e9, 0.0, 0.0
+        u, v = places[k, 0], places[k, 1]
+        if not (u >= 0 and v >= 0 and u < width - 1 and v < height - 1):
+            continue
+        column, row = int(u), int(v)
+        f, g = u - column, v - row
+        a, b = image[row, column], image[row, column + 1]
+        c, d = image[row + 1, column], image[row + 1, column + 1]
+        if np.isnan(a) or np.isnan(b) or np.isnan(c) or np.isnan(d):
+            continue
+        values[k] = (1 - g) * ((1 - f) * a + f * b) + g * ((1 - f) * c + f * d)
+        slopes[k, 0] = (1 - g) * (b - a) + g * (d - c)
+        slopes[k, 1] = (1 - f) * (c - a) + f * (d - b)
+
+
+@kernel
+def chain(
+    rows: NDArray[np.float64],
+    outer: NDArray[np.intp],
+    inner: NDArray[np.intp],
+    beyond: NDArray[np.float32],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    local: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+) -> None:
+    """How residuals change with the parameters (k, dim), from how they do with outer + beyond (outer − inner).
+
+    Args:
+        rows: derivatives (k, 3) by these points.
+        outer, inner, beyond: vertices and share (k,).
+        group, parameters, local: as in `Moves`.
+        jacobian: zeros before.
+    """
+    for k in range(rows.shape[0]):
+        for end in range(2):
+            v, share = (outer[k], 1.0 + beyond[k]) if end == 0 else (inner[k], 0.0 - beyond[k])
+            own = parameters[group[v]]
+            for d in range(own.size):
+                along = rows[k, 0] * local[v, 0, d] + rows[k, 1] * local[v, 1, d] + rows[k, 2] * local[v, 2, d]
+                jacobian[k, own[d]] += share * along
+
+
+@kernel
+def judge(
+    thetas: NDArray[np.float64],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    outer: NDArray[np.intp],
+    inner: NDArray[np.intp],
+    beyond: NDArray[np.float32],
+    is_fisheye: bool,
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    corner: NDArray[np.float32],
+    inwards: NDArray[np.float32],
+    deviation: float,
+) -> float:
+    """Half the squared distances of one candidate's rim from the outline, in deviations, each bounded.
+
+    Args:
+        thetas, vertices, normals: the candidate.
+        outer, inner, beyond: vertices and share (k,).
+        is_fisheye, pose, matrix, lens, limit: as in `projection.project`.
+        corner: column and row of the image's first pixel (2,).
+        inwards: distances (rows, columns) [px].
+        deviation: of the outline [px].
+    """
+    k = outer.size
+    points, places, inverse_z = (
+        np.empty((1, 3, k), np.float32),
+        np.empty((1, k, 2), np.float32),
+        np.empty((1, k), np.float32),
+    )
+    values, slopes = np.empty(k), np.empty((k, 2))
+    for i in range(3):
+        of_vertices = vertices[0, i]
+        for v in range(k):
+            end = of_vertices[outer[v]]
+            points[0, i, v] = end + beyond[v] * (end - of_vertices[inner[v]])
+    project(points, is_fisheye, pose, matrix, lens, limit, places, inverse_z)
+    for v in range(k):
+        unknown = np.isnan(inverse_z[0, v])
+        for i in range(2):
+            places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
+    look_up(inwards, places[0], values, slopes)
+    total = 0.0
+    for v in range(k):
+        total += min((values[v] / deviation) ** 2, FARTHEST**2)
+    return 0.5 * total
