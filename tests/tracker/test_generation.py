@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, padded, propose, update
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=25, deadline=None)
@@ -14,10 +14,9 @@ few = settings(max_examples=25, deadline=None)
 def drawn(seed: int, population: int, dimension: int) -> np.ndarray:
     """Normal numbers as `propose` draws them."""
     bits = np.random.default_rng(seed).bit_generator.random_raw((population * dimension + 1) // 2).view(np.uint32)
-    z, thetas = np.empty((population, dimension), np.float32), np.empty((population, dimension))
-    axes = np.eye(dimension, dtype=np.float32)
-    propose(bits, normal_quantiles(), axes, 1.0, np.zeros(dimension), z, thetas)
-    return z
+    z, thetas = padded(np.zeros((population, dimension))), np.empty((population, dimension))
+    propose(bits, normal_quantiles(), padded(np.eye(dimension)), 1.0, np.zeros(dimension), z, thetas)
+    return z[:population, :dimension]
 
 
 def test_random_bits_become_normal_numbers():
@@ -36,8 +35,9 @@ def test_candidates_are_the_mean_and_steps_along_the_axes(seed):
     population, n = (int(size) for size in generator.integers(1, 20, 2))
     axes, mean, sigma = generator.normal(size=(n, n)).astype(np.float32), generator.normal(size=n), generator.random()
     bits = generator.integers(0, 2**32, population * n, dtype=np.uint32)
-    z, thetas = np.empty((population, n), np.float32), np.empty((population, n))
-    propose(bits, normal_quantiles(), axes, sigma, mean, z, thetas)
+    rows, thetas = padded(np.zeros((population, n))), np.empty((population, n))
+    propose(bits, normal_quantiles(), padded(axes), sigma, mean, rows, thetas)
+    z = rows[:population, :n]
     place = bits / 2**32 * (len(normal_quantiles()) - 1)
     expected = np.interp(place, np.arange(len(normal_quantiles())), normal_quantiles()).reshape(population, n)
     np.testing.assert_allclose(z, expected, atol=2e-6)
@@ -66,10 +66,11 @@ def test_a_generation_teaches_what_the_tutorial_says(seed):
     kept = 1 - c_1 - c_mu * w.sum() + (not usual) * c_1 * c_c * (2 - c_c)
     wanted = kept * learnt + c_1 * np.outer(p_c, p_c) + c_mu * (ranked.T * shares) @ ranked
     mean_wanted = mean + 0.3 * best @ axes
-    sigma = update(z, axes, costs, w, constants.rates, g, 0.3, mean, paths, learnt)
+    rows = padded(learnt)
+    sigma = update(padded(z), padded(axes), costs, w, constants.rates, g, 0.3, mean, paths, rows)
     np.testing.assert_allclose(mean, mean_wanted, atol=1e-5)
     np.testing.assert_allclose(paths, [p_sigma, p_c], atol=1e-5)
-    np.testing.assert_allclose(np.tril(learnt), np.tril(wanted), atol=1e-4)
+    np.testing.assert_allclose(np.tril(rows[:n, :n]), np.tril(wanted), atol=1e-4)
     assert np.isclose(sigma, 0.3 * np.exp(min(1.0, c_sigma / d_sigma * (length - 1))))
 
 
@@ -83,18 +84,18 @@ def test_new_coordinates_describe_the_same_covariance_path_and_axes(seed):
     learnt = np.eye(n) + 0.02 * change @ change.T
     path, axes = generator.normal(size=n), (metric @ factor).T.astype(np.float32)
     covariance, place = factor @ learnt @ factor.T, factor @ path
-    lower = np.tril(learnt).astype(np.float32)
-    absorb(lower, factor, path, axes)
-    np.testing.assert_array_equal(lower, np.eye(n))
+    lower, rows = padded(np.tril(learnt)), padded(axes)
+    absorb(lower, factor, path, rows)
+    np.testing.assert_array_equal(lower, padded(np.eye(n)))
     np.testing.assert_allclose(factor @ factor.T, covariance, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(np.triu(factor, 1), 0, atol=1e-12)
     np.testing.assert_allclose(factor @ path, place, rtol=1e-4, atol=1e-4)
-    np.testing.assert_allclose(axes, (metric @ factor).T, rtol=1e-3, atol=1e-4)
+    np.testing.assert_allclose(rows, padded((metric @ factor).T), rtol=1e-3, atol=1e-4)
 
 
 def test_what_rounding_made_indefinite_keeps_the_deviations_of_the_axes():
-    learnt = np.array([[4, 0], [3, 1]], np.float32)
-    factor, path, axes = np.eye(2), np.ones(2), np.eye(2, dtype=np.float32)
+    learnt = padded(np.array([[4.0, 0.0], [3.0, 1.0]]))
+    factor, path, axes = np.eye(2), np.ones(2), padded(np.eye(2))
     absorb(learnt, factor, path, axes)
     np.testing.assert_allclose(factor, np.diag([2, 1]))
     np.testing.assert_allclose(path, [0.5, 1])

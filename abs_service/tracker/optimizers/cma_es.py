@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, padded, propose, update
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,10 @@ class CmaEs:
         self._generation = 0
         self._gap = max(1, int(LEARNT / (self._constants.rates[2] + self._constants.rates[3])))
         # Single precision takes half the time, and nobody needs to know a step better.
-        self._z = np.zeros((population, dimension), np.float32)
+        self._shape = population, dimension
+        self._z = padded(np.zeros(self._shape))
         self._factor = np.eye(dimension)
-        self._learnt, self._axes = np.eye(dimension, dtype=np.float32), np.eye(dimension, dtype=np.float32)
+        self._learnt, self._axes = padded(self._factor), padded(self._factor)
 
     @property
     def deviation(self) -> float:
@@ -104,12 +105,12 @@ class CmaEs:
         factor = np.asarray(np.linalg.cholesky(covariance), np.float64)
         self._paths[1] = np.linalg.solve(factor, self._factor @ self._paths[1])
         self._factor = factor
-        self._axes = np.matmul(factor.T, metric.T).astype(np.float32)
+        self._axes = padded(np.matmul(factor.T, metric.T))
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
-        bits = self._bits.random_raw((self._z.size + 1) // 2).view(np.uint32)
-        thetas = np.empty(self._z.shape)
+        thetas = np.empty(self._shape)
+        bits = self._bits.random_raw((thetas.size + 1) // 2).view(np.uint32)
         propose(bits, normal_quantiles(), self._axes, self._sigma, self._mean, self._z, thetas)
         return thetas
 
