@@ -8,7 +8,7 @@ cache when the next one reads it, and the interpreter calls once for all.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +31,10 @@ class Step:
     arguments: tuple[Any, ...] = ()
 
 
-@runtime_checkable
-class Compiled(Protocol):
-    """A part that can be a step of a chain; all others are asked for the whole population at once."""
-
-    def step(self) -> Step | None:
-        """What it does with the observation in hand; none where something that it consists of cannot be a step."""
-        ...
-
-
 def step_of(part: object) -> Step | None:
-    """A part's step, if it has one."""
-    return part.step() if isinstance(part, Compiled) else None
+    """What a part does with the observation in hand, if it can tell it as a step, which not every part needs to."""
+    step = getattr(part, "step", None)
+    return step() if step else None
 
 
 class Chain:

@@ -1,7 +1,7 @@
 """What a synthesis is: samples of deformed meshes as a sensor would see them, and images that fit them."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,18 @@ class Synthesis:
     attributes: NDArray[np.float32]
 
 
+class Sight(NamedTuple):
+    """What a view sees of one candidate of a chain.
+
+    Attributes:
+        see: from vertices and normals to pixels and distances, as in `Synthesis`.
+        look: from vertices and pixels to attributes.
+    """
+
+    see: Step
+    look: Step
+
+
 class View(Protocol):
     """A mesh through one camera.
 
@@ -50,6 +62,10 @@ class View(Protocol):
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes."""
+        ...
+
+    def sight(self) -> Sight | None:
+        """The same for one candidate of a chain; none unless the samples are the vertices."""
         ...
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
@@ -83,19 +99,6 @@ class View(Protocol):
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
         """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
-        ...
-
-
-@runtime_checkable
-class CompiledView(View, Protocol):
-    """A view that can be a part of steps of a chain, since its samples are the vertices."""
-
-    def step(self) -> Step:
-        """From vertices and normals of one candidate to its pixels and distances, as in `Synthesis`."""
-        ...
-
-    def looks(self) -> Step:
-        """From vertices and pixels of one candidate to its attributes, as in `Synthesis`."""
         ...
 
 

@@ -117,6 +117,9 @@ class DenseView:
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
+    def sight(self) -> None:
+        """None: which samples there are depends on the candidate."""
+
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: the image tells better than the lattice how they change."""
         samples, _ = self._render(surface)

@@ -9,7 +9,7 @@ from abs_service.observation import Observation
 from abs_service.tracker.chain import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import Synthesis, View
+from abs_service.tracker.synthesis.base import Sight, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sampling import lens_kind, sampler, see
@@ -120,13 +120,10 @@ class SparseView:
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
         return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
 
-    def step(self) -> Step:
-        """Pixels and distances of vertices and normals."""
-        return Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
-
-    def looks(self) -> Step:
-        """Attributes at the centres of the pixels, of vertices and pixels."""
-        return self._slopes.step(self._attributes)
+    def sight(self) -> Sight:
+        """What one candidate of a chain shows."""
+        seeing = Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
+        return Sight(seeing, self._slopes.step(self._attributes))
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """As where the surface was expected."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.images import ChannelImage, Image
 from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.channel_cost import CHANNEL, INVERSE, VALUE, channel_cost, copy, fill
@@ -104,9 +104,8 @@ class ChannelTerm:
 
     def step(self) -> Step | None:
         """The same for one candidate of a chain."""
-        if not isinstance(self._view, CompiledView):
-            return None
-        return judging(self._view, channel_cost, self._measured, self._illumination.step())
+        sight = self._view.sight()
+        return judging(sight, channel_cost, self._measured, self._illumination.step()) if sight else None
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.images import ColorImage, Image
 from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.comparing import judging
@@ -87,7 +87,8 @@ class ColorTerm:
 
     def step(self) -> Step | None:
         """The same for one candidate of a chain."""
-        return judging(self._view, _color_cost, self._measured) if isinstance(self._view, CompiledView) else None
+        sight = self._view.sight()
+        return judging(sight, _color_cost, self._measured) if sight else None
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:

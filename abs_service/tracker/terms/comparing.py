@@ -8,24 +8,24 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.chain import Step
 from abs_service.tracker.synthesis import centers, sampling
-from abs_service.tracker.synthesis.base import CompiledView
+from abs_service.tracker.synthesis.base import Sight
 from abs_service.tracker.terms.illumination import as_it_is
 from calib.jit import composed, kernel
 
 AS_IT_IS = Step(as_it_is)
 
 
-def judging(view: CompiledView, cost: Callable[..., None], measured: tuple[Any, ...], light: Step = AS_IT_IS) -> Step:
-    """A judging step: what the view sees, in this light, is compared with what was measured.
+def judging(sight: Sight, cost: Callable[..., None], measured: tuple[Any, ...], light: Step = AS_IT_IS) -> Step:
+    """A judging step: what is seen, in this light, is compared with what was measured.
 
     Args:
-        view: the view.
+        sight: how it is seen.
         cost: a kernel that takes pixels (population, n), attributes (population, n, channels), what was measured, and
             an array for its results (population,).
         measured: what it takes.
         light: from attributes, vertices and normals of a candidate to how the attributes look.
     """
-    seeing, looking = view.step(), view.looks()
+    seeing, looking = sight
     parts = {"see": seeing.kernel, "look": looking.kernel, "shine": light.kernel, "compare": cost}
     first, second, third = len(seeing.arguments), len(looking.arguments), len(light.arguments)
     kernel = composed(_judge, **parts, SEEN=first, LOOKED=first + second, LIT=first + second + third)

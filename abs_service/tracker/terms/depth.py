@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.chain import Step, both
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import CompiledView, Synthesizer
+from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, write_constants
@@ -118,10 +118,10 @@ class DepthTerm:
 
     def step(self) -> Step | None:
         """The same for one candidate of a chain."""
-        if not isinstance(self._view, CompiledView):
+        sight, bounds = self._view.sight(), (self._bounds.inlier, self._bounds.outlier)
+        if sight is None:
             return None
-        seeing, bounds = self._view.step(), (self._bounds.inlier, self._bounds.outlier)
-        measured = Step(composed(judge, see=seeing.kernel), (self._texture, *bounds, *seeing.arguments))
+        measured = Step(composed(judge, see=sight.see.kernel), (self._texture, *bounds, *sight.see.arguments))
         return both(measured, self._outline.step())
 
     def linearize(self, surface: Surface, moves: Moves) -> Together:
