@@ -6,6 +6,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.arc import SMALL
 from abs_service.tracker.models.base import ModelError
 from calib.jit import kernel
 
@@ -129,3 +130,53 @@ def roll(
         sine = sine * u + series[0, i]
         versine = versine * u + series[1, i]
     return p * sine - p, p * t * versine, -square * versine, t * sine
+
+
+@kernel
+def slopes(
+    parameters: NDArray[np.float64],
+    height: float,
+    full_height: float,
+    sides: NDArray[np.float64],
+    points: NDArray[np.float64],
+    rotation: NDArray[np.float64],
+    per_bend: float,
+    half: float,
+    result: NDArray[np.float64],
+) -> None:
+    """Derivatives of places on a sheet by the bends of its sides and by its height map, none beyond their range.
+
+    At a distance q from the centre, an arc of curvature κ rises by q (1 − cos κq)/κq and reaches q sin κq/κq.
+
+    Args:
+        parameters: of the bends (8,).
+        height, full_height: parameter of the height map g, and the end of its range; heights z become z + g z²/half.
+        sides: see `SIDES`.
+        points: vertices on the flat sheet (2, n) [m].
+        rotation: from the sheet, z pointing away, to where the derivatives are wanted (3, 3).
+        per_bend: curvature at a parameter of 1 [1/m].
+        half: half the sheet's long side [m].
+        result: the first nine columns (n, 3, 9…) are written.
+    """
+    g, moves = min(max(height, -full_height), full_height), np.empty((3, 9))
+    for v in range(points.shape[1]):
+        rise, moves[:] = 0.0, 0.0
+        for i in range(8):
+            q = sides[i, 0] * points[0, v] + sides[i, 1] * points[1, v]
+            curvature = per_bend * min(max(parameters[i], -FULL), FULL)
+            t = curvature * q
+            if q <= 0:
+                continue
+            small = abs(t) < SMALL  # see `arc`
+            sine, versine = np.sin(t), 1 - np.cos(t)
+            rise += q * (0.5 * t if small else versine / t)
+            scale = per_bend * q * q if abs(parameters[i]) <= FULL else 0.0
+            ahead = -t / 3 if small else (1 - versine - sine / t) / t
+            moves[0, i], moves[1, i] = scale * ahead * sides[i, 0], scale * ahead * sides[i, 1]
+            moves[2, i] = -scale * (0.5 - 0.125 * t * t if small else (sine - versine / t) / t)
+        moves[2, :8] *= 1 + 2 * g / half * rise
+        moves[2, 8] = -rise * rise / half if g == height else 0.0
+        for row in range(3):
+            for i in range(9):
+                total = rotation[row, 0] * moves[0, i] + rotation[row, 1] * moves[1, i]
+                result[v, row, i] = total + rotation[row, 2] * moves[2, i]

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.chain import Step
 from abs_service.tracker.models import bends
-from abs_service.tracker.models.arc import arc
 from abs_service.tracker.models.base import BOARD, Moves, Surface
-from abs_service.tracker.models.bends import bend, roll
+from abs_service.tracker.models.bends import bend, roll, slopes
 from abs_service.tracker.models.placing import place
 from abs_service.tracker.models.tiles import LANES, TILE, write
 from abs_service.tracker.rectangle import find_sheet
@@ -91,7 +90,7 @@ class FlexPad:
     def __init__(self, sheet: Sheet, vertices: int, least_radius: float, bend_deviation: float):
         mesh = sheet.mesh(vertices)
         points = pose.transform(pose.inverse(sheet.T_rp), mesh.vertices)[:, :2]
-        self._points = points.T
+        self._points = np.ascontiguousarray(points.T)
         self._padded = np.ascontiguousarray(np.pad(self._points, ((0, 0), (0, LANES))), np.float32)
         self._half = 0.5 * sheet.width
         self._rotation, self._center = sheet.T_rp[:3, :3], sheet.T_rp[:3, 3]
@@ -125,26 +124,16 @@ class FlexPad:
         """Derivatives (n, 3, 15) of the vertices at theta (15,), by bends and g beyond their range none."""
         turn = pose.from_rotation_vector(theta[ROTATION], (0, 0, 0))[:3, :3]
         turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
-        shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
-        on_sheet = turn @ self._rotation @ self._slopes(theta[BENDS], theta[HEIGHT])
-        return np.concatenate([on_sheet, pose.turning(theta[ROTATION], turned), shifts], axis=2)
+        result = np.empty((len(turned), 3, DIMENSION))
+        sheet = self._points, np.matmul(turn, self._rotation), self._per_bend, self._half
+        slopes(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
+        result[:, :, ROTATION] = pose.turning(theta[ROTATION], turned)
+        result[:, :, TRANSLATION] = np.eye(3)
+        return result
 
     def moves(self, theta: NDArray[np.float64]) -> Moves:
         """As `jacobian`: every parameter moves every vertex."""
         return Moves.full(self.jacobian(theta))
-
-    def _slopes(self, bend: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-        """Derivatives (n, 3, 9) of places on the sheet, z pointing away, by bends (8,) and height map."""
-        bounded, g = np.clip(bend, -bends.FULL, bends.FULL), np.clip(height, -FULL_HEIGHT, FULL_HEIGHT)
-        q = np.maximum(bends.SIDES @ self._points, 0.0)
-        end, slope = arc((self._per_bend * bounded)[:, None] * q)
-        rise = np.sum(q * end.imag, axis=0)
-        by_bends = np.where(bounded == bend, self._per_bend, 0.0)[:, None] * q**2 * slope
-        result = np.zeros((len(rise), 3, 9))
-        result[:, :2, :8] = by_bends.real.T[:, None] * bends.SIDES.T
-        result[:, 2, :8] = -(by_bends.imag * (1 + 2 * g / self._half * rise)).T
-        result[:, 2, 8] = np.where(g == height, -(rise**2) / self._half, 0.0)
-        return result
 
 
 def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> NDArray[np.float64]:
