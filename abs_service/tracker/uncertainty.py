@@ -51,7 +51,8 @@ def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.floa
     result = np.empty((len(moves.local), 3, 3))
     for group, own in enumerate(moves.parameters):
         vertices = np.flatnonzero(moves.group == group)
-        local = moves.local[vertices]
+        in_a_row = vertices.size and vertices[-1] - vertices[0] == vertices.size - 1
+        local = moves.local[slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices]  # a slice copies nothing
         # One product of matrices for all vertices: n small ones take several times as long.
         weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
         _multiply(weighted, local, vertices, result)
