@@ -1,6 +1,6 @@
 """What whole frames cost at the paper's full budgets and with `hybrid`, and which share of it is the search's own.
 
-    NUMBA_NUM_THREADS=2 python -m tests.benchmarks.rates --frames 10
+    NUMBA_NUM_THREADS=2 python -m tests.benchmarks.rates --frames 40
 
 prints JSON. Frames are those of the simulated sheet, from frame set to estimate; the depth camera has 176 × 144 pixels,
 the colour camera 320 × 240. The minimum of the frames is told: machines, and hours on one machine, differ. Where
@@ -137,7 +137,7 @@ def measure(case: Case, frames: int) -> dict[str, float]:
 def main(arguments: list[str]) -> None:
     """Prints {part: {ms, cpu_ms, search_share}}."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=10)
+    parser.add_argument("--frames", type=int, default=40)
     frames = parser.parse_args(arguments).frames
     print(json.dumps({case.part: measure(case, frames) for case in cases(1.0)}, indent=1))
 

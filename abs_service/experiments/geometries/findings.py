@@ -66,8 +66,9 @@ _PRIORS = (
 )
 _MESHES = (
     "Root mean square errors over the same frames. At the rim, pixels mix the sheet with the wall. A vertex for every "
-    "pixel (5000) reads all of them; the stretch prior's deviation is 0.1 then, because the same stretch is counted on "
-    "eight times as many edges. The paper's search takes up to 1000 generations of 32 candidates a frame."
+    "pixel (5000) reads all of them; the stretch prior's deviation is √(5000 / 600) times as large then, because the "
+    "same stretch is counted on so many edges more. The paper's search takes up to 1000 generations of 32 candidates a "
+    "frame."
 )
 
 
