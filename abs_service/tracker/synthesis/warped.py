@@ -154,7 +154,7 @@ class _SharedView:
         return Synthesis(common.pixel, common.distance, self._attributes)
 
     def sight(self) -> None:
-        """None: which samples there are depends on the candidate."""
+        """None: one synthesis serves all sensors, and in a chain each would make its own."""
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
