@@ -38,13 +38,14 @@ class Patches:
         spans = np.subtract(weights.shape, degree)
         of_u, of_w = (spline.power_form(points, degree) for points in weights.shape)
         powers = np.einsum("ilp,jmq->ijpqlm", of_u, of_w).reshape(*control.shape, -1)
-        self._powers = powers * weights.ravel()[control][:, :, None]
+        powers *= weights.ravel()[control][:, :, None]
+        self._powers = np.pad(powers, ((0, 0), (0, 0), (0, -powers.shape[2] % LANES))).astype(np.float32)
         self._control = control
         self._start = np.searchsorted(span, np.arange(len(control) + 1)).astype(np.int64)
         evaluate = composed(_evaluate, _polynomial=composed(_polynomial, ORDERS=degree + 1))
         self._deform = composed(_deform, _evaluate=evaluate)
         place = np.clip([u, w], 0, 1) * spans[:, None] - np.divmod(span, spans[1]) - 0.5
-        denominator = _polynomials(self._powers.sum(axis=1).reshape(-1, degree + 1, degree + 1)[span], *place)
+        denominator = _polynomials(powers.sum(axis=1).reshape(-1, degree + 1, degree + 1)[span], *place)
         value, along_u, along_w = denominator
         self._vertices = np.zeros((6, len(u) + LANES), np.float32)
         self._vertices[:, : len(u)] = [*place, offset, 1 / value, along_u, along_w]
@@ -91,29 +92,32 @@ ORDERS = 3
 def _find_coefficients(
     control: NDArray[np.float64],
     span_control: NDArray[np.int32],
-    powers: NDArray[np.float64],
+    powers: NDArray[np.float32],
     coefficients: NDArray[np.float32],
 ) -> None:
-    """Coefficients (spans, 3, q) of x, y and z, in double precision: they are differences.
+    """Coefficients (spans, 3, q…) of x, y and z from the first control point on.
+
+    From there, all are so near that single precision does: rounding moves a vertex by less than it does afterwards.
 
     Args:
         control: one candidate's parameters (3 · control points,).
         span_control: control points of every span (spans, q).
-        powers: each control point's share of every coefficient (spans, q, q).
+        powers: each control point's share of every coefficient (spans, q, q…), zeros up to a multiple of `LANES`.
         coefficients: results.
     """
-    sums = np.empty((3, powers.shape[2]))
-    x, y, z = sums[0], sums[1], sums[2]
+    lanes = np.uintp(powers.shape[2] // LANES * LANES)
+    coefficients[:] = 0
     for s in range(powers.shape[0]):
-        sums[:] = 0
+        x, y, z = coefficients[s, 0], coefficients[s, 1], coefficients[s, 2]
         for p in range(powers.shape[1]):
             first, shares = 3 * span_control[s, p], powers[s, p]
-            px, py, pz = control[first], control[first + 1], control[first + 2]
-            for q in range(shares.size):
+            px = np.float32(control[first] - control[0])
+            py = np.float32(control[first + 1] - control[1])
+            pz = np.float32(control[first + 2] - control[2])
+            for q in range(lanes):
                 x[q] += shares[q] * px
                 y[q] += shares[q] * py
                 z[q] += shares[q] * pz
-        coefficients[s] = sums
 
 
 @kernel
@@ -137,6 +141,7 @@ def _polynomial(
 @kernel
 def _evaluate(
     coefficients: NDArray[np.float32],
+    origin: NDArray[np.float64],
     start: NDArray[np.int64],
     places: NDArray[np.float32],
     vertices: NDArray[np.float32],
@@ -145,12 +150,14 @@ def _evaluate(
     """Eq. 8 for a candidate.
 
     Args:
-        coefficients: of the numerator's x, y and z (spans, 3, (d + 1)²), powers of w within those of u.
+        coefficients: of the numerator's x, y and z (spans, 3, (d + 1)²…), powers of w within those of u.
+        origin: from which they count (3…) [m].
         start: first vertex of every span, and the number of vertices, (spans + 1,).
         places: u, w, offset, 1 / denominator and its derivatives by u and by w (6, n + `LANES`).
         vertices, normals: results (3, n).
     """
     one, n, s = np.float32(1), vertices.shape[1], 0
+    ox, oy, oz = np.float32(origin[0]), np.float32(origin[1]), np.float32(origin[2])
     result = np.empty((6, TILE + LANES), np.float32)
     for first in range(0, n, TILE):
         last = min(first + TILE, n)
@@ -173,7 +180,7 @@ def _evaluate(
                 a, b, d = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
                 inverse = one / np.sqrt(a * a + b * b + d * d + np.float32(1e-20))
                 a, b, d = a * inverse, b * inverse, d * inverse
-                x, y, z = x + a * offset[v], y + b * offset[v], z + d * offset[v]
+                x, y, z = ox + x + a * offset[v], oy + y + b * offset[v], oz + z + d * offset[v]
                 at = shift + v
                 result[0, at], result[1, at], result[2, at] = x, y, z
                 result[3, at], result[4, at], result[5, at] = a, b, d
@@ -185,7 +192,7 @@ def _evaluate(
 def _deform(
     thetas: NDArray[np.float64],
     span_control: NDArray[np.int32],
-    powers: NDArray[np.float64],
+    powers: NDArray[np.float32],
     start: NDArray[np.int64],
     places: NDArray[np.float32],
     vertices: NDArray[np.float32],
@@ -195,14 +202,14 @@ def _deform(
     for k in prange(thetas.shape[0]):
         coefficients = np.empty((powers.shape[0], 3, powers.shape[2]), np.float32)
         _find_coefficients(thetas[k], span_control, powers, coefficients)
-        _evaluate(coefficients, start, places, vertices[k], normals[k])
+        _evaluate(coefficients, thetas[k], start, places, vertices[k], normals[k])
 
 
 @kernel
 def _step(
     thetas: NDArray[np.float64],
     span_control: NDArray[np.int32],
-    powers: NDArray[np.float64],
+    powers: NDArray[np.float32],
     start: NDArray[np.int64],
     places: NDArray[np.float32],
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
