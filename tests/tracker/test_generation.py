@@ -13,7 +13,7 @@ few = settings(max_examples=25, deadline=None)
 
 def drawn(seed: int, population: int, dimension: int) -> np.ndarray:
     """Normal numbers as `propose` draws them."""
-    bits = np.random.default_rng(seed).bit_generator.random_raw((population * dimension + 1) // 2).view(np.uint32)
+    bits = np.random.default_rng(seed).bit_generator.random_raw((population * dimension + 3) // 4).view(np.uint16)
     z, thetas = padded(np.zeros((population, dimension))), np.empty((population, dimension))
     propose(bits, normal_quantiles(), padded(np.eye(dimension)), 1.0, np.zeros(dimension), z, thetas)
     return z[:population, :dimension]
@@ -34,11 +34,11 @@ def test_candidates_are_the_mean_and_steps_along_the_axes(seed):
     generator = np.random.default_rng(seed)
     population, n = (int(size) for size in generator.integers(1, 20, 2))
     axes, mean, sigma = generator.normal(size=(n, n)).astype(np.float32), generator.normal(size=n), generator.random()
-    bits = generator.integers(0, 2**32, population * n, dtype=np.uint32)
+    bits = generator.integers(0, 2**16, population * n, dtype=np.uint16)
     rows, thetas = padded(np.zeros((population, n))), np.empty((population, n))
     propose(bits, normal_quantiles(), padded(axes), sigma, mean, rows, thetas)
     z = rows[:population, :n]
-    place = bits / 2**32 * (len(normal_quantiles()) - 1)
+    place = (bits + 0.5) / 2**16 * (len(normal_quantiles()) - 1)
     expected = np.interp(place, np.arange(len(normal_quantiles())), normal_quantiles()).reshape(population, n)
     np.testing.assert_allclose(z, expected, atol=2e-6)
     np.testing.assert_allclose(thetas, mean + sigma * z.astype(np.float64) @ axes, atol=1e-5)

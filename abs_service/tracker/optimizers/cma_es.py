@@ -110,7 +110,7 @@ class CmaEs:
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
         thetas = np.empty(self._shape)
-        bits = self._bits.random_raw((thetas.size + 1) // 2).view(np.uint32)
+        bits = self._bits.random_raw((thetas.size + 3) // 4).view(np.uint16)
         propose(bits, normal_quantiles(), self._axes, self._sigma, self._mean, self._z, thetas)
         return thetas
 

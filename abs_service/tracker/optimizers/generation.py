@@ -55,7 +55,7 @@ def padded(matrix: NDArray[np.floating]) -> NDArray[np.float32]:
 
 @kernel
 def propose(
-    bits: NDArray[np.uint32],
+    bits: NDArray[np.uint16],
     quantiles: NDArray[np.float32],
     axes: NDArray[np.float32],
     sigma: float,
@@ -66,7 +66,7 @@ def propose(
     """Draws a population.
 
     The library's normal numbers would take as long as all the rest of a generation. Between two quantiles, whose
-    probability is all that counts, the density is taken to be level; nobody needs to know a random number better.
+    probability is all that counts, there are 16 numbers that are equally likely; nobody needs to know one better.
 
     Args:
         bits: random (population · dim,), or more.
@@ -80,9 +80,9 @@ def propose(
     for k in range(population):
         z_k, own = z[k], bits[k * n :]
         for i in range(np.uintp(n)):
-            place, between = np.uintp(own[i] >> np.uint32(20)), np.int32(own[i] & np.uint32(0xFFFFF))
+            place, between = np.uintp(own[i] >> np.uint16(4)), np.int32(own[i] & np.uint16(15))
             low, high = quantiles[place], quantiles[place + np.uintp(1)]
-            z_k[i] = low + np.float32(between) * np.float32(2.0**-20) * (high - low)
+            z_k[i] = low + (np.float32(between) + np.float32(0.5)) * np.float32(0.0625) * (high - low)
         step[:] = 0
         for i in range(0, n, ROWS):  # four at a time: what is added up is read and written less often
             a, b, c, d = z_k[i], z_k[i + 1], z_k[i + 2], z_k[i + 3]
