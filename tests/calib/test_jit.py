@@ -1,0 +1,100 @@
+"""Kernels are put together from others, and found again in the compiler's cache by what they are made from."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from calib.jit import composed, kernel
+
+FACTOR = 2
+
+
+@kernel
+def doubled(x: float) -> float:
+    """Twice x."""
+    return FACTOR * x
+
+
+@kernel
+def squared(x: float) -> float:
+    """x squared."""
+    return x * x
+
+
+inner = doubled
+
+
+@kernel
+def after(x: float) -> float:
+    """One more than what another kernel says."""
+    return inner(x) + 1
+
+
+@kernel
+def after_too(x: float) -> float:
+    """The same code, said otherwise, and somewhere else."""
+    return inner(x) + 1
+
+
+def digest(function: object) -> str:
+    return str(getattr(function, "digest"))  # noqa: B009
+
+
+def test_a_composed_kernel_calls_what_it_is_given() -> None:
+    assert after(3.0) == 7
+    assert composed(after, inner=squared)(3.0) == 10
+    assert composed(after, inner=composed(doubled, FACTOR=5))(3.0) == 16
+    assert after(3.0) == 7
+
+
+def test_the_same_composition_is_made_once() -> None:
+    assert composed(after, inner=squared) is composed(after, inner=squared)
+    assert composed(after, inner=squared) is not after
+
+
+def test_what_is_compiled_is_named_by_all_that_it_is_made_from() -> None:
+    variants = [after, composed(after, inner=squared), composed(after, inner=composed(doubled, FACTOR=5))]
+    assert len({digest(one) for one in variants}) == 3
+    assert digest(composed(after, inner=doubled)) == digest(after) == digest(after_too)
+
+
+PARTS = """
+from calib.jit import kernel
+
+@kernel
+def part(x: float) -> float:
+    return x + {number}
+"""
+
+WHOLE = """
+from calib.jit import kernel
+from parts import part
+
+@kernel
+def whole(x: float) -> float:
+    return 2 * part(x)
+
+print(whole(1.0), sum(whole._compiled.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.skipif(os.environ.get("NUMBA_DISABLE_JIT", "0") != "0", reason="nothing is compiled")
+def test_what_was_compiled_is_found_again_unless_something_that_it_calls_has_changed(tmp_path: Path) -> None:
+    (tmp_path / "whole.py").write_text(WHOLE)
+
+    def run(number: int) -> list[str]:
+        (tmp_path / "parts.py").write_text(PARTS.format(number=number))
+        paths = f"{tmp_path}{os.pathsep}{Path(__file__).parents[2]}"
+        environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
+        done = subprocess.run(
+            [sys.executable, "whole.py"], cwd=tmp_path, env=environment, check=True, capture_output=True
+        )
+        return done.stdout.decode().split()
+
+    assert run(1) == ["4.0", "0"]
+    assert run(1) == ["4.0", "1"]
+    assert run(5) == ["12.0", "0"]
+    assert run(1) == ["4.0", "1"]
