@@ -19,6 +19,7 @@ from abs_service.commands import plans
 from abs_service.experiments.recordings.agreement import Agreement, agreement
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking import Tracking
+from abs_service.warmup import warm_up
 from calib.camera import Camera
 from drivers.frame import FrameSet, Kind
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
@@ -80,6 +81,8 @@ class Toy:
         self._rig = plans.rig(self._settings, TRACKER, images.cameras)
         synchroniser = plans.synchroniser(self._settings, TRACKER, self._rig.sensors.values())
         sets = [one for frame in images.frames() for one in synchroniser.add(frame)] + list(synchroniser.flush())
+        # As the service does before its first image; compiling is no part of a frame's time.
+        warm_up(plans.noises(self._settings, TRACKER), plans.plan(self._settings, TRACKER))
         self.moments = [_moment(one, _mask(mask.path)) for one, mask in zip(sets, masks, strict=True)]
 
     @cached_property
