@@ -100,37 +100,9 @@ def _sum_squares(
     factor: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over edges of the squared relative change of length times a factor, for every member of the population.
-
-    Args:
-        vertices: (population, 3, n) [m].
-        runs: first vertex, first other end and length in vertices, a multiple of `_LANES` (runs, 3).
-        singles: edges in no run (k, 2).
-        inverse_lengths: of the runs' edges, 0 where there is none, and then of the singles [1/m].
-        factor: what the sum is multiplied by.
-        out: (population,).
-    """
-    one, none = np.float32(1), np.float32(0)
+    """What `_sum_of_squares` says of every member of a population, (population, 3, n) [m]."""
     for k in prange(vertices.shape[0]):
-        place, total, done = vertices[k], none, np.uintp(0)
-        for r in range(runs.shape[0]):
-            # Unsigned: else each is tested for being negative. A sum of its own: runs need not wait for each other.
-            i, j, length = np.uintp(runs[r, 0]), np.uintp(runs[r, 1]), np.uintp(runs[r, 2] // _LANES * _LANES)
-            part = none
-            for e in range(length):
-                a, b = i + e, j + e
-                x, y, z = place[0, a] - place[0, b], place[1, a] - place[1, b], place[2, a] - place[2, b]
-                scale = inverse_lengths[done + e]
-                change = np.sqrt(x * x + y * y + z * z) * scale - (one if scale > none else none)
-                part += change * change
-            total += part
-            done += length
-        for e in range(np.uintp(singles.shape[0])):
-            i, j = np.uintp(singles[e, 0]), np.uintp(singles[e, 1])
-            x, y, z = place[0, i] - place[0, j], place[1, i] - place[1, j], place[2, i] - place[2, j]
-            change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[done + e] - one
-            total += change * change
-        out[k] = factor * total
+        out[k] = _sum_of_squares(vertices[k], runs, singles, inverse_lengths, factor)
 
 
 @kernel
@@ -144,6 +116,43 @@ def _judge(
     factor: float,
 ) -> float:
     """See `EdgeRuns.step`."""
-    out = np.empty(1)
-    _sum_squares(vertices, runs, singles, inverse_lengths, factor, out)
-    return out[0]
+    return _sum_of_squares(vertices[0], runs, singles, inverse_lengths, factor)
+
+
+@kernel
+def _sum_of_squares(
+    place: NDArray[np.float32],
+    runs: NDArray[np.int64],
+    singles: NDArray[np.int32],
+    inverse_lengths: NDArray[np.float32],
+    factor: float,
+) -> float:
+    """Sum over edges of the squared relative change of length times a factor.
+
+    Args:
+        place: vertices (3, n) [m].
+        runs: first vertex, first other end and length in vertices, a multiple of `_LANES` (runs, 3).
+        singles: edges in no run (k, 2).
+        inverse_lengths: of the runs' edges, 0 where there is none, and then of the singles [1/m].
+        factor: what the sum is multiplied by.
+    """
+    one, none = np.float32(1), np.float32(0)
+    total, done = none, np.uintp(0)
+    for r in range(runs.shape[0]):
+        # Unsigned: else each is tested for being negative. A sum of its own: runs need not wait for each other.
+        i, j, length = np.uintp(runs[r, 0]), np.uintp(runs[r, 1]), np.uintp(runs[r, 2] // _LANES * _LANES)
+        part = none
+        for e in range(length):
+            a, b = i + e, j + e
+            x, y, z = place[0, a] - place[0, b], place[1, a] - place[1, b], place[2, a] - place[2, b]
+            scale = inverse_lengths[done + e]
+            change = np.sqrt(x * x + y * y + z * z) * scale - (one if scale > none else none)
+            part += change * change
+        total += part
+        done += length
+    for e in range(np.uintp(singles.shape[0])):
+        i, j = np.uintp(singles[e, 0]), np.uintp(singles[e, 1])
+        x, y, z = place[0, i] - place[0, j], place[1, i] - place[1, j], place[2, i] - place[2, j]
+        change = np.sqrt(x * x + y * y + z * z) * inverse_lengths[done + e] - one
+        total += change * change
+    return factor * float(total)

@@ -44,8 +44,8 @@ class ShapePrior:
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
-        out = np.zeros(len(thetas))
-        _add_squares(thetas, self._rest, self._prior, out)
+        out = np.empty(len(thetas))
+        _half_squares(thetas, self._rest, self._prior, out)
         return out
 
     def step(self) -> Step:
@@ -98,7 +98,7 @@ class MotionPrior:
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
         out = np.empty(len(thetas))
-        _sum_squares(thetas, self.predicted, self._inverse_deviation, out)
+        _half_squares_of_each(thetas, self.predicted, self._inverse_deviation, out)
         return out
 
     def step(self) -> Step:
@@ -115,32 +115,6 @@ class MotionPrior:
 
 
 @kernel
-def _add_squares(
-    thetas: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """Adds half the squared length of every row times Θ − center."""
-    for k in range(thetas.shape[0]):
-        for r in range(rows.shape[0]):
-            length = 0.0
-            for d in range(center.size):
-                length += rows[r, d] * (thetas[k, d] - center[d])
-            out[k] += 0.5 * length * length
-
-
-@kernel
-def _sum_squares(
-    thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """Half the squared length of scales times Θ − center."""
-    for k in range(thetas.shape[0]):
-        total = 0.0
-        for d in range(center.size):
-            length = scales[d] * (thetas[k, d] - center[d])
-            total += length * length
-        out[k] = 0.5 * total
-
-
-@kernel
 def _judge_shape(
     thetas: NDArray[np.float64],
     vertices: NDArray[np.float32],
@@ -149,9 +123,7 @@ def _judge_shape(
     prior: NDArray[np.float64],
 ) -> float:
     """See `ShapePrior.step`."""
-    out = np.zeros(1)
-    _add_squares(thetas, rest, prior, out)
-    return out[0]
+    return _half_square(thetas[0], rest, prior)
 
 
 @kernel
@@ -163,6 +135,44 @@ def _judge_motion(
     inverse_deviation: NDArray[np.float64],
 ) -> float:
     """See `MotionPrior.step`."""
-    out = np.empty(1)
-    _sum_squares(thetas, predicted, inverse_deviation, out)
-    return out[0]
+    return _half_square_of_each(thetas[0], predicted, inverse_deviation)
+
+
+@kernel
+def _half_squares(
+    thetas: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """What `_half_square` says of every member of a population."""
+    for k in range(thetas.shape[0]):
+        out[k] = _half_square(thetas[k], center, rows)
+
+
+@kernel
+def _half_squares_of_each(
+    thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """What `_half_square_of_each` says of every member of a population."""
+    for k in range(thetas.shape[0]):
+        out[k] = _half_square_of_each(thetas[k], center, scales)
+
+
+@kernel
+def _half_square(theta: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64]) -> float:
+    """Half the squared length of rows (k, dim) times Θ − center."""
+    total = 0.0
+    for r in range(rows.shape[0]):
+        length = 0.0
+        for d in range(center.size):
+            length += rows[r, d] * (theta[d] - center[d])
+        total += 0.5 * length * length
+    return total
+
+
+@kernel
+def _half_square_of_each(theta: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64]) -> float:
+    """Half the squared length of scales (dim,) times Θ − center."""
+    total = 0.0
+    for d in range(center.size):
+        length = scales[d] * (theta[d] - center[d])
+        total += length * length
+    return 0.5 * total

@@ -14,6 +14,9 @@ from calib.noise.base import WINDOW_M
 #: errs by a Laplace distribution of this scale.
 FREE_SCALE_M = 0.01
 
+#: Texels are gathered so many at a time, and then compared all at once.
+_TILE = 32
+
 
 @kernel
 def write_constants(
@@ -64,26 +67,43 @@ def depth_cost(
     outlier: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured.
-
-    Texture as `write_texture` makes it.
-    """
-    window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
-    unbounded = np.float32(1e30)
-    # No branches on what is measured: whether an outlier's bound is reached cannot be foreseen, and each wrong guess
-    # takes the processor as long as several samples.
+    """What `_cost_of` says of every member of a population, (population, n)."""
     for k in prange(pixel.shape[0]):
-        total, pixels, distances = 0.0, pixel[k], distance[k]
-        for v in range(np.uintp(pixels.size)):
-            i = pixels[v]
-            texel = texture[np.uintp(max(i, 0))]
-            t = texel[0] - distances[v]
+        out[k] = _cost_of(pixel[k], distance[k], texture, inlier, outlier)
+
+
+@kernel
+def _cost_of(
+    pixels: NDArray[np.int32],
+    distances: NDArray[np.float32],
+    texture: NDArray[np.float32],
+    inlier: float,
+    outlier: float,
+) -> float:
+    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured."""
+    window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
+    half, none, unbounded, total = np.float32(0.5), np.float32(0), np.float32(1e30), 0.0
+    texels = np.empty((_TILE, 8), np.float32)
+    for first in range(0, pixels.size, _TILE):
+        pixel, distance, count = pixels[first:], distances[first:], np.uintp(min(_TILE, pixels.size - first))
+        for v in range(count):
+            # All is read before any is written, so that the compiler moves eight numbers at once.
+            texel, to = texture[np.uintp(max(pixel[v], 0))], texels[v]
+            a, b, c, d, e, f, g, h = texel[0], texel[1], texel[2], texel[3], texel[4], texel[5], texel[6], texel[7]
+            to[0], to[1], to[2], to[3], to[4], to[5], to[6], to[7] = a, b, c, d, e, f, g, h
+        part = none
+        # No branches on what is measured: whether an outlier's bound is reached cannot be foreseen, and each wrong
+        # guess takes the processor as long as several samples.
+        for v in range(count):
+            t = texels[v, 0] - distance[v]
             inside = min(max(t, -window), window)
-            e = (t - texel[1] - texel[2] * inside) * (texel[3] + inside * (texel[4] + inside * texel[5]))
-            cost = np.float32(0.5) * e * e + texel[6] + texel[7] * inside
-            bounded = min(cost, ceiling if texel[3] > 0 else unbounded) + least
-            total += bounded if i >= 0 else np.float32(0)
-        out[k] = total
+            inverse = texels[v, 3] + inside * (texels[v, 4] + inside * texels[v, 5])
+            e = (t - texels[v, 1] - texels[v, 2] * inside) * inverse
+            cost = half * e * e + texels[v, 6] + texels[v, 7] * inside
+            bounded = min(cost, ceiling if texels[v, 3] > 0 else unbounded) + least
+            part += bounded if pixel[v] >= 0 else none
+        total += part
+    return float(total)
 
 
 #: What `judge` looks through; `composed` puts another in its place.
@@ -101,7 +121,5 @@ def judge(
     *seeing: Any,
 ) -> float:
     """What `depth_cost` says of one candidate of a chain, after `see` with the arguments that it takes."""
-    out = np.empty(1)
     pixel, distance = see(vertices, normals, *seeing)
-    depth_cost(pixel, distance, texture, inlier, outlier, out)
-    return out[0]
+    return _cost_of(pixel[0], distance[0], texture, inlier, outlier)
