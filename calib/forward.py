@@ -26,6 +26,17 @@ def bend_fisheye(x: np.float32, y: np.float32, lens: NDArray[np.float32]) -> tup
 
 
 @kernel
+def bend(x: np.float32, y: np.float32, lens: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
+    """Distorted from ideal normalised coordinates, for the eight coefficients of any other lens."""
+    one, two = np.float32(1), np.float32(2)
+    k1, k2, p1, p2, k3, k4, k5, k6 = lens
+    r2 = x * x + y * y
+    radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    right = x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)
+    return right, y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y
+
+
+@kernel
 def straighten_fisheye(
     x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: NDArray[np.float32]
 ) -> tuple[np.float32, np.float32]:

@@ -76,11 +76,35 @@ def _and(others: Step, one: tuple[bool, Step]) -> Step:
     return Step(kernel, (is_available, *step.arguments, *others.arguments))
 
 
+def deforming(fill: Callable[..., None], vertices: int, arguments: tuple[Any, ...]) -> Step:
+    """A deforming step.
+
+    Args:
+        fill: a kernel that takes parameters (1, dim), `arguments`, and arrays (1, 3, n) for vertices and normals.
+        vertices: their number n.
+        arguments: what it takes.
+    """
+    return Step(composed(_deformed, fill=fill), (vertices, *arguments))
+
+
 @kernel
-def deform(thetas: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """A surface without vertices, in whose place `composed` puts another."""
-    nothing = np.empty((len(thetas), 3, 0), np.float32)
-    return nothing, nothing
+def fill(thetas: NDArray[np.float64], vertices: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
+    """A surface that is nowhere, in whose place `composed` puts another."""
+    vertices[:], normals[:] = 0, 0
+
+
+@kernel
+def _deformed(
+    thetas: NDArray[np.float64], count: int, *arguments: Any
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """See `deforming`."""
+    vertices, normals = np.empty((1, 3, count), np.float32), np.empty((1, 3, count), np.float32)
+    fill(thetas, *arguments, vertices, normals)
+    return vertices, normals
+
+
+#: A step that deforms.
+deform: Callable[..., Any] = _deformed
 
 
 @kernel

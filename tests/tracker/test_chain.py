@@ -137,7 +137,7 @@ def test_what_has_nothing_to_say_costs_nothing() -> None:
     one = chain.Step(chain.cost)
     assert chain.both(one, chain.NOTHING) is one
     silent = chain.available([(True, one), (False, one)])
-    empty = chain.Chain(chain.Step(chain.deform), chain.NOTHING, chain.NOTHING, chain.NOTHING, silent)
+    empty = chain.Chain(chain.Step(chain.deform, (0,)), chain.NOTHING, chain.NOTHING, chain.NOTHING, silent)
     np.testing.assert_array_equal(empty.cost(np.ones((3, 2))), np.zeros(3))
 
 

@@ -6,16 +6,31 @@ exp(iα) times an arc is one that begins in the direction α, so that arcs which
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from calib.jit import kernel
+
 #: Bend [rad] below which series are closer than quotients of rounded differences; either errs by less than 1e-9.
 SMALL = 1e-3
 
 
 def arc(bend: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """End of an arc of length one, ∫ exp(i bend t) dt from 0 to 1, and its derivative by the bend (…) [rad]."""
-    b = np.asarray(bend, np.float64)
-    small = np.abs(b) < SMALL
-    divisor = np.where(small, 1.0, b)
-    turn = np.exp(1j * b)
-    end = np.where(small, 1 + 0.5j * b - b**2 / 6, (turn - 1) / (1j * divisor))
-    slope = np.where(small, 0.5j - b / 3 - 0.125j * b**2, (turn - end) / divisor)
+    bends = np.asarray(bend, np.float64)
+    end, slope = np.empty(bends.shape, np.complex128), np.empty(bends.shape, np.complex128)
+    _ends(bends.reshape(-1), end.reshape(-1), slope.reshape(-1))
     return end, slope
+
+
+@kernel
+def _ends(bends: NDArray[np.float64], ends: NDArray[np.complex128], slopes: NDArray[np.complex128]) -> None:
+    for k in range(bends.size):
+        ends[k], slopes[k] = end_of(bends[k])
+
+
+@kernel
+def end_of(bend: float) -> tuple[complex, complex]:
+    """What `arc` tells, for one bend."""
+    if abs(bend) < SMALL:
+        return 1 - bend * bend / 6 + 0.5j * bend, -bend / 3 + 1j * (0.5 - 0.125 * bend * bend)
+    turn = np.cos(bend) + 1j * np.sin(bend)
+    end = (turn - 1) / (1j * bend)
+    return end, (turn - end) / bend

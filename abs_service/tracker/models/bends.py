@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.arc import SMALL
+from abs_service.tracker.models.arc import end_of
 from abs_service.tracker.models.base import ModelError
 from calib.jit import kernel
 
@@ -163,17 +163,13 @@ def slopes(
         rise, moves[:] = 0.0, 0.0
         for i in range(8):
             q = sides[i, 0] * points[0, v] + sides[i, 1] * points[1, v]
-            curvature = per_bend * min(max(parameters[i], -FULL), FULL)
-            t = curvature * q
             if q <= 0:
                 continue
-            small = abs(t) < SMALL  # see `arc`
-            sine, versine = np.sin(t), 1 - np.cos(t)
-            rise += q * (0.5 * t if small else versine / t)
+            end, slope = end_of(per_bend * min(max(parameters[i], -FULL), FULL) * q)
+            rise += q * end.imag
             scale = per_bend * q * q if abs(parameters[i]) <= FULL else 0.0
-            ahead = -t / 3 if small else (1 - versine - sine / t) / t
-            moves[0, i], moves[1, i] = scale * ahead * sides[i, 0], scale * ahead * sides[i, 1]
-            moves[2, i] = -scale * (0.5 - 0.125 * t * t if small else (sine - versine / t) / t)
+            moves[0, i], moves[1, i] = scale * slope.real * sides[i, 0], scale * slope.real * sides[i, 1]
+            moves[2, i] = -scale * slope.imag
         moves[2, :8] *= 1 + 2 * g / half * rise
         moves[2, 8] = -rise * rise / half if g == height else 0.0
         for row in range(3):

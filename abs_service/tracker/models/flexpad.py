@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
+from abs_service.tracker.chain import Step, deforming
 from abs_service.tracker.models import bends
 from abs_service.tracker.models.base import BOARD, Moves, Surface
 from abs_service.tracker.models.bends import bend, roll, slopes
@@ -113,7 +113,7 @@ class FlexPad:
 
     def step(self) -> Step:
         """The same for a chain."""
-        return Step(composed(_step, _deform=self._deform), self._arguments)
+        return deforming(self._deform, self._points.shape[1], self._arguments)
 
     @property
     def _arguments(self) -> tuple[Any, ...]:
@@ -205,20 +205,3 @@ def _deform(
                 w[4, v] = of_y[0] * a + of_y[1] * b + of_y[2] * d
                 w[5, v] = of_z[0] * a + of_z[1] * b + of_z[2] * d
             write(w, first, count, vertices[k], normals[k])
-
-
-@kernel
-def _step(
-    thetas: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    per_bend: float,
-    half: float,
-    points: NDArray[np.float32],
-    series: NDArray[np.float32],
-    scale: float,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Vertices and normals of one candidate."""
-    shape = 1, 3, points.shape[1] - LANES
-    vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    _deform(thetas, pose, per_bend, half, points, series, scale, vertices, normals)
-    return vertices, normals

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
+from abs_service.tracker.chain import Step, deforming
 from abs_service.tracker.models import spline
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.tiles import LANES, TILE, write
@@ -59,7 +59,7 @@ class Patches:
 
     def step(self) -> Step:
         """The same for a chain."""
-        return Step(composed(_step, _deform=self._deform), self._arguments)
+        return deforming(self._deform, self._vertices.shape[1] - LANES, self._arguments)
 
     @property
     def _arguments(self) -> tuple[NDArray[np.generic], ...]:
@@ -203,18 +203,3 @@ def _deform(
         coefficients = np.empty((powers.shape[0], 3, powers.shape[2]), np.float32)
         _find_coefficients(thetas[k], span_control, powers, coefficients)
         _evaluate(coefficients, thetas[k], start, places, vertices[k], normals[k])
-
-
-@kernel
-def _step(
-    thetas: NDArray[np.float64],
-    span_control: NDArray[np.int32],
-    powers: NDArray[np.float32],
-    start: NDArray[np.int64],
-    places: NDArray[np.float32],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Vertices and normals of one candidate."""
-    shape = 1, 3, places.shape[1] - LANES
-    vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
-    _deform(thetas, span_control, powers, start, places, vertices, normals)
-    return vertices, normals

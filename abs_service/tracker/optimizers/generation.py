@@ -42,8 +42,8 @@ def normal_quantiles() -> NDArray[np.float32]:
     return np.array([-_END, *inner, _END], np.float32)
 
 
-#: What is multiplied has so many columns more than it needs, or multiples of so many rows, all zeros: loops over them
-#: then leave nothing over that would have to be computed one by one.
+#: What is multiplied has multiples of so many columns and rows, what it does not need being zeros: loops over them then
+#: leave nothing over that would have to be computed one by one.
 LANES, ROWS = 8, 4
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.forward import bend_fisheye
-from calib.jit import kernel, prange
+from calib.forward import bend, bend_fisheye
+from calib.jit import composed, kernel, prange
 
 
 @kernel
@@ -47,45 +47,6 @@ def at_centers(
     result: NDArray[np.float32],
 ) -> None:
     """Value + slope · (centre of the pixel − projection of the vertex), eq. 10; the value itself in the border."""
-    one, two, width, per_stride = np.float32(1), np.float32(2), np.int32(stride), 1 / stride
-    fx, fy, cx, cy = matrix
-    k1, k2, p1, p2, k3, k4, k5, k6 = lens
-    for k in prange(pixel.shape[0]):
-        rights, downs = np.empty(pixel.shape[1], np.float32), np.empty(pixel.shape[1], np.float32)
-        for v in range(pixel.shape[1]):
-            right, down = np.float32(0), np.float32(0)
-            if pixel[k, v] > 0:
-                a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-                inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
-                x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
-                y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
-                r2 = x * x + y * y
-                radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-                column = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
-                row = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
-                line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
-                right = np.float32(pixel[k, v] - line * width) - one - column
-                down = np.float32(line) - one - row
-            rights[v], downs[v] = right, down
-        for channel in range(values.shape[1]):
-            own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
-            for v in range(np.uintp(looks.size)):
-                looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
-
-
-@kernel
-def at_centers_fisheye(
-    vertices: NDArray[np.float32],
-    pixel: NDArray[np.int32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    stride: int,
-    values: NDArray[np.float32],
-    slopes: NDArray[np.float32],
-    result: NDArray[np.float32],
-) -> None:
-    """What `_at_centers` is with the four coefficients of a fisheye."""
     one, width, per_stride = np.float32(1), np.int32(stride), 1 / stride
     fx, fy, cx, cy = matrix
     for k in prange(pixel.shape[0]):
@@ -97,9 +58,8 @@ def at_centers_fisheye(
                 inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
                 x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
                 y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
-                bent_x, bent_y = bend_fisheye(x, y, lens)
-                column = fx * bent_x + cx
-                row = fy * bent_y + cy
+                bent_x, bent_y = bend(x, y, lens)
+                column, row = fx * bent_x + cx, fy * bent_y + cy
                 line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
                 right = np.float32(pixel[k, v] - line * width) - one - column
                 down = np.float32(line) - one - row
@@ -108,3 +68,7 @@ def at_centers_fisheye(
             own, slope, looks = values[:, channel], slopes[:, channel], result[k, :, channel]
             for v in range(np.uintp(looks.size)):
                 looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
+
+
+#: The same with the four coefficients of a fisheye.
+at_centers_fisheye = composed(at_centers, bend=bend_fisheye)

@@ -9,18 +9,22 @@ from calib.forward import bend_fisheye
 from calib.jit import kernel
 
 
+def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """What kernels need of a camera: its pose T_sr (3, 4), fx, fy, cx and cy (4,), and the lens's coefficients."""
+    pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
+    matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+    return pose, matrix, camera.lens.coefficients.astype(np.float32)
+
+
 class Projection:
     """Eq. 10 for populations, in single precision.
 
     Attributes:
-        optics: what `project` takes between the vertices and the results.
+        arguments: what `project` takes between the vertices and the results.
     """
 
     def __init__(self, camera: Camera):
-        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        lens = camera.lens.coefficients.astype(np.float32)
-        self.optics = isinstance(camera.lens, KannalaBrandt), pose, matrix, lens, camera.field_radius**2
+        self.arguments = isinstance(camera.lens, KannalaBrandt), *optics(camera), camera.field_radius**2
 
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
@@ -29,7 +33,7 @@ class Projection:
         """
         population, _, n = vertices.shape
         place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
-        project(vertices, *self.optics, place, inverse_z)
+        project(vertices, *self.arguments, place, inverse_z)
         return place, inverse_z
 
 

@@ -10,6 +10,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye, level, relief
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
+from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.rig import PictureNoise, Rig
@@ -118,9 +119,7 @@ class Relief:
         self._camera = camera
         self._edges = mesh.edges
         self._lengths = _along(mesh, self._edges)
-        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        self._optics = pose, matrix, camera.lens.coefficients.astype(np.float32), camera.width + 2
+        self._optics = *optics(camera), camera.width + 2
         self._is_fisheye = isinstance(camera.lens, KannalaBrandt)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:

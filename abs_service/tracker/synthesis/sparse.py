@@ -10,7 +10,7 @@ from abs_service.tracker.chain import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Sight, Synthesis, View
-from abs_service.tracker.synthesis.projection import Projection
+from abs_service.tracker.synthesis.projection import Projection, optics
 from abs_service.tracker.synthesis.raster import Raster
 from abs_service.tracker.synthesis.sampling import lens_kind, sampler, see
 from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
@@ -93,10 +93,7 @@ class SparseView:
         self._slopes = slopes
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
-        pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
-        matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-        lens = camera.lens.coefficients.astype(np.float32)
-        self._optics = pose, matrix, lens, camera.field_radius**2, camera.height, camera.width
+        self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
         self._sample = sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:

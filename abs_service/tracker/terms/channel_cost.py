@@ -74,7 +74,7 @@ def channel_cost(
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     samples, channels = factor.shape
-    # No branches on what is measured, see `depth._depth_cost`.
+    # No branches on what is measured, see `depth_cost._cost_of`.
     for k in prange(pixel.shape[0]):
         total, pixels, looks = 0.0, pixel[k], appearance[np.intp(k) % appearance.shape[0]]
         for v in range(np.uintp(pixels.size)):

@@ -142,7 +142,7 @@ def _color_cost(
     half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
     shared = inverse.shape[0] == 1
-    # No branches on what is measured, see `depth._depth_cost`.
+    # No branches on what is measured, see `depth_cost._cost_of`.
     for k in prange(pixel.shape[0]):
         total, pixels, looks = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
         for v in range(np.uintp(pixels.size)):

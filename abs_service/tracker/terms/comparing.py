@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 from abs_service.tracker.chain import Step
 from abs_service.tracker.synthesis import centers, sampling
 from abs_service.tracker.synthesis.base import Sight
-from abs_service.tracker.terms.illumination import as_it_is
+from abs_service.tracker.terms.illumination import AS_IT_IS, as_it_is
 from calib.jit import composed, kernel
-
-AS_IT_IS = Step(as_it_is)
 
 
 def judging(sight: Sight, cost: Callable[..., None], measured: tuple[Any, ...], light: Step = AS_IT_IS) -> Step:

@@ -33,7 +33,7 @@ class Passive:
 
     def step(self) -> Step:
         """The attributes themselves."""
-        return Step(as_it_is)
+        return AS_IT_IS
 
 
 class Active:
@@ -84,6 +84,10 @@ def as_it_is(
 ) -> NDArray[np.float32]:
     """The attributes themselves."""
     return attributes
+
+
+#: The step of a light in which everything looks as it is.
+AS_IT_IS = Step(as_it_is)
 
 
 @kernel

@@ -117,7 +117,7 @@ class RimOutline:
 
     def step(self) -> Step:
         """The same for one candidate of a chain."""
-        looking = *self._projection.optics, self._corner, self._inwards, self._deviation
+        looking = *self._projection.arguments, self._corner, self._inwards, self._deviation
         return Step(judge, (self._rim.outer, self._rim.inner, self._beyond, *looking))
 
     def linearize(self, surface: Surface, moves: Moves) -> Linearization:
