@@ -10,6 +10,7 @@ from abs_service.readers import BAYER_ORDERS
 from abs_service.tracker.models.base import Moves
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.priors import MotionPrior
 from abs_service.tracker.priors import Settings as PriorSettings
 from abs_service.tracker.stretch import StretchPrior
@@ -25,8 +26,8 @@ from calib.camera import Camera
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.rig import Rig, Sensor
-from tests.tracker.scenes import as_surface, depth_image, flat, plane_distance, sheet, sparse
+from calib.rig import Noise, Rig, Sensor
+from tests.tracker.scenes import as_surface, depth_image, flat, observation, plane_distance, sheet, sparse
 
 #: Many fine pixels, so that rounding to one of them is small against the steps of the derivatives.
 FINE = Camera(640, 480, 1500.0, 1500.0, 319.5, 239.5)
@@ -36,6 +37,7 @@ MESH = sheet(height=lambda x, y: 1.0 + 0.2 * x - 0.1 * y)
 NORMAL = np.array([-0.2, 0.1, 1.0])
 SIGMA = 5e-3
 BOUNDS = Bounds(0.05, 1.6, 4.6)
+LIKELIHOOD = likelihood.Settings()
 
 
 def depth_term() -> DepthTerm:
@@ -96,12 +98,18 @@ def ramp() -> np.ndarray:
     return np.stack([columns, rows, 255 - rows], axis=-1).astype(np.uint8)
 
 
+def seen_by(noise: Noise) -> Sensor:
+    return Sensor("any", COLOR, noise)
+
+
 def test_color_rows_predict_what_a_ramp_s_residuals_do():
     mesh = sheet(7, 9, height=flat, size=(0.2, 0.14))
     model = Rigid(mesh)
     columns, rows = COLOR.project(mesh.vertices).T
     colors = np.stack([columns, rows, 255 - rows], axis=-1)
-    term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), GaussianColor(10.0), BOUNDS)
+    noise = GaussianColor(10.0)
+    bounds = LIKELIHOOD.bounds(seen_by(noise))
+    term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
     term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
     linear = term.linearize(model.deform(model.rest[None]), model.moves(model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=0.06)  # pixels are whole numbers
@@ -148,7 +156,8 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
     rig = Rig("r", {"bayer": Sensor("bayer", COLOR, GaussianBayer(50.0))})
     model, synthesizer = Rigid(mesh), Sparse(rig, mesh)
     looks = generator.uniform(100, 150, (len(synthesizer.canvas.vertices), 3)).astype(np.float32)
-    term = ChannelTerm("bayer", synthesizer, looks, GaussianBayer(50.0), Passive(), BOUNDS)
+    noise = GaussianBayer(50.0)
+    term = ChannelTerm("bayer", synthesizer, looks, noise, Passive(), LIKELIHOOD.bounds(seen_by(noise)))
     picture = generator.uniform(100, 150, (COLOR.height, COLOR.width)).astype(np.float32)
     term.observe(ChannelImage(picture, BAYER_ORDERS[order]), model.deform(model.rest[None]))
     linear = term.linearize(model.deform(model.rest[None]), model.moves(model.rest))
@@ -159,6 +168,26 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
         actual = (term._residuals(there)[0] - term._residuals(back)[0]) / 2
         assert stays.mean() > 0.5
         np.testing.assert_allclose((linear.jacobian @ step)[stays], actual[stays], rtol=0.02, atol=2e-4)
+
+
+@pytest.mark.parametrize("objective", [likelihood.Settings(), euclidean.Settings(cutoff_m=0.06, cutoff_levels=100.0)])
+@pytest.mark.parametrize("deviations", [0.0, 2.9, 3.3, 3.7, 5.0, 7.0])
+def test_what_costs_less_than_an_outlier_is_linearized_whatever_the_objective(objective, deviations):
+    """Or a descent would ignore what its cost is made of: then it stops where that is not least."""
+    noise, mesh = GaussianPolynomial(((0.01,),)), MESH
+    distance = plane_distance(FINE, NORMAL, 1.0)
+    rig = Rig("r", {"tof": Sensor("tof", FINE, noise)})
+    found = objective.build(rig, mesh, sparse(FINE, mesh))
+    found.observe(observation(0, (), tof=depth_image(distance)), as_surface((mesh.vertices, mesh.normals)))
+    along = np.linalg.norm(mesh.vertices, axis=1, keepdims=True)
+    nearer = as_surface((mesh.vertices * (1 - 0.01 * deviations / along), mesh.normals))
+    costs = [
+        float(found.cost(as_surface((mesh.vertices * (1 - (0.01 * deviations + by) / along), mesh.normals)))[0])
+        for by in (-1e-4, 1e-4)
+    ]
+    (linear,) = found.linearize(nearer, Moves.full((mesh.vertices / along)[:, :, None]))
+    gradient = -(linear.jacobian.T @ linear.residual)[0]
+    np.testing.assert_allclose((costs[1] - costs[0]) / 2e-4, gradient, rtol=0.02, atol=20.0)
 
 
 def test_only_inliers_and_what_is_in_free_space_are_linearized():

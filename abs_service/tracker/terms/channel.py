@@ -11,8 +11,8 @@ from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
-from abs_service.tracker.terms.channel_cost import CHANNEL, INVERSE, VALUE, channel_cost, copy, fill
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.channel_cost import CHANNEL, INVERSE, NORMALIZER, VALUE, channel_cost, copy, fill
 from abs_service.tracker.terms.comparing import judging
 from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.illumination import Illumination
@@ -81,7 +81,7 @@ class ChannelTerm:
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)
         self._widening = NO_WIDENING
-        _, inverse, _ = self._residuals(predicted)
+        inverse = self._residuals(predicted)[1]
         with np.errstate(divide="ignore"):
             deviation = (1 / inverse)[:, None]
         self._widening = self._misplacement.widening(self._view, predicted, deviation)
@@ -113,12 +113,12 @@ class ChannelTerm:
         return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
-        """The inliers' normalised residuals, and how they change with the parameters.
+        """Normalised residuals of all but outliers, and how they change with the parameters.
 
         What light makes of a turning surface changes slower than its texture, and is left to the search.
         """
-        residual, inverse, measured = self._residuals(surface)
-        use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
+        residual, inverse, normalizer = self._residuals(surface)
+        use = 0.5 * residual**2 + normalizer < self._bounds.outlier
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         slopes = self._slopes(surface)[use] * inverse[use, None]
         rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices))[:, 0]
@@ -126,11 +126,11 @@ class ChannelTerm:
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
-        residual, _, measured = self._residuals(surface)
+        residual = self._residuals(surface)[0]
         pixel = self._view.synthesize(surface).pixel[0]
         hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
         mean = -float(self.cost(surface)[0]) / len(residual)
-        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, np.abs(residual), mean)
+        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean)
 
     def _slopes(self, surface: Surface) -> NDArray[np.float64]:
         """How the channel of each sample's pixel changes there per pixel to the right and down (m, 2).
@@ -147,15 +147,15 @@ class ChannelTerm:
         slopes[unknown] = channel_slopes(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples)
         return slopes
 
-    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
         seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
         texels = self._texture[seen.pixel[0]].astype(np.float64)
-        own = seen.attributes[0][np.arange(len(texels)), texels[:, CHANNEL].astype(int)]
-        widened = np.broadcast_to(self._widening.factor, (len(texels), self._widening.factor.shape[1]))
-        inverse = (
-            texels[:, INVERSE] / widened[np.arange(len(texels)), texels[:, CHANNEL].astype(int) % widened.shape[1]]
-        )
-        residual = (texels[:, VALUE] - own) * inverse
+        each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
+        widening = self._widening
+        # One widening may stand for all samples, or for all channels.
+        of = each % len(widening.factor), channel % widening.factor.shape[1]
+        inverse = texels[:, INVERSE] / widening.factor[of]
+        residual = (texels[:, VALUE] - seen.attributes[0][each, channel]) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
-        return np.where(measured, residual, np.inf), inverse, measured
+        return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]

@@ -8,7 +8,7 @@ from abs_service.tracker.chain import Step
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
 from abs_service.tracker.terms.comparing import judging
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
@@ -96,9 +96,9 @@ class ColorTerm:
         return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
-        """The inliers' normalised residuals, three channels each, and how they change with the parameters."""
+        """Normalised residuals of all but outliers, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
-        use = measured & (np.sqrt(np.mean(residual**2, axis=1)) < INLIER_DEVIATIONS)
+        use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
         rows = color_rows(self._image, self._view.camera, vertices) * inverse

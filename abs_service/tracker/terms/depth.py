@@ -10,7 +10,7 @@ from abs_service.tracker.chain import Step, both
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
 from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, write_constants
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
@@ -125,14 +125,14 @@ class DepthTerm:
         return both(measured, self._outline.step())
 
     def linearize(self, surface: Surface, moves: Moves) -> Together:
-        """Normalised residuals of inliers and of what is in free space, and how they change with the parameters."""
+        """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""
         samples = self._view.follow(surface, moves)
         parts = (self._linearize_measured(surface, samples), self._linearize_free(surface, samples))
         return Together((*parts, self._outline.linearize(surface, moves)), moves.dimension)
 
     def _linearize_measured(self, surface: Surface, samples: Moves) -> PointLinearization:
-        residual, inverse_deviation, measured = self._residuals(surface)
-        use = measured & (np.abs(residual) < INLIER_DEVIATIONS)
+        residual, inverse_deviation, cost = self._residuals(surface)
+        use = cost < self._bounds.outlier - self._bounds.inlier
         vertices, normals = (
             self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, surface.normals[0].T)
         )
@@ -157,7 +157,8 @@ class DepthTerm:
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
-        residual, _, measured = self._residuals(surface)
+        residual, _, cost = self._residuals(surface)
+        measured = cost < np.inf
         pixel = self._view.synthesize(surface).pixel[0]
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
         hidden = (pixel < 0) | self._obscured[pixel]
@@ -167,10 +168,9 @@ class DepthTerm:
             self.sensor, (pixel > 0) & ~(hidden | self._doubtful[pixel]), hidden, measured | free, size, mean
         )
 
-    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
-        """Normalised residual, inverse deviation, and whether there is a measurement, each (n,)."""
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
         seen = self._view.synthesize(surface)
-        residual, inverse = np.empty((2, seen.pixel.shape[1]))
-        measured = np.empty(residual.size, np.bool_)
-        normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, measured)
-        return residual, inverse, measured
+        residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
+        normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, cost)
+        return residual, inverse, cost

@@ -46,16 +46,20 @@ def normalize(
     texture: NDArray[np.float32],
     residual: NDArray[np.float64],
     inverse: NDArray[np.float64],
-    measured: NDArray[np.bool_],
+    cost: NDArray[np.float64],
 ) -> None:
-    """Residuals of samples (n,) in their deviations, these deviations' inverses, and whether anything was measured."""
+    """Residuals of samples (n,) in their deviations, these deviations' inverses, and what they cost without any bound.
+
+    Where nothing was measured, the cost is infinite.
+    """
     for v in range(pixel.size):
         texel = texture[max(pixel[v], 0)]
         t = np.float64(texel[0]) - distance[v]
         inside = min(max(t, -WINDOW_M), WINDOW_M)
         inverse[v] = texel[3] + inside * (texel[4] + inside * texel[5])
         residual[v] = (t - texel[1] - texel[2] * inside) * inverse[v]
-        measured[v] = pixel[v] > 0 and texel[3] > 0
+        explained = 0.5 * residual[v] * residual[v] + texel[6] + texel[7] * inside
+        cost[v] = explained if pixel[v] > 0 and texel[3] > 0 else np.inf
 
 
 @kernel
