@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.surfaces import connected_surfaces
+from calib.jit import kernel
 
 #: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].
 AGREEMENT_M = 0.03
@@ -58,42 +59,95 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
         predicted: radial distances of the predicted mesh [m], infinite beside it.
         focal: focal length of the camera [px].
     """
-    expected = np.isfinite(predicted)
     labels, count = connected_surfaces(distance, LARGEST_STEP_M)
-    with np.errstate(invalid="ignore"):
-        agrees = expected & (np.abs(distance - predicted) < AGREEMENT_M)
-    inside = np.bincount(labels[expected], minlength=count)
-    agreeing = np.bincount(labels[agrees], minlength=count)
-    is_object = (agreeing >= LEAST_PIXELS) & (agreeing >= LEAST_SHARE * inside)
-    is_object[0] = False
+    is_object = np.zeros(count, np.bool_)
+    _recognize(distance, predicted, labels, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
         return Visibility(nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
-    shown = is_object[labels]
-    near = _extended(np.where(expected, predicted, np.nan))[0]
-    with np.errstate(invalid="ignore"):
-        before = ~shown & (distance < near - AGREEMENT_M)
-        behind = ~shown & (distance > near + AGREEMENT_M)
-    foreground = before & (cv2.dilate(((labels > 0) & before).astype(np.uint8), np.ones((3, 3))) > 0)
+    near = _extended(predicted)
+    shown, before, solid, behind, missing = np.empty((5, *distance.shape), np.bool_)
+    _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
+    foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
+    hole = _inside(missing, np.isfinite(predicted), near / focal) if missing.any() else nothing
+    away_px = np.asarray(_depth_inside(~shown), np.float32)
+    return Visibility(shown, foreground, hole, np.where(behind, away_px * near / np.float32(focal), np.float32(0)))
+
+
+@kernel
+def _recognize(
+    distance: NDArray[np.float32],
+    predicted: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    is_object: NDArray[np.bool_],
+) -> None:
+    """Which surfaces (count,), of which the first is none, are the object."""
+    inside, agreeing = np.zeros(is_object.size, np.int64), np.zeros(is_object.size, np.int64)
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            expected, label = predicted[row, column], labels[row, column]
+            if np.isfinite(expected):
+                inside[label] += 1
+                agreeing[label] += 1 if abs(distance[row, column] - expected) < AGREEMENT_M else 0
+    for label in range(1, is_object.size):
+        is_object[label] = agreeing[label] >= max(LEAST_PIXELS, LEAST_SHARE * inside[label])
+
+
+@kernel
+def _compare(
+    distance: NDArray[np.float32],
+    near: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    is_object: NDArray[np.bool_],
+    shown: NDArray[np.bool_],
+    before: NDArray[np.bool_],
+    solid: NDArray[np.bool_],
+    behind: NDArray[np.bool_],
+    missing: NDArray[np.bool_],
+) -> None:
+    """Which pixels show the object, something before it, part of a surface before it, something behind it, nothing."""
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            label, beyond = labels[row, column], distance[row, column] - near[row, column]
+            is_shown = is_object[label]
+            is_before = not is_shown and beyond < -AGREEMENT_M
+            shown[row, column], before[row, column] = is_shown, is_before
+            solid[row, column] = is_before and label > 0
+            behind[row, column] = not is_shown and beyond > AGREEMENT_M
+            missing[row, column] = not np.isfinite(distance[row, column])
+
+
+def _inside(missing: NDArray[np.bool_], expected: NDArray[np.bool_], metres: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Missing returns within the expected outline, and around these, for pixels of a width (height, width) [m]."""
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
-        missing = ~np.isfinite(distance)
-        hole = missing & (_depth_inside(expected) * near / focal > RIM_M)
+        hole = missing & (_depth_inside(expected) * metres > RIM_M)
         if hole.any():
-            hole |= missing & (_depth_inside(~hole) * near / focal < 2 * RIM_M)
-    away, steps = _extended(np.where(shown, near, np.nan))
-    return Visibility(shown, foreground, hole, np.where(behind, steps * away / focal, 0).astype(np.float32))
+            hole |= missing & (_depth_inside(~hole) * metres < 2 * RIM_M)
+    return hole
 
 
-def _extended(values: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """An image without its NaNs, each replaced by the nearest value, and how far away that is [px]."""
-    known = np.isfinite(values)
-    steps, labels = cv2.distanceTransformWithLabels(
-        (~known).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    places = np.asarray(labels, np.int32)
-    table = np.zeros(int(places.max()) + 1, np.float32)
-    table[places[known]] = values[known]
-    return table[places], np.asarray(steps, np.float32)
+def _extended(predicted: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Distances [m] of the predicted mesh, beside it those of its nearest pixel."""
+    beside = ~np.isfinite(predicted)
+    labels = cv2.distanceTransformWithLabels(
+        beside.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )[1]
+    values = np.empty(predicted.shape, np.float32)
+    _spread(predicted, np.asarray(labels, np.int32), values)
+    return values
+
+
+@kernel
+def _spread(predicted: NDArray[np.float32], labels: NDArray[np.int32], values: NDArray[np.float32]) -> None:
+    """Gives every pixel what the pixel on the mesh has that is labelled like it; not a number if there is none."""
+    table = np.full(labels.size + 1, np.float32(np.nan))
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            if np.isfinite(predicted[row, column]):
+                table[labels[row, column]] = predicted[row, column]
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            values[row, column] = table[labels[row, column]]
 
 
 def _depth_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:

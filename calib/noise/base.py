@@ -171,14 +171,19 @@ def _write_texels(
 ) -> None:
     """Coefficients in t from the values (3, n) at t = −WINDOW_M, 0, WINDOW_M; texels have single precision only."""
     slope, curvature = 1 / (2 * WINDOW_M), 1 / (2 * WINDOW_M**2)
+    last, normalizer, growth = np.zeros(3), np.float32(0), 0.0
     for k in range(center.size):
         texel = texture[rows[k] + 1, columns[k] + 1]
-        below, middle, above = 1 / deviation[0, k], 1 / deviation[1, k], 1 / deviation[2, k]
+        near, here, far = deviation[0, k], deviation[1, k], deviation[2, k]
+        below, middle, above = 1 / near, 1 / here, 1 / far
+        if near != last[0] or here != last[1] or far != last[2]:  # a logarithm takes as long as all the rest
+            last[0], last[1], last[2] = near, here, far
+            normalizer = np.log(np.float32(here)) + np.float32(LOG_SQRT_2PI)
+            growth = np.log(np.float32(far * below)) * slope
         texel[0] = center[k]
         texel[1] = mean[1, k]
         texel[2] = (mean[2, k] - mean[0, k]) * slope
         texel[3] = middle
         texel[4] = (above - below) * slope
         texel[5] = (above - 2 * middle + below) * curvature
-        texel[6] = np.log(np.float32(deviation[1, k])) + np.float32(LOG_SQRT_2PI)
-        texel[7] = np.log(np.float32(deviation[2, k] * below)) * slope
+        texel[6], texel[7] = normalizer, growth

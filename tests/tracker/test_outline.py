@@ -81,7 +81,8 @@ def test_look_up_is_bilinear_interpolation(seed: int):
 def test_the_outline_is_zero_and_distances_grow_inwards():
     distance = picture()
     view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
-    away = inwards(distance, classify(distance, view.render(moved(MESH, 0.0)), CAMERA.fx))
+    part, away = inwards(distance, classify(distance, view.render(moved(MESH, 0.0)), CAMERA.fx), CAMERA.width)
+    assert distance[part].shape == distance.shape
     row, on = CAMERA.height // 2, distance[CAMERA.height // 2] < 1.3
     assert np.all(away[row, on] > 0)
     assert np.all(away[row, ~on] < 0)
@@ -149,3 +150,17 @@ def test_free_space_right_beside_the_outline_is_held_against_no_vertex(outline_p
 def test_the_likelihood_has_it_by_a_key():
     assert likelihood.Settings().outline_px == 0
     assert likelihood.Settings(outline_px=0.5).outline_px == 0.5
+
+
+def test_distances_near_the_outline_do_not_depend_on_how_far_the_image_goes_on():
+    distance = picture()
+    distance[20:24, 30:60] = np.nan
+    view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
+    seen = classify(distance, view.render(moved(MESH, 0.0)), CAMERA.fx)
+    _, everywhere = inwards(distance, seen, CAMERA.width)
+    part, near = inwards(distance, seen, 3)
+    assert near.size < 0.8 * everywhere.size
+    np.testing.assert_array_equal(near, everywhere[part])
+    beyond = everywhere.copy()
+    beyond[part] = -3
+    assert np.nanmax(beyond) <= -3

@@ -38,7 +38,7 @@ class Settings:
     """
 
     steps: Annotated[int, Ge(1)] = 12
-    tolerance: Annotated[float, Gt(0)] = 1.0
+    tolerance: Annotated[float, Gt(0)] = 2.0
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 25
     step: Annotated[float, Gt(0)] = 1.0

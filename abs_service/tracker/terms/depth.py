@@ -11,7 +11,7 @@ from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
-from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, write_constants
+from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, usual_cost, write_constants
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
 from abs_service.tracker.terms.outline import Outline, Unknown
@@ -84,6 +84,8 @@ class DepthTerm:
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of what stands before the object."""
+        if not self._obscured.any():
+            return np.zeros((0, 3))
         rows, columns = np.nonzero(np.isfinite(self._foreground))
         camera, (top, left) = self._view.camera, corner(self._window)
         sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
@@ -100,8 +102,7 @@ class DepthTerm:
         costs an outlier, and more the farther it is from the object.
         """
         silent = seen.foreground | seen.hole | doubtful
-        normalizer = within(texture, self._window)[..., 6]
-        agreeing = float(np.median(normalizer[seen.object])) + 0.5 if seen.object.any() else 0.0
+        agreeing = usual_cost(within(texture, self._window)[..., 6], seen.object) if silent.any() else 0.0
         free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
         write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
 

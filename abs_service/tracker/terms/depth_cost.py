@@ -18,6 +18,11 @@ FREE_SCALE_M = 0.01
 _TILE = 32
 
 
+def usual_cost(normalizer: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
+    """What a measurement of the object that agrees costs on average; 0 where a mask (rows, columns) shows none."""
+    return float(np.median(normalizer[shown])) + 0.5 if shown.any() else 0.0
+
+
 @kernel
 def write_constants(
     silent: NDArray[np.bool_],

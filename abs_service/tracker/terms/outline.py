@@ -4,7 +4,7 @@ Distances say nothing about how a smooth surface slides along itself. Where it e
 between the pixels that show the object and those that look past it.
 """
 
-from typing import Protocol
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.linearization import Linearization
-from abs_service.tracker.terms.rim import FARTHEST, Rim, chain, judge, look_up
+from abs_service.tracker.terms.rim import FARTHEST, Rim, chain, judge, locate
 from abs_service.tracker.visibility import Visibility
 from calib.camera import Camera
 
@@ -104,70 +104,87 @@ class RimOutline:
         self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
     ) -> NDArray[np.bool_]:
         """Takes what a window of a depth image shows; the pixels beside the object that say nothing else."""
-        self._inwards = inwards(distance, seen)
-        self._corner = np.array(corner(window)[::-1], np.float32)
+        part, self._inwards = inwards(distance, seen, int(np.ceil(FARTHEST * self._deviation)) + 1)
+        self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
             self._beyond, self._begun = self._measure(predicted), True
-        return (seen.free_m > 0) & (self._inwards > -GRACE * self._deviation)
+        beside = np.zeros(distance.shape, np.bool_)
+        beside[part] = (seen.free_m[part] > 0) & (self._inwards > -GRACE * self._deviation)
+        return beside
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
-        residual = self._look_up(self._points(surface))[0] / self._deviation
-        return 0.5 * np.sum(np.minimum(residual**2, FARTHEST**2), axis=1)
+        nothing, step = np.zeros((1, 0)), self.step()
+        each = zip(surface.vertices[:, None], surface.normals[:, None])
+        return np.array([step.kernel(nothing, *member, *step.arguments) for member in each])
 
     def step(self) -> Step:
         """The same for one candidate of a chain."""
-        looking = *self._projection.arguments, self._corner, self._inwards, self._deviation
-        return Step(judge, (self._rim.outer, self._rim.inner, self._beyond, *looking))
+        return Step(judge, (self._deviation, *self._arguments))
 
     def linearize(self, surface: Surface, moves: Moves) -> Linearization:
         """Residuals of what is near the outline, and their derivatives."""
-        points = self._points(surface)
-        residual, slopes = (values[0] / self._deviation for values in self._look_up(points))
+        points, values, slopes = self._locate(surface)
+        residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
-        places = points[0].T[use].astype(np.float64)
-        rows = np.einsum("vi,vij->vj", slopes[use], project_with_slopes(self._camera, places)[1])
+        by_place = project_with_slopes(self._camera, points[use].astype(np.float64))[1]
+        rows = np.einsum("vi,vij->vj", slopes[use] / self._deviation, by_place)
         ends = self._rim.outer[use], self._rim.inner[use], self._beyond[use]
         jacobian = np.zeros((len(use), moves.dimension))
         chain(rows, *ends, moves.group, moves.parameters, moves.local, jacobian)
         return Linearization(residual[use], jacobian)
 
-    def _points(self, surface: Surface) -> NDArray[np.float32]:
-        """Where the object ends (population, 3, k) [m]."""
-        outer, inner = surface.vertices[:, :, self._rim.outer], surface.vertices[:, :, self._rim.inner]
-        return np.asarray(outer + self._beyond * (outer - inner), np.float32)
+    @property
+    def _arguments(self) -> tuple[Any, ...]:
+        """What `locate` takes between the vertices and the results."""
+        ends = self._rim.outer, self._rim.inner, self._beyond
+        return *ends, *self._projection.arguments, self._corner, self._inwards
+
+    def _locate(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]:
+        """Where the object ends (k, 3) [m], how far inside the outline that is (k,) [px], and slopes (k, 2) of that."""
+        k = len(self._beyond)
+        points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
+        locate(surface.vertices, *self._arguments, points, values, slopes)
+        return points[0].T, values, slopes
 
     def _measure(self, predicted: Surface) -> NDArray[np.float32]:
         """How far (k,) the object goes on beyond the rim of the mesh, in distances from the next vertex."""
-        outer, inner = (predicted.vertices[0].T[i].astype(np.float64) for i in (self._rim.outer, self._rim.inner))
-        steps = self._camera.project(outer) - self._camera.project(inner)
-        away, slopes = (values[0] for values in self._look_up(predicted.vertices[:, :, self._rim.outer]))
+        outer, away, slopes = self._locate(predicted)
+        inner = predicted.vertices[0].T[self._rim.inner]
+        steps = self._camera.project(outer.astype(np.float64)) - self._camera.project(inner.astype(np.float64))
         per_step = -np.einsum("vi,vi->v", slopes, steps)
         known = per_step > 0
         beyond = np.where(known, np.clip(away / np.where(known, per_step, 1.0), 0.0, MOST_BEYOND), 0.0)
         return beyond.astype(np.float32)
 
-    def _look_up(self, points: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Distances inwards (population, k) [px] of points (population, 3, k), and slopes (population, k, 2)."""
-        places, inverse_z = self._projection.project(np.ascontiguousarray(points))
-        places -= self._corner
-        places[np.isnan(inverse_z)] = np.nan
-        values, slopes = np.empty(places.shape[:2]), np.empty(places.shape)
-        look_up(self._inwards, places.reshape(-1, 2), values.reshape(-1), slopes.reshape(-1, 2))
-        return values, slopes
+
+def _around(mask: NDArray[np.bool_], reach: int) -> Window:
+    """Rows and columns within so many pixels of those of a mask (height, width), which is not empty."""
+    axes = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows, columns = (slice(max(int(at[0]) - reach, 0), int(at[-1]) + reach + 1) for at in axes)
+    return rows, columns
 
 
-def inwards(distance: NDArray[np.float32], seen: Visibility) -> NDArray[np.float32]:
-    """Distance of every pixel (height, width) from the object's outline [px], negative outside it; NaN if unknown.
+def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tuple[Window, NDArray[np.float32]]:
+    """Distance of pixels from the object's outline [px], negative outside it; NaN if unknown.
 
     What hides the object, and where returns are missing inside it, is unknown: the object may go on there.
+
+    Args:
+        distance, seen: an image (height, width) [m], and what it shows.
+        reach: farther than so many pixels outside, nobody asks.
+
+    Returns:
+        The part of the image that is not farther outside, and the distances there (rows, columns).
     """
     beside = (seen.free_m > 0) | (np.isnan(distance) & ~seen.hole)
     if not (beside.any() and seen.object.any()):
-        return np.full(distance.shape, np.nan, np.float32)
-    inside, outside = (
-        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for mask in (~beside, beside)
+        return WHOLE, np.full(distance.shape, np.nan, np.float32)
+    part = _around(~beside, reach)
+    outside = beside[part]
+    to_inside, to_outside = (
+        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for mask in (outside, ~outside)
     )
-    away = np.where(beside, 0.5 - outside, inside - 0.5).astype(np.float32)
-    away[seen.foreground | seen.hole] = np.nan
-    return away
+    away = np.where(outside, 0.5 - to_inside, to_outside - 0.5).astype(np.float32)
+    away[seen.foreground[part] | seen.hole[part]] = np.nan
+    return part, away

@@ -92,10 +92,8 @@ def chain(
 
 
 @kernel
-def judge(
-    thetas: NDArray[np.float64],
+def locate(
     vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
     outer: NDArray[np.intp],
     inner: NDArray[np.intp],
     beyond: NDArray[np.float32],
@@ -106,25 +104,23 @@ def judge(
     limit: float,
     corner: NDArray[np.float32],
     inwards: NDArray[np.float32],
-    deviation: float,
-) -> float:
-    """Half the squared distances of one candidate's rim from the outline, in deviations, each bounded.
+    points: NDArray[np.float32],
+    values: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+) -> None:
+    """Where one candidate's object ends, and how far inside the outline that is.
 
     Args:
-        thetas, vertices, normals: the candidate.
+        vertices: of the candidate (1, 3, n) [m].
         outer, inner, beyond: vertices and share (k,).
         is_fisheye, pose, matrix, lens, limit: as in `projection.project`.
         corner: column and row of the image's first pixel (2,).
         inwards: distances (rows, columns) [px].
-        deviation: of the outline [px].
+        points: where the object ends (1, 3, k) [m].
+        values, slopes: as `look_up` tells them.
     """
     k = outer.size
-    points, places, inverse_z = (
-        np.empty((1, 3, k), np.float32),
-        np.empty((1, k, 2), np.float32),
-        np.empty((1, k), np.float32),
-    )
-    values, slopes = np.empty(k), np.empty((k, 2))
+    places, inverse_z = np.empty((1, k, 2), np.float32), np.empty((1, k), np.float32)
     for i in range(3):
         of_vertices = vertices[0, i]
         for v in range(k):
@@ -136,7 +132,33 @@ def judge(
         for i in range(2):
             places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
     look_up(inwards, places[0], values, slopes)
-    total = 0.0
+
+
+@kernel
+def judge(
+    thetas: NDArray[np.float64],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    deviation: float,
+    outer: NDArray[np.intp],
+    inner: NDArray[np.intp],
+    beyond: NDArray[np.float32],
+    is_fisheye: bool,
+    pose: NDArray[np.float32],
+    matrix: NDArray[np.float32],
+    lens: NDArray[np.float32],
+    limit: float,
+    corner: NDArray[np.float32],
+    inwards: NDArray[np.float32],
+) -> float:
+    """Half the squared distances of one candidate's rim from the outline, in deviations [px], each bounded.
+
+    What comes after the deviation is as in `locate`.
+    """
+    k, total = outer.size, 0.0
+    points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
+    camera = is_fisheye, pose, matrix, lens, limit
+    locate(vertices, outer, inner, beyond, *camera, corner, inwards, points, values, slopes)
     for v in range(k):
         total += min((values[v] / deviation) ** 2, FARTHEST**2)
     return 0.5 * total
