@@ -76,7 +76,7 @@ def _and(others: Step, one: tuple[bool, Step]) -> Step:
     return Step(kernel, (is_available, *step.arguments, *others.arguments))
 
 
-def deforming(fill: Callable[..., None], vertices: int, arguments: tuple[Any, ...]) -> Step:
+def deforming(fill: Callable[..., Any], vertices: int, arguments: tuple[Any, ...]) -> Step:
     """A deforming step.
 
     Args:
@@ -88,9 +88,12 @@ def deforming(fill: Callable[..., None], vertices: int, arguments: tuple[Any, ..
 
 
 @kernel
-def fill(thetas: NDArray[np.float64], vertices: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
-    """A surface that is nowhere, in whose place `composed` puts another."""
+def _nowhere(thetas: NDArray[np.float64], vertices: NDArray[np.float32], normals: NDArray[np.float32]) -> None:
+    """A surface in whose place `composed` puts another."""
     vertices[:], normals[:] = 0, 0
+
+
+fill: Callable[..., None] = _nowhere
 
 
 @kernel

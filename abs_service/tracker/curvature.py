@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
+#: What is wrong with a curvature that has no Cholesky factor.
+NOT_POSITIVE = "the curvature of the cost is not positive definite"
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Quadratic:
@@ -27,7 +30,7 @@ class Quadratic:
 def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
     """The sum of linearised parts as a quadratic: gradient Jᵀr and curvature JᵀJ of all rows."""
     gradient, curvature = np.zeros(dimension), np.zeros((dimension, dimension))
-    for part in parts:
+    for part in (part for part in parts if len(part.residual)):
         add_at(part.parameters, part.jacobian.T @ part.jacobian, curvature)
         gradient[part.parameters] += part.jacobian.T @ part.residual
     return Quadratic(gradient, curvature)
@@ -64,10 +67,22 @@ def newton_step(quadratic: Quadratic, metric: NDArray[np.float64]) -> NDArray[np
     return -metric @ (metric.T @ quadratic.gradient)
 
 
+def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The δ (dim,) with curvature δ = right, of a positive definite curvature (dim, dim), in half the usual time.
+
+    Raises:
+        LinAlgError: the curvature is not positive definite.
+    """
+    _, found, is_indefinite = scipy.linalg.lapack.dposv(curvature, right)
+    if is_indefinite:
+        raise np.linalg.LinAlgError(NOT_POSITIVE)
+    return np.asarray(found, np.float64)
+
+
 def posterior_covariance(quadratic: Quadratic) -> NDArray[np.float64]:
     """Covariance (dim, dim) of Θ given the measurements: the inverse of the curvature at the estimate (Laplace)."""
     factor, is_indefinite = scipy.linalg.lapack.dpotrf(quadratic.curvature, lower=True)
     if is_indefinite:
-        raise np.linalg.LinAlgError("the curvature of the cost is not positive definite")
+        raise np.linalg.LinAlgError(NOT_POSITIVE)
     lower = scipy.linalg.lapack.dpotri(factor, lower=True)[0]  # half the time of a general inverse
     return np.asarray(lower + np.tril(lower, -1).T, np.float64)

@@ -66,7 +66,7 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
     if not is_object.any():
         return Visibility(nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
     near = _extended(predicted)
-    shown, before, solid, behind, missing = np.empty((5, *distance.shape), np.bool_)
+    shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
     hole = _inside(missing, np.isfinite(predicted), near / focal) if missing.any() else nothing

@@ -55,7 +55,8 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
     assert len(linear.residual) == len(MESH.vertices)
     for step in np.diag([0.02, 0.02, 0.1, 0.02, 0.04, 5e-3]):
         predicted = linear.jacobian @ step
-        actual = [term._residuals(model.deform((theta + part)[None]))[0] - linear.residual for part in (step, -step)]
+        moved = [term._view.synthesize(model.deform((theta + part)[None])) for part in (step, -step)]
+        actual = [term._residuals(seen)[0] - linear.residual for seen in moved]
         np.testing.assert_allclose((actual[0] - actual[1]) / 2, predicted, atol=0.1)  # pixels are 0.7 mm wide
         assert np.abs(predicted).max() > 0.4
 

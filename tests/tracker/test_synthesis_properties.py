@@ -91,7 +91,7 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
     scene = Scene(kind, np.array(turn + shift))
     depth = DepthTerm("tof", scene.synthesizer, len(MESH.vertices), DEPTH, BOUNDS)
     depth.observe(scene.depth, scene.surface)
-    residual, _, cost = depth._residuals(scene.surface)
+    residual, _, cost = depth._residuals(depth._view.synthesize(scene.surface))
     measured = np.isfinite(cost)
     assert np.count_nonzero(measured) > 0.9 * np.sum(depth._view.synthesize(scene.surface).pixel > 0) > 100
     steepest = (

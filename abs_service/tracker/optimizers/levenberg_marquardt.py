@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.curvature import Quadratic
+from abs_service.tracker.curvature import Quadratic, solved
 from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Stop
 
 NAME = "levenberg_marquardt"
@@ -47,6 +47,7 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
 
 def _step(quadratic: Quadratic, damping: float) -> tuple[NDArray[np.float64], float]:
     """The damped step (dim,) and the decrease of cost that the quadratic promises for it [nats]."""
-    curvature = quadratic.curvature + np.diag(damping * np.diag(quadratic.curvature))
-    step = np.asarray(-np.linalg.solve(curvature, quadratic.gradient), np.float64)
+    damped = quadratic.curvature.copy()
+    damped.flat[:: len(damped) + 1] *= 1 + damping
+    step = -solved(damped, quadratic.gradient)
     return step, float(-step @ (quadratic.gradient + 0.5 * quadratic.curvature @ step))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.images import DepthImage, Image
 from abs_service.tracker.chain import Step, both
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
 from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, usual_cost, write_constants
@@ -55,7 +55,7 @@ class DepthTerm:
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
         self._window = WHOLE
-        self._foreground = np.zeros((0, 0), np.float32)
+        self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
         """Renders the noise model over a depth image; what is hidden is left out of this frame."""
@@ -68,7 +68,7 @@ class DepthTerm:
         distance = np.where(texels[..., 3] > 0, texels[..., 0], np.float32(np.nan))
         seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
         doubtful = self._outline.observe(distance, seen, predicted, window)
-        self._window, self._foreground = window, np.where(seen.foreground, distance, np.nan)
+        self._window, self._distance, self._foreground = window, distance, seen.foreground
         height, width = texture.shape[0] - 2, texture.shape[1] - 2
         self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
         self._doubtful = placed(window, doubtful, height, width).ravel()
@@ -84,12 +84,12 @@ class DepthTerm:
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of what stands before the object."""
-        if not self._obscured.any():
+        rows, columns = np.nonzero(self._foreground)
+        if not len(rows):
             return np.zeros((0, 3))
-        rows, columns = np.nonzero(np.isfinite(self._foreground))
         camera, (top, left) = self._view.camera, corner(self._window)
         sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
-        return pose.transform(camera.T_rs, sight * self._foreground[rows, columns, None])
+        return pose.transform(camera.T_rs, sight * self._distance[rows, columns, None])
 
     def hide(self, points: NDArray[np.float64]) -> None:
         """Nothing more: a depth sensor sees for itself what stands before the object."""
@@ -108,11 +108,10 @@ class DepthTerm:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) with what the outline says."""
-        return self._measured_cost(surface) + self._outline.cost(surface)
+        return self._measured_cost(surface, self._view.synthesize(surface)) + self._outline.cost(surface)
 
-    def _measured_cost(self, surface: Surface) -> NDArray[np.float64]:
+    def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
         """Of the measurements; the outlier share is mixed in by the larger of the two densities."""
-        seen = self._view.synthesize(surface)
         out = np.empty(len(seen.pixel))
         depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
@@ -127,12 +126,12 @@ class DepthTerm:
 
     def linearize(self, surface: Surface, moves: Moves) -> Together:
         """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""
-        samples = self._view.follow(surface, moves)
-        parts = (self._linearize_measured(surface, samples), self._linearize_free(surface, samples))
+        samples, seen = self._view.follow(surface, moves), self._view.synthesize(surface)
+        parts = (self._linearize_measured(surface, samples, seen), self._linearize_free(surface, samples, seen))
         return Together((*parts, self._outline.linearize(surface, moves)), moves.dimension)
 
-    def _linearize_measured(self, surface: Surface, samples: Moves) -> PointLinearization:
-        residual, inverse_deviation, cost = self._residuals(surface)
+    def _linearize_measured(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
+        residual, inverse_deviation, cost = self._residuals(seen)
         use = cost < self._bounds.outlier - self._bounds.inlier
         vertices, normals = (
             self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, surface.normals[0].T)
@@ -140,12 +139,12 @@ class DepthTerm:
         rows = depth_rows(vertices, normals, self._view.camera.center) * inverse_deviation[use, None]
         return PointLinearization(residual[use], rows, np.flatnonzero(use), samples)
 
-    def _linearize_free(self, surface: Surface, samples: Moves) -> PointLinearization:
+    def _linearize_free(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
         """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
 
         The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
         """
-        pixel = self._view.synthesize(surface).pixel[0]
+        pixel = seen.pixel[0]
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
         if not out.any():
@@ -158,20 +157,19 @@ class DepthTerm:
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
-        residual, _, cost = self._residuals(surface)
-        measured = cost < np.inf
-        pixel = self._view.synthesize(surface).pixel[0]
+        seen = self._view.synthesize(surface)
+        residual, _, cost = self._residuals(seen)
+        measured, pixel = cost < np.inf, seen.pixel[0]
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
         hidden = (pixel < 0) | self._obscured[pixel]
-        mean = -float(self._measured_cost(surface)[0]) / residual.size
+        mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
         return summarize(
             self.sensor, (pixel > 0) & ~(hidden | self._doubtful[pixel]), hidden, measured | free, size, mean
         )
 
-    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
-        seen = self._view.synthesize(surface)
         residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
         normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, cost)
         return residual, inverse, cost

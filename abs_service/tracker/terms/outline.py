@@ -4,7 +4,7 @@ Distances say nothing about how a smooth surface slides along itself. Where it e
 between the pixels that show the object and those that look past it.
 """
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -25,6 +25,11 @@ GRACE = 3.0
 
 #: The object goes on beyond the outermost vertices by no more than so many times their distance from the next ones.
 MOST_BEYOND = 2.0
+
+
+#: Outer and inner vertices and share of a rim, and what `projection.project` takes of a camera.
+Ends = tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float32]]
+Optics = tuple[bool, NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float]
 
 
 class Outline(Protocol):
@@ -135,7 +140,7 @@ class RimOutline:
         return Linearization(residual[use], jacobian)
 
     @property
-    def _arguments(self) -> tuple[Any, ...]:
+    def _arguments(self) -> tuple[*Ends, *Optics, NDArray[np.float32], NDArray[np.float32]]:
         """What `locate` takes between the vertices and the results."""
         ends = self._rim.outer, self._rim.inner, self._beyond
         return *ends, *self._projection.arguments, self._corner, self._inwards
