@@ -11,7 +11,7 @@ from abs_service.experiments.base import Context, Findings
 from abs_service.experiments.geometries import findings
 from abs_service.experiments.geometries.bound import Priors
 from abs_service.experiments.geometries.following import KnownSheet, printed
-from abs_service.experiments.geometries.measuring import PAPER, Job, Sequence, Variant, measure
+from abs_service.experiments.geometries.measuring import BOTH, PAPER, Job, Sequence, Variant, measure
 from abs_service.experiments.geometries.sensor import calibrated, true_sensor
 from abs_service.experiments.scenes.geometries import GEOMETRIES, Motion, MovingSheet
 
@@ -21,7 +21,10 @@ TITLE = "E1: ten geometries, Euclidean fitness against likelihood and against th
 OFF = 100.0
 
 #: Priors of a mesh of 5000 vertices: the same stretch is counted on so many edges more than on one of 600.
-FINE = Priors(stretch=0.02 * (5000 / 600) ** 0.5, speed=0.3)
+FINE = Priors(stretch=BOTH.stretch * (5000 / 600) ** 0.5, speed=BOTH.speed)
+
+#: Other deviations of the stretch prior: that of the built-in rig, and one as far on the other side.
+OTHERS = (0.02, 0.04)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +100,11 @@ def _variants(settings: Settings, number: int) -> dict[str, Variant]:
     variants = _main(settings.frames)
     for kind, likelihood in ((findings.LIKELIHOOD, True), (findings.EUCLIDEAN, False)):
         n = settings.prior_frames
-        variants[f"{kind}, no stretch prior"] = Variant(likelihood, n, Priors(OFF, 0.3))
-        variants[f"{kind}, no motion prior"] = Variant(likelihood, n, Priors(0.02, OFF))
+        for deviation in OTHERS:
+            name = f"{kind}, stretch prior of {deviation}"
+            variants[name] = Variant(likelihood, settings.frames, Priors(deviation, BOTH.speed))
+        variants[f"{kind}, no stretch prior"] = Variant(likelihood, n, Priors(OFF, BOTH.speed))
+        variants[f"{kind}, no motion prior"] = Variant(likelihood, n, Priors(BOTH.stretch, OFF))
         variants[f"{kind}, neither prior"] = Variant(likelihood, n, Priors(OFF, OFF))
         n = settings.mesh_frames
         variants[f"{kind}, vertices at the rim"] = Variant(likelihood, n, inset=0.0)

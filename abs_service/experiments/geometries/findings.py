@@ -60,7 +60,8 @@ _BOUND = (
     "prior adds because the true sheet stretches at all. “all pixels” is “and priors” with every pixel of the sheet."
 )
 _PRIORS = (
-    "Root mean square errors over the same frames, with each prior switched off. The shape prior has no part here: "
+    "Root mean square errors over the same frames, with each prior switched off, and with other deviations of that of "
+    "stretch than 0.03, with which the likelihood is to err least. The shape prior has no part here: "
     "nothing is known of the control points of a NURBS before measuring. The grey image stays: without it and without "
     "priors nothing says where on the surface a control point lies."
 )
