@@ -22,7 +22,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.curvature import add_at
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
@@ -38,12 +37,12 @@ def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> N
         inverse: Σ (dim, dim), of the curvature of likelihood and priors.
         sensed: r and J of the sensors, in parts.
     """
-    excess = np.zeros_like(inverse)
+    covariance = inverse.copy()
     for part in sensed:
-        answer = part.jacobian @ inverse[part.square]
-        kept = np.maximum(1 - np.einsum("md,md->m", answer, part.jacobian), LEAST_KEPT)
-        add_at(part.parameters, (part.jacobian.T * (part.residual**2 / kept - 1)) @ part.jacobian, excess)
-    return inverse + inverse @ excess @ inverse
+        answer = part.jacobian @ inverse[part.parameters]
+        kept = np.maximum(1 - np.einsum("md,md->m", answer[:, part.parameters], part.jacobian), LEAST_KEPT)
+        covariance += (answer.T * (part.residual**2 / kept - 1)) @ answer
+    return covariance
 
 
 def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -28,11 +28,6 @@ class Linearization:
     jacobian: NDArray[np.float64]
     parameters: NDArray[np.int64] | slice = field(default_factory=lambda: EVERY)
 
-    @property
-    def square(self) -> tuple[NDArray[np.int64], ...] | slice:
-        """Index of a matrix (dim, dim) that gives its part (k, k) for the parameters."""
-        return self.parameters if isinstance(self.parameters, slice) else (self.parameters[:, None], self.parameters)
-
     def parts(self) -> list["Linearization"]:
         """Itself."""
         return [self]
