@@ -14,7 +14,9 @@ _ON_AXIS = 1e-4
 
 
 @kernel
-def bend_fisheye(x: np.float32, y: np.float32, lens: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
+def bend_fisheye(
+    x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
+) -> tuple[np.float32, np.float32]:
     """Distorted from ideal normalised coordinates, for the four coefficients of a fisheye."""
     one = np.float32(1)
     radius = np.sqrt(x * x + y * y)
@@ -26,7 +28,21 @@ def bend_fisheye(x: np.float32, y: np.float32, lens: NDArray[np.float32]) -> tup
 
 
 @kernel
-def bend(x: np.float32, y: np.float32, lens: NDArray[np.float32]) -> tuple[np.float32, np.float32]:
+def eight(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
+    """The coefficients of a lens, for `bend`, as numbers, which stay where elements are read again."""
+    return lens[0], lens[1], lens[2], lens[3], lens[4], lens[5], lens[6], lens[7]
+
+
+@kernel
+def four(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
+    """The same of a fisheye, for `bend_fisheye`."""
+    return lens[0], lens[1], lens[2], lens[3]
+
+
+@kernel
+def bend(
+    x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
+) -> tuple[np.float32, np.float32]:
     """Distorted from ideal normalised coordinates, for the eight coefficients of any other lens."""
     one, two = np.float32(1), np.float32(2)
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
