@@ -12,7 +12,7 @@ from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
 #: No search gets farther from the prediction than so many deviations of the motion prior.
-FARTHEST = 5.0
+FARTHEST = 4.0
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
 FIRST_INTERVAL_S = 1 / 30

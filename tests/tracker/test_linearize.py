@@ -88,7 +88,7 @@ def test_the_chain_rule_is_a_product_of_matrices(seed, count):
 
 def test_grazing_views_do_not_explode():
     normals = np.array([[0.0, 0, -1], [1, 0, -1e-4]]) / [[1], [np.hypot(1, 1e-4)]]
-    rows = depth_rows(np.array([[0.0, 0, 1], [0, 0, 1]]), normals, np.zeros(3))
+    rows = depth_rows(np.array([[0.0, 0, 1], [0, 0, 1]]), normals, np.zeros(3), np.arange(2), np.ones(2))
     np.testing.assert_allclose(rows[0], [0, 0, -1])
     assert np.linalg.norm(rows[1]) == pytest.approx(5)
 

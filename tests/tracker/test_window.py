@@ -182,5 +182,5 @@ def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():
     assert np.isinf(prior.reach_m)  # nothing is known of the first frame
     prior.update(np.zeros(3))
     prior.predict(100_000_000)
-    assert prior.reach_m == pytest.approx(5 * 0.3 * 0.1)
-    assert prior.cost(np.array([[prior.reach_m, 0, 0]]))[0] == pytest.approx(12.5)
+    assert prior.reach_m == pytest.approx(4 * 0.3 * 0.1)
+    assert prior.cost(np.array([[prior.reach_m, 0, 0]]))[0] == pytest.approx(8)

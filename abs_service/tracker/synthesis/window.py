@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.projection import Projection
+from abs_service.tracker.synthesis.zbuffer import extent
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -35,10 +36,12 @@ def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: 
     if not np.isfinite(reach_m * nearest):
         return WHOLE
     margin = reach_m * max(camera.fx, camera.fy) * nearest + 2
-    size = np.array([camera.width, camera.height])
-    first = np.clip(np.floor(place[0].min(axis=0) - margin), 0, size).astype(int)
-    last = np.clip(np.ceil(place[0].max(axis=0) + margin) + 1, first, size).astype(int)
-    return slice(int(first[1]), int(last[1])), slice(int(first[0]), int(last[0]))
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    extent(place, inverse_z, low, high)
+    size = np.array([camera.height, camera.width])
+    first = np.clip(np.floor(low - margin), 0, size).astype(int).tolist()
+    last = np.clip(np.ceil(high + margin) + 1, first, size).astype(int).tolist()
+    return slice(first[0], last[0]), slice(first[1], last[1])
 
 
 def corner(window: Window) -> tuple[int, int]:

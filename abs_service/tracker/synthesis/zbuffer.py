@@ -88,7 +88,7 @@ def _box(
 ) -> tuple[int, int, int, int]:
     """First row and column, and number of both, in steps, of what a population covers of an image."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
-    _extent(place, inverse_z, low, high)
+    extent(place, inverse_z, low, high)
     if high[0] < low[0]:
         return 0, 0, 0, 0
     most = -(-np.array(shape) // step) - 1
@@ -98,7 +98,7 @@ def _box(
 
 
 @kernel
-def _extent(
+def extent(
     place: NDArray[np.float32], inverse_z: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> None:
     """Least and greatest (row, column) of all vertices that the camera can see."""

@@ -11,7 +11,15 @@ from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
-from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, depth_cost, judge, normalize, usual_cost, write_constants
+from abs_service.tracker.terms.depth_cost import (
+    FREE_SCALE_M,
+    depth_cost,
+    distances,
+    judge,
+    normalize,
+    usual_cost,
+    write_constants,
+)
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
 from abs_service.tracker.terms.outline import Outline, Unknown
@@ -65,7 +73,8 @@ class DepthTerm:
         texture = self._synthesizer.texture(self.sensor, self._render(image, window))
         texels = within(texture, window)
         self._view.look(predicted)
-        distance = np.where(texels[..., 3] > 0, texels[..., 0], np.float32(np.nan))
+        distance = np.empty(texels.shape[:2], np.float32)
+        distances(texels, distance)
         seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
         doubtful = self._outline.observe(distance, seen, predicted, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
@@ -102,7 +111,7 @@ class DepthTerm:
         costs an outlier, and more the farther it is from the object.
         """
         silent = seen.foreground | seen.hole | doubtful
-        agreeing = usual_cost(within(texture, self._window)[..., 6], seen.object) if silent.any() else 0.0
+        agreeing = usual_cost(within(texture, self._window), seen.object) if silent.any() else 0.0
         free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
         write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
 
@@ -132,12 +141,12 @@ class DepthTerm:
 
     def _linearize_measured(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
         residual, inverse_deviation, cost = self._residuals(seen)
-        use = cost < self._bounds.outlier - self._bounds.inlier
+        use = np.flatnonzero(cost < self._bounds.outlier - self._bounds.inlier)
         vertices, normals = (
-            self._view.spread(surface, values)[use] for values in (surface.vertices[0].T, surface.normals[0].T)
+            self._view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
-        rows = depth_rows(vertices, normals, self._view.camera.center) * inverse_deviation[use, None]
-        return PointLinearization(residual[use], rows, np.flatnonzero(use), samples)
+        rows = depth_rows(vertices, normals, self._view.camera.center, use, inverse_deviation)
+        return PointLinearization(residual[use], rows, use, samples)
 
     def _linearize_free(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
         """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.

@@ -18,9 +18,24 @@ FREE_SCALE_M = 0.01
 _TILE = 32
 
 
-def usual_cost(normalizer: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
+@kernel
+def usual_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
     """What a measurement of the object that agrees costs on average; 0 where a mask (rows, columns) shows none."""
-    return float(np.median(normalizer[shown])) + 0.5 if shown.any() else 0.0
+    normalizer, count = np.empty(shown.size, np.float32), 0
+    for row in range(shown.shape[0]):
+        for column in range(shown.shape[1]):
+            normalizer[count] = texels[row, column, 6]
+            count += 1 if shown[row, column] else 0
+    return float(np.median(normalizer[:count])) + 0.5 if count else 0.0
+
+
+@kernel
+def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
+    """What every pixel (rows, columns) measured, without the mean offset [m]; not a number without a return."""
+    for row in range(found.shape[0]):
+        for column in range(found.shape[1]):
+            texel = texels[row, column]
+            found[row, column] = texel[0] if texel[3] > 0 else np.float32(np.nan)
 
 
 @kernel

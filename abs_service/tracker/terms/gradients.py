@@ -20,9 +20,13 @@ LEAST_COSINE = 0.2
 
 
 def depth_rows(
-    vertices: NDArray[np.floating], normals: NDArray[np.floating], center: NDArray[np.float64]
+    vertices: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    center: NDArray[np.float64],
+    use: NDArray[np.intp],
+    weight: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Derivatives (n, 3) of measured − synthesised distance by the vertex.
+    """Derivatives (m, 3) of weighted measured − synthesised distances by some of the vertices.
 
     A vertex that slides along the surface keeps its residual, because the measurement moves with the pixel; only its
     motion along the normal counts, lengthened by the angle between normal and line of sight.
@@ -30,9 +34,11 @@ def depth_rows(
     Args:
         vertices, normals: positions [m] and unit normals (n, 3).
         center: camera centre c_s (3,) [m].
+        use: indices of these vertices (m,).
+        weight: of each vertex' distance (n,) [1/m].
     """
-    rows = np.empty((len(vertices), 3))
-    _depth_rows(np.asarray(vertices, np.float64), np.asarray(normals, np.float64), center, rows)
+    rows = np.empty((len(use), 3))
+    _depth_rows(vertices, normals, center, use, weight, rows)
     return rows
 
 
@@ -105,15 +111,21 @@ def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDA
 
 @kernel
 def _depth_rows(
-    vertices: NDArray[np.float64], normals: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64]
+    vertices: NDArray[np.floating],
+    normals: NDArray[np.floating],
+    center: NDArray[np.float64],
+    use: NDArray[np.intp],
+    weight: NDArray[np.float64],
+    rows: NDArray[np.float64],
 ) -> None:
-    """Normals (n, 3) over the cosines of the angles at which vertices (n, 3) are seen from a centre (3,)."""
-    for v in range(vertices.shape[0]):
+    """Weighted normals (n, 3) over the cosines of the angles at which vertices (n, 3) are seen from a centre (3,)."""
+    for k in range(use.size):
+        v = use[k]
         x, y, z = vertices[v, 0] - center[0], vertices[v, 1] - center[1], vertices[v, 2] - center[2]
         along = normals[v, 0] * x + normals[v, 1] * y + normals[v, 2] * z
         cosine = min(along / np.sqrt(x * x + y * y + z * z), -LEAST_COSINE)
         for i in range(3):
-            rows[v, i] = -normals[v, i] / cosine
+            rows[k, i] = -normals[v, i] * weight[v] / cosine
 
 
 @kernel
