@@ -59,6 +59,7 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
         predicted: radial distances of the predicted mesh [m], infinite beside it.
         focal: focal length of the camera [px].
     """
+    distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
     labels, count = connected_surfaces(distance, LARGEST_STEP_M)
     is_object = np.zeros(count, np.bool_)
     _recognize(distance, predicted, labels, is_object)
