@@ -146,15 +146,16 @@ def test_without_color_it_is_unknown_where_along_the_sheet_a_vertex_is():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [11, 12, 13])
-def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be(seed):
-    found = coverage(f"simulated://sheet?seed={seed}", 120)
-    print(f"seed {seed}: {found}")
-    assert 0.9 <= found.vertices <= 0.99
-    assert 0.9 <= found.sensed <= 0.99
-    assert found.directions > 12
-    assert found.theta >= 0.9
-    assert found.said_mm == pytest.approx(found.true_mm, rel=0.1)
+def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be():
+    """In each sequence not much less often; whether more often, 119 frames that share errors cannot tell alone."""
+    found = [coverage(f"simulated://sheet?seed={seed}", 120) for seed in (11, 12, 13)]
+    for one in found:
+        print(one)
+        assert min(one.vertices, one.sensed, one.theta) >= 0.9
+        assert one.directions > 12
+        assert one.said_mm == pytest.approx(one.true_mm, rel=0.1)
+    for shares in ([one.vertices for one in found], [one.sensed for one in found]):
+        assert 0.92 <= np.mean(shares) <= 0.985
 
 
 def test_a_vertex_without_the_noise_of_its_mesh_would_claim_too_much():
