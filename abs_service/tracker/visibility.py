@@ -71,8 +71,8 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
     hole = _inside(missing, np.isfinite(predicted), near / focal) if missing.any() else nothing
-    away_px = np.asarray(_depth_inside(~shown), np.float32)
-    return Visibility(shown, foreground, hole, np.where(behind, away_px * near / np.float32(focal), np.float32(0)))
+    away = _depth_inside(~shown) * near / np.float32(focal)
+    return Visibility(shown, foreground, hole, np.where(behind, away, np.float32(0)))
 
 
 @kernel

@@ -152,6 +152,7 @@ def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be():
     for one in found:
         print(one)
         assert min(one.vertices, one.sensed, one.theta) >= 0.9
+        assert one.vertices <= 0.99
         assert one.directions > 12
         assert one.said_mm == pytest.approx(one.true_mm, rel=0.1)
     for shares in ([one.vertices for one in found], [one.sensed for one in found]):

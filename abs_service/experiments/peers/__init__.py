@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.experiments.base import Context, Findings, Goal, at_most
 from abs_service.experiments.peers import report, rivals
 from abs_service.experiments.peers.gauss_newton import GaussNewton
-from abs_service.experiments.peers.measuring import Followed, Make, follow, quickest, with_template
+from abs_service.experiments.peers.measuring import Followed, Make, follow, with_template
 from abs_service.experiments.peers.ours import SETUPS, Ours
 from abs_service.experiments.peers.rivals import Follower
 from abs_service.experiments.peers.scene import Leap, Scene, Shot, film, spin, turn
@@ -146,7 +146,9 @@ def _goals(
     lost = [one.lost for one in leapt[GAUSS_NEWTON]]
     both = sum(here.lost for here, there in zip(leapt[BEST], lost) if there)
     return (
-        at_most(f"Time a frame, {BEST}, median of the quickest sequence", quickest(best["5 mm"]), 4, "ms"),
+        at_most(
+            f"Time a frame, {BEST}, median", np.median(np.concatenate([one.cpu_ms for one in best["5 mm"]])), 4, "ms"
+        ),
         at_most("Vertex error at 5 mm noise", mean("5 mm", "vertex_mm"), 2.0, "mm"),
         at_most("Surface error at 5 mm noise", mean("5 mm", "surface_mm"), 0.7, "mm"),
         at_most("Vertex error at 15 mm noise", mean("15 mm", "vertex_mm"), 3.5, "mm"),
