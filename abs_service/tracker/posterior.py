@@ -1,6 +1,7 @@
 """What a search minimises: the negative logarithm of likelihood times priors, for the observation in hand."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,27 @@ from abs_service.tracker.priors import MotionPrior, ShapePrior
 from abs_service.tracker.stretch import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 from abs_service.tracker.terms.linearization import Linearization
+
+#: Within so many nats per parameter of where it was made, a linearisation is as good as a new one: that is how far the
+#: last step of a descent goes, and half of how far the noise of a frame throws the estimate.
+NEAR = 0.25
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearized:
+    """The cost near one Θ.
+
+    Attributes:
+        theta: the parameters (dim,).
+        quadratic: likelihood and priors.
+        sensed: residuals of the sensors alone, and their derivatives.
+        moves: how the vertices move.
+    """
+
+    theta: NDArray[np.float64]
+    quadratic: Quadratic
+    sensed: list[Linearization]
+    moves: Moves
 
 
 class Posterior:
@@ -38,7 +60,7 @@ class Posterior:
         self._shape = shape
         self._motion = motion
         self._cost = self.cost_in_stages
-        self._linearized: list[tuple[NDArray[np.float64], Quadratic, list[Linearization], Moves]] = []
+        self._linearized: list[Linearized] = []
         self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
 
     def observe(self, observation: Observation) -> NDArray[np.float64]:
@@ -76,17 +98,21 @@ class Posterior:
 
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
-        if not (self._linearized and np.array_equal(self._linearized[0][0], theta)):
+        if not (self._linearized and np.array_equal(self._linearized[0].theta, theta)):
             surface, moves = self._model.deform(theta[None]), self._model.moves(theta)
             sensed = [part for points in self._objective.linearize(surface, moves) for part in points.parts()]
             quadratic = gauss_newton([*sensed, *self._priors(surface, moves, theta)], self.dimension)
-            self._linearized = [(theta, quadratic, sensed, moves)]
-        return self._linearized[0][1]
+            self._linearized = [Linearized(theta, quadratic, sensed, moves)]
+        return self._linearized[0].quadratic
 
-    def sensed(self, theta: NDArray[np.float64]) -> tuple[list[Linearization], Moves]:
-        """What the sensors alone say near theta (dim,), and how the vertices move there."""
+    def linearized_near(self, theta: NDArray[np.float64]) -> Linearized:
+        """The last linearisation with its residuals at theta (dim,) if that is `NEAR`, and a new one if it is not."""
+        for last in self._linearized:
+            by = theta - last.theta
+            if 0.5 * by @ last.quadratic.curvature @ by < NEAR * self.dimension:
+                return replace(last, sensed=[part.moved(by) for part in last.sensed])
         self.linearize(theta)
-        return self._linearized[0][2:]
+        return self._linearized[0]
 
     def answers(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): the sensors' derivatives by Θ, and by steps of single vertices (n, 3) [m]."""

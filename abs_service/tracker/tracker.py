@@ -65,10 +65,10 @@ class Tracker:
         self, theta: NDArray[np.float64], surface: Surface
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
-        sensed, moves = self._posterior.sensed(theta)
-        covariance = uncertainty.sandwich(posterior_covariance(self._posterior.linearize(theta)), sensed)
+        near = self._posterior.linearized_near(theta)
+        covariance = uncertainty.sandwich(posterior_covariance(near.quadratic), near.sensed)
         own = uncertainty.along_normals(surface, self._own)
-        return covariance, uncertainty.propagated(moves, covariance) + own
+        return covariance, uncertainty.propagated(near.moves, covariance) + own
 
     def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
+from abs_service.tracker.curvature import Quadratic
 from abs_service.tracker.optimizers.base import Budget, Stop
 from abs_service.tracker.optimizers.levenberg_marquardt import descend
-from tests.tracker.problems import linear, rosenbrock
+from tests.tracker.problems import Known, linear, rosenbrock
 
 TARGET = np.array([0.3, -2.0, 1.0])
 
@@ -16,18 +18,49 @@ def budget(limit: int = 10**6, in_time=lambda: True) -> Budget:
     return Budget(limit, in_time)
 
 
-def test_one_step_solves_a_linear_problem_and_the_next_promises_nothing():
-    problem, spent = linear(TARGET, np.array([1.0, 10.0, 100.0])), budget()
+def counted(problem: Known) -> tuple[Known, list[NDArray[np.float64]]]:
+    """The problem, and a list that every Θ enters at which it is linearised."""
+    asked: list[NDArray[np.float64]] = []
+
+    class Counted(Known):
+        def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+            asked.append(theta)
+            return super().linearize(theta)
+
+    return Counted(problem.dimension, problem.residuals, problem.unexplained_at), asked
+
+
+def test_one_step_solves_a_linear_problem_and_the_next_is_the_last():
+    (problem, asked), spent = counted(linear(TARGET, np.array([1.0, 10.0, 100.0]))), budget()
     found = descend(problem, np.zeros(3), 5, 1e-6, spent)
     np.testing.assert_allclose(found.theta, TARGET, atol=1e-8)
     assert (found.stop, found.searcher, found.deviation) == (Stop.CONVERGED, "levenberg_marquardt", 0.0)
-    assert (spent.generations, spent.evaluations) == (1, 2)
+    assert (len(asked), spent.evaluations) == (2, 3)
 
 
-def test_where_it_is_best_already_nothing_is_tried():
+def test_a_step_that_promises_little_is_taken_and_is_the_last():
+    (problem, asked), spent = counted(linear(TARGET, np.ones(3))), budget()
+    promise = 0.5 * TARGET @ TARGET
+    found = descend(problem, np.zeros(3), 5, 1.01 * promise, spent)
+    np.testing.assert_allclose(found.theta, TARGET, atol=1e-8)
+    assert (found.stop, spent.generations, spent.evaluations, len(asked)) == (Stop.CONVERGED, 1, 2, 1)
+
+
+def test_a_step_that_promises_little_and_does_not_keep_it_is_not_taken():
+    def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.column_stack([x - TARGET, np.where(np.abs(x).max(axis=1) > 0.1, 9.0, 0.0)])
+
+    steep = Known(3, residuals, lambda _: 0.0)
+    found = descend(steep, np.zeros(3), 5, 10.0, budget())
+    assert found.stop == Stop.CONVERGED
+    np.testing.assert_array_equal(found.theta, 0)
+
+
+def test_where_it_is_best_already_it_stays():
     spent = budget()
     found = descend(linear(TARGET, np.ones(3)), TARGET, 5, 1e-6, spent)
-    assert (found.stop, spent.generations, spent.evaluations) == (Stop.CONVERGED, 0, 1)
+    np.testing.assert_allclose(found.theta, TARGET, atol=1e-9)
+    assert (found.stop, spent.evaluations) == (Stop.CONVERGED, 2)
 
 
 @settings(max_examples=40, deadline=None)

@@ -147,16 +147,17 @@ def test_without_color_it_is_unknown_where_along_the_sheet_a_vertex_is():
 
 @pytest.mark.slow
 def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be():
-    """In each sequence not much less often; whether more often, 119 frames that share errors cannot tell alone."""
-    found = [coverage(f"simulated://sheet?seed={seed}", 120) for seed in (11, 12, 13)]
+    """The frames of one sequence share their errors: shares scatter by 4 % from one to the next, their mean by 1 %."""
+    found = [coverage(f"simulated://sheet?seed={seed}", 120) for seed in range(11, 23)]
     for one in found:
         print(one)
-        assert min(one.vertices, one.sensed, one.theta) >= 0.9
-        assert one.vertices <= 0.99
+        assert min(one.vertices, one.theta) >= 0.95
+        assert one.sensed >= 0.85
         assert one.directions > 12
-        assert one.said_mm == pytest.approx(one.true_mm, rel=0.1)
-    for shares in ([one.vertices for one in found], [one.sensed for one in found]):
-        assert 0.92 <= np.mean(shares) <= 0.985
+        assert one.said_mm == pytest.approx(one.true_mm, rel=0.15)
+    assert np.mean([one.sensed for one in found]) == pytest.approx(0.95, abs=0.025)
+    assert np.mean([one.vertices for one in found]) <= 0.985
+    assert np.mean([one.said_mm for one in found]) == pytest.approx(np.mean([one.true_mm for one in found]), rel=0.07)
 
 
 def test_a_vertex_without_the_noise_of_its_mesh_would_claim_too_much():

@@ -27,7 +27,8 @@ class Settings:
 
     Attributes:
         steps: of the descent per frame at most.
-        tolerance: the descent has converged when a step promises less than this [nats].
+        tolerance: the descent ends with a step that promises less than this per parameter [nats]; the noise of a frame
+            throws the estimate by ½.
         population: candidates per generation of CMA-ES; 0 lets it choose 4 + 3 ln dim.
         generations: generations per frame at most, where CMA-ES takes over.
         step: standard deviation of its first candidates, in deviations of the priors.
@@ -38,7 +39,7 @@ class Settings:
     """
 
     steps: Annotated[int, Ge(1)] = 12
-    tolerance: Annotated[float, Gt(0)] = 2.0
+    tolerance: Annotated[float, Gt(0)] = 0.2
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 25
     step: Annotated[float, Gt(0)] = 1.0
@@ -89,7 +90,8 @@ class Hybrid:
         return found
 
     def _descend(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        return descend(problem, start, self._settings.steps, self._settings.tolerance, budget)
+        tolerance = self._settings.tolerance * problem.dimension
+        return descend(problem, start, self._settings.steps, tolerance, budget)
 
     def _take_over(self, problem: Problem, start: NDArray[np.float64], near: Outcome, budget: Budget) -> Outcome:
         """The better of what the descent found and of what CMA-ES finds, with a descent from there."""

@@ -11,7 +11,6 @@ NAME = "levenberg_marquardt"
 #: Damping after the first step that failed, and its growth with each further one, as a share of the curvature.
 FIRST_DAMPING = 0.1
 GROWTH = 10.0
-MOST_DAMPING = 1e3
 
 
 def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Outcome:
@@ -21,27 +20,28 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         problem: the cost.
         start: where to begin (dim,).
         iterations: steps at most.
-        tolerance: a step that promises a smaller decrease [nats] is not taken: it has converged.
+        tolerance: a step that promises a smaller decrease [nats] is the last: what would follow it is less by far.
         budget: evaluations and time; one step is tried at least.
     """
     theta, cost = start, float(problem.cost(start[None])[0])
     budget.spend(1)
-    stop, damping, steps, tries = None, 0.0, 0, 0
+    stop, damping, steps = None, 0.0, 0
     quadratic = problem.linearize(theta)
     while stop is None and steps < iterations:
         step, promise = _step(quadratic, damping)
-        if promise < tolerance:
-            stop = Stop.CONVERGED
-            break
         moved = float(problem.cost((theta + step)[None])[0])
-        better, tries = moved < cost, tries + 1
+        better = moved < cost
         budget.spend(1, generations=int(better))
         if better:
             theta, cost, damping, steps = theta + step, moved, damping / GROWTH, steps + 1
-            quadratic = problem.linearize(theta)
-        else:
-            damping = max(damping * GROWTH, FIRST_DAMPING)
+        if promise < tolerance:
+            stop = Stop.CONVERGED
+            break
         stop = budget.exhausted()
+        if not better:
+            damping = max(damping * GROWTH, FIRST_DAMPING)
+        elif stop is None and steps < iterations:
+            quadratic = problem.linearize(theta)
     return Outcome(theta, cost, NAME, stop or Stop.GENERATIONS, 0.0)
 
 

@@ -32,6 +32,10 @@ class Linearization:
         """Itself."""
         return [self]
 
+    def moved(self, by: NDArray[np.float64]) -> "Linearization":
+        """The residuals, to first order, when all parameters have changed by so much (dim,)."""
+        return Linearization(self.residual + self.jacobian @ by[self.parameters], self.jacobian, self.parameters)
+
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
         """Jᵀ times values (m, k) of the residuals (dimension, k)."""
         result = np.zeros((dimension, values.shape[1]))
