@@ -57,8 +57,9 @@ def run(arguments: argparse.Namespace) -> int:
     name = _tracker(settings, arguments.tracker, path)
     strip = follow(recording, *replay.recorded_rig(settings, name, recording), plans.plan(settings, name))
     model = strip.model
-    found = estimate_stiffness(strip.hangings, model.strip.length, model.strip.length_deviation)
-    bending = found.bending(arguments.weight * FREE_FALL, model.strip.length)
+    seen = model.strip
+    found = estimate_stiffness(strip.hangings, seen.length, seen.length_deviation, seen.load_deviation)
+    bending = found.bending(arguments.weight * FREE_FALL, seen.length)
     title = f"D = {bending * 1e3:.3g} mN·m ± {found.deviation:.0%}, {found.frames} frames"
     try:
         draw(strip.profiles(found), title, plot)
@@ -90,7 +91,8 @@ def _text(found: Stiffness, bending: float, strip: HangingStrip, plot: Path) -> 
             f"{found.frames} frames tracked, {strip.passed_over} not",
             f"bending stiffness per width  D = {bending * 1e3:.4g} mN·m ± {found.deviation:.1%} (one deviation)",
             f"  of the whole strip        EI = {bending * size.width:.4g} N·m²",
-            f"  from the scatter {found.scatter:.1%}, from where the strip's ends are {found.from_length:.1%}",
+            f"  from the scatter {found.scatter:.1%}, from where the strip's ends are {found.from_length:.1%}, "
+            f"from its shape when it was found {found.from_first:.1%}",
             f"load w L³/D {found.load:.3g}; squared residuals {found.misfit:.1f} of their variance"
             + (": the strip is not straight by itself, not uniform, or moves fast" if found.misfit > 9 else ""),
             f"drew {plot}",
@@ -106,6 +108,7 @@ def _json(found: Stiffness, bending: float, strip: HangingStrip, plot: Path) -> 
             "relative_deviation": found.deviation,
             "relative_deviation_scatter": found.scatter,
             "relative_deviation_length": found.from_length,
+            "relative_deviation_first": found.from_first,
             "bending_stiffness_nm2": bending * size.width,
             "load": found.load,
             "misfit": found.misfit,

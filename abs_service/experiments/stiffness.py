@@ -71,8 +71,9 @@ def trial(true: float, seed: int, frames: int) -> Trial:
     if not isinstance(model, gravity.Gravity):
         raise TypeError(f"a gravity model was asked for, not {model}")
     hangings = [hanging(model, one.theta, one.covariance) for one in followed.estimates]
-    found = estimate_stiffness(hangings, model.strip.length, model.strip.length_deviation)
-    return Trial(true, found.bending(WEIGHT, model.strip.length), found, followed.surface_mm)
+    strip = model.strip
+    found = estimate_stiffness(hangings, strip.length, strip.length_deviation, strip.load_deviation)
+    return Trial(true, found.bending(WEIGHT, strip.length), found, followed.surface_mm)
 
 
 def run(settings: Settings, context: Context) -> Findings:
@@ -100,7 +101,7 @@ def run(settings: Settings, context: Context) -> Findings:
     )
 
 
-_REASON = "Errors are mostly common to a sequence: where on the strip the first frame puts the gripper."
+_REASON = "Errors are mostly common to a sequence: the shape that the strip seems to have in its first frame."
 
 _COLUMNS = (
     Column("true D", "mN·m", ".3g"),

@@ -17,6 +17,9 @@ NOISE_M = 5e-3
 #: What is this many times farther away is something else, or a pixel that shows two things at once.
 LARGEST_GAP = 3.0
 
+#: Step of the numerical derivatives: of a place [m], an angle [rad], and the logarithm of a load.
+STEP = 1e-3
+
 #: Loads w L³ / D that are looked for: a strip that sags by a thousandth of its length, and a thread.
 LOADS = (1e-2, 300.0)
 
@@ -168,17 +171,28 @@ def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> Hang:
 
 def fit(hang: Hang, flat: NDArray[np.float64]) -> Hang:
     """The hang of the same length with the least distance to points (n, 2); it may not slide along itself."""
+    bounds = ([-np.inf, -np.inf, np.log(LOADS[0] / hang.load)], [np.inf, np.inf, np.log(LOADS[1] / hang.load)])
+    found = scipy.optimize.least_squares(
+        lambda p: _changed(hang, p).unroll(flat)[1] / NOISE_M,
+        np.clip(np.zeros(3), *bounds),
+        bounds=bounds,
+        loss="soft_l1",
+        x_scale=(0.01, 0.1, 1.0),
+    )
+    return _changed(hang, found.x)
+
+
+def load_deviation(hang: Hang, flat: NDArray[np.float64]) -> float:
+    """Standard deviation of the logarithm of a fitted hang's load, from how its points (n, 2) scatter."""
+    steps = STEP * np.eye(3)
+    ahead, back = ([_changed(hang, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
+    slopes = (np.array(ahead) - np.array(back)) / (2 * STEP)
+    scatter = 1.4826 * np.median(np.abs(hang.unroll(flat)[1]))  # of a normal distribution, whatever a few points do
+    return float(scatter * np.sqrt(np.linalg.inv(slopes @ slopes.T)[2, 2]))
+
+
+def _changed(hang: Hang, by: NDArray[np.float64]) -> Hang:
+    """Moved beside its chord [m], with another inclination at the free end [rad] and another logarithm of the load."""
     chord = hang.nodes[-1] - hang.nodes[0]
     beside = np.array([-chord[1], chord[0]]) / np.linalg.norm(chord)
-
-    def moved(p: NDArray[np.float64]) -> Hang:
-        return Hang(hang.tip + p[1], float(np.exp(p[2])), hang.middle + p[0] * beside, hang.length)
-
-    def residual(p: NDArray[np.float64]) -> Vector:
-        return moved(p).unroll(flat)[1] / NOISE_M
-
-    bounds = ([-np.inf, -np.inf, np.log(LOADS[0])], [np.inf, np.inf, np.log(LOADS[1])])
-    start = np.clip([0.0, 0.0, np.log(hang.load)], *bounds)
-    return moved(
-        scipy.optimize.least_squares(residual, start, bounds=bounds, loss="soft_l1", x_scale=(0.01, 0.1, 1.0)).x
-    )
+    return Hang(hang.tip + by[1], hang.load * float(np.exp(by[2])), hang.middle + by[0] * beside, hang.length)

@@ -60,9 +60,10 @@ class Stiffness:
 
     Attributes:
         load: weight per area times length cubed over stiffness per width; no unit.
-        deviation: standard deviation of the load's logarithm: from the scatter of the frames, and from the length.
+        deviation: standard deviation of the load's logarithm: that of all parts together.
         scatter: the part of it that is told from how stretches of the recording differ.
         from_length: the part of it that comes from the strip's length.
+        from_first: the part of it that comes from how the strip hung when it was found.
         misfit: mean squared residual of the inclinations, in their own variances: about 1 if the beam model holds.
         frames: number of frames used.
     """
@@ -71,6 +72,7 @@ class Stiffness:
     deviation: float
     scatter: float
     from_length: float
+    from_first: float
     misfit: float
     frames: int
 
@@ -89,13 +91,19 @@ def hanging(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> H
     return Hanging(model.inclination(theta), slopes @ covariance @ slopes.T + least)
 
 
-def estimate_stiffness(frames: Sequence[Hanging], length: float, length_deviation: float) -> Stiffness:
+def estimate_stiffness(
+    frames: Sequence[Hanging], length: float, length_deviation: float, first_deviation: float
+) -> Stiffness:
     """Fits one load to all frames, each with an inclination of its own.
+
+    What the strip looks like is told from the frame in which it was found, with the shape that it seemed to have there.
+    Colours hold on to that shape in all frames, so they share its error.
 
     Args:
         frames: in the order of time.
         length: of the strip [m].
         length_deviation: standard deviation of the length [m]; the load grows with its third power.
+        first_deviation: standard deviation of the logarithm of the load that the first frame seemed to show.
 
     Raises:
         StiffnessError: too few frames, or a strip that does not bend, or that hangs like a thread.
@@ -109,8 +117,9 @@ def estimate_stiffness(frames: Sequence[Hanging], length: float, length_deviatio
     wide = np.sqrt((STRETCHES - 1) / (STRETCHES - 3))
     scatter = max(wide * float(np.std(parts, ddof=1) / np.sqrt(STRETCHES)), fit.deviation)
     from_length = 3 * length_deviation / length
-    deviation = float(np.hypot(scatter, from_length))
-    return Stiffness(float(np.exp(fit.log_load)), deviation, scatter, from_length, fit.misfit, len(frames))
+    deviation = float(np.linalg.norm([scatter, from_length, first_deviation]))
+    load = float(np.exp(fit.log_load))
+    return Stiffness(load, deviation, scatter, from_length, first_deviation, fit.misfit, len(frames))
 
 
 def predicted_tip(load: float, frame: Hanging) -> float:

@@ -5,7 +5,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.hang import LARGEST_GAP, NOISE_M, Hang, Plane, Vector, find_plane, first_guess, fit, normals_at
+from abs_service.tracker.hang import (
+    LARGEST_GAP,
+    NOISE_M,
+    Hang,
+    Plane,
+    Vector,
+    find_plane,
+    first_guess,
+    fit,
+    load_deviation,
+    normals_at,
+)
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.sheet import Sheet
 from abs_service.tracker.sighting import Sighting, SightingError
@@ -31,8 +42,10 @@ RIM_PX = 4
 #: The outline is read off where this share of the strip is still beyond, because rims are ragged.
 RIM_SHARE = 0.05
 
-#: Grazing views: the cosine between line of sight and normal below which a pixel's area would explode.
-LEAST_COSINE = 0.2
+#: A pixel shows no more of the strip than under this cosine between line of sight and normal. Pixels at an end that
+#: show other things as well lie on the curve's extrapolation, which may turn away from the camera: with all the area
+#: that they would have there, the strip grew by a fifth.
+LEAST_COSINE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +59,7 @@ class Strip:
         turn: nodes (STEPS + 1,) from the gripper to the free end: angle by which the tangent has turned since the
             gripper, positive towards z [rad].
         pixel: length along the strip that one of the sensor's pixels shows [m].
+        load_deviation: standard deviation of the logarithm of the load by which it hangs like this; 0 if that is known.
     """
 
     T_rg: Pose
@@ -53,6 +67,7 @@ class Strip:
     width: float
     turn: NDArray[np.float64]
     pixel: float
+    load_deviation: float = 0.0
 
     def bends(self, segments: int) -> NDArray[np.float64]:
         """Angles (segments,) by which equal parts of the strip bend, the first at the gripper [rad]."""
@@ -98,8 +113,12 @@ def find_strip(sighting: Sighting, gravity: Vector, towards_gripper: Vector, len
     share = float(np.mean(fitted.belongs[: len(seen)]))
     _check((fitted.hang.length, fitted.sides[1] - fitted.sides[0]), length, share)
     hang = fitted.hang.cut(fitted.hang.length - (length or fitted.hang.length), fitted.hang.length)
-    hang = fit(hang, fitted.plane.coordinates(points)[1][fitted.belongs])
-    return _strip(fitted, hang)
+    flat = fitted.plane.coordinates(points)[1][fitted.belongs]
+    along = hang.unroll(flat)[0]
+    # Pixels on an end show what is behind it as well, and would bend the strip most of all.
+    inner = flat[np.minimum(along, hang.length - along) > fitted.pixel / 2]
+    hang = fit(hang, inner)
+    return _strip(fitted, hang, load_deviation(hang, inner))
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +222,7 @@ def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np
     return np.linalg.lstsq(rows, np.append(gap - gap.mean(), weight * turn), rcond=None)[0]
 
 
-def _strip(fitted: _Fitted, hang: Hang) -> Strip:
+def _strip(fitted: _Fitted, hang: Hang, deviation: float) -> Strip:
     """The strip in the rig, whose z axis is on the camera's side."""
     plane, sides = fitted.plane, fitted.sides
     start = hang.inclination[:1]
@@ -213,4 +232,4 @@ def _strip(fitted: _Fitted, hang: Hang) -> Strip:
     T_rg = np.eye(4)
     T_rg[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     T_rg[:3, 3] = hang.nodes[0] @ np.array([plane.ahead, plane.down]) + np.mean(sides) * plane.across
-    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start), fitted.pixel)
+    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start), fitted.pixel, deviation)

@@ -38,7 +38,7 @@ CASES = (
     Case("`posed`, `nurbs` 4 × 4", "sheet", posed.Settings(nurbs.Settings())),
     Case("`flexpad`, size given", "sheet", flexpad.Settings(0.3, 0.2)),
     Case("`flexpad`, size detected", "sheet", flexpad.Settings()),
-    Case("`gravity`, 4 segments, length given", "strip", gravity.Settings(length_m=0.3)),
+    Case("`gravity`, 8 segments, length given", "strip", gravity.Settings(length_m=0.3)),
     Case("`rigid`, `hybrid`", "board", rigid.Settings(), optimizer=hybrid.Settings()),
     Case("`rigid`, `hybrid`", "board", rigid.Settings(), misplacement_px=0.2, optimizer=hybrid.Settings()),
     Case("`rigid`", "board", rigid.Settings(), misplacement_px=0.2),

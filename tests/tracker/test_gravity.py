@@ -153,17 +153,47 @@ def seen(uri: str, exposure: int) -> Seen:
     return Seen(sight(observation, rig, plan.reference, plan.region.build(), 300), strip)
 
 
-@pytest.mark.parametrize("stiffness", [0.003, 0.01, 0.05])
-@pytest.mark.parametrize("seed", [2, 3, 4, 5])
-def test_the_gripper_line_is_found_in_a_depth_image(stiffness, seed):
-    """Within 5 mm and 4°, two times what eight seeds scatter by; a pixel shows 5 mm of the strip."""
-    case = seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", seed)
-    found = find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]))
-    assert np.linalg.norm(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3]) < 5e-3
-    cosines = np.abs(np.sum(found.T_rg[:3, :3] * case.strip.T_rg[:3, :3], axis=0))
-    assert np.rad2deg(np.arccos(np.minimum(cosines, 1))).max() < 4
-    assert (found.length, found.width) == (pytest.approx(0.30, abs=5e-3), pytest.approx(0.05, abs=3e-3))
-    assert abs(np.rad2deg(abs(found.turn[-1]) - np.ptp(case.strip.profile.angle))) < 5
+@pytest.mark.parametrize(("stiffness", "degrees"), [(0.003, 5.5), (0.01, 3.0), (0.05, 1.5)])
+def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
+    """Root mean squares of twelve poses: the more it bends at the gripper, the less its direction there is seen."""
+    places, angles, sizes, bends = [], [], [], []
+    for seed in range(2, 14):
+        case = seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", seed)
+        found = find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]))
+        places.append(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3])
+        cosines = np.abs(np.sum(found.T_rg[:3, :3] * case.strip.T_rg[:3, :3], axis=0))
+        angles.append(np.rad2deg(np.arccos(np.minimum(cosines, 1))).max())
+        sizes.append([found.length - 0.30, found.width - 0.05])
+        bends.append(np.rad2deg(abs(found.turn[-1]) - np.ptp(case.strip.profile.angle)))
+    place = np.sqrt(np.mean(np.sum(np.square(places), axis=1)))
+    angle, length, width, bend = np.sqrt(np.mean(np.square(np.column_stack([angles, sizes, bends])), axis=0))
+    print(stiffness, place, angle, length, width, bend)
+    assert place < 5e-3  # a pixel shows 5 mm of the strip
+    assert max(angle, bend) < degrees
+    assert length < 6e-3
+    assert width < 3e-3
+
+
+@pytest.mark.parametrize("stiffness", [0.005, 0.02])
+def test_lengths_scatter_as_they_say_they_do(stiffness):
+    """In a strip that sags by 80°, the end at the gripper once turned away from the camera: 50 mm too long."""
+    cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
+    found = [find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    errors = np.array([(one.length - 0.30) / one.length_deviation for one in found])
+    assert np.sqrt(np.mean(errors**2)) < 1.2
+    assert np.abs(errors).max() < 3
+
+
+@pytest.mark.parametrize("stiffness", [0.02, 0.08])
+def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
+    """Pixels at the rim, which show what is behind as well, once bent the strip: it seemed up to a third less stiff."""
+    cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
+    found = [find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    # To first order, the angle by which a strip bends is in proportion to the load.
+    turned = [np.ptp(case.strip.profile.angle) for case in cases]
+    errors = np.array([np.log(abs(one.turn[-1]) / true) for one, true in zip(found, turned)])
+    said = np.array([one.load_deviation for one in found])
+    assert np.sqrt(np.mean(errors**2)) < 1.5 * said.mean() < 0.2
 
 
 def test_which_end_is_held_is_what_the_user_says():

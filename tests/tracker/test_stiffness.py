@@ -46,7 +46,7 @@ def frames(load: float, count: int = 80, segments: int = 4, sigma: float = SIGMA
 @settings(max_examples=15)
 @given(st.floats(0.3, 40), st.integers(2, 8))
 def test_the_load_is_found_within_its_deviation(load, segments):
-    found = estimate_stiffness(frames(load, segments=segments), 1.0, 0.0)
+    found = estimate_stiffness(frames(load, segments=segments), 1.0, 0.0, 0.0)
     assert abs(np.log(found.load / load)) < 4 * found.deviation
     assert found.deviation < 0.3
     assert found.misfit == pytest.approx(1, abs=0.4)
@@ -56,7 +56,7 @@ def test_the_load_is_found_within_its_deviation(load, segments):
 def test_the_stated_deviation_is_that_of_many_trials():
     errors, stated = [], []
     for seed in range(30):
-        found = estimate_stiffness(frames(4.0, 64, seed=seed), 1.0, 0.0)
+        found = estimate_stiffness(frames(4.0, 64, seed=seed), 1.0, 0.0, 0.0)
         errors.append(np.log(found.load / 4.0))
         stated.append(found.deviation)
     # Student's factor, and the larger one of two estimates, are on the safe side.
@@ -68,28 +68,28 @@ def test_a_nearly_straight_strip_sags_as_the_small_deflection_formula_says():
     """Horizontally clamped, the free end of a cantilever under its own weight inclines by w L³ / (6 D)."""
     load = 0.05
     inclination = load / 6 * (1 - (1 - np.linspace(0, 1, 5)) ** 3)
-    found = estimate_stiffness([Hanging(inclination, 1e-8 * np.eye(5))] * LEAST_FRAMES, 1.0, 0.0)
+    found = estimate_stiffness([Hanging(inclination, 1e-8 * np.eye(5))] * LEAST_FRAMES, 1.0, 0.0, 0.0)
     assert found.load == pytest.approx(load, rel=0.01)
     assert found.bending(weight=2.0, length=1.0) == pytest.approx(2.0 / load, rel=0.01)
 
 
-def test_an_unknown_length_is_part_of_the_deviation():
-    sure, unsure = (estimate_stiffness(frames(4.0), 0.3, deviation) for deviation in (0.0, 0.003))
-    assert unsure.from_length == pytest.approx(0.03)
-    assert unsure.deviation == pytest.approx(np.hypot(sure.deviation, 0.03))
+def test_an_unknown_length_and_the_first_frame_s_shape_are_parts_of_the_deviation():
+    sure, unsure = (estimate_stiffness(frames(4.0), 0.3, *deviations) for deviations in ((0.0, 0.0), (0.003, 0.04)))
+    assert (unsure.from_length, unsure.from_first) == (pytest.approx(0.03), 0.04)
+    assert unsure.deviation == pytest.approx(np.hypot(sure.deviation, 0.05))
 
 
 def test_a_strip_that_is_curved_by_itself_does_not_fit():
     curled = [Hanging(frame.inclination + np.array([0, 0.3, 0, 0.3, 0]), frame.covariance) for frame in frames(4.0)]
-    assert estimate_stiffness(curled, 1.0, 0.0).misfit > 9
+    assert estimate_stiffness(curled, 1.0, 0.0, 0.0).misfit > 9
 
 
 def test_what_cannot_be_told_is_refused():
     with pytest.raises(StiffnessError, match=f"{LEAST_FRAMES - 1} frames .* are too few, at least {LEAST_FRAMES}"):
-        estimate_stiffness(frames(4.0, LEAST_FRAMES - 1), 1.0, 0.0)
+        estimate_stiffness(frames(4.0, LEAST_FRAMES - 1), 1.0, 0.0, 0.0)
     straight = [Hanging(np.full(5, 0.4), 1e-8 * np.eye(5))] * LEAST_FRAMES
     with pytest.raises(StiffnessError, match="the strip bends too little"):
-        estimate_stiffness(straight, 1.0, 0.0)
+        estimate_stiffness(straight, 1.0, 0.0, 0.0)
 
 
 def test_the_tip_that_goes_with_a_load_is_found():

@@ -35,7 +35,7 @@ class Settings:
         length_m: free length of the strip [m]; 0 takes what is detected.
     """
 
-    segments: Annotated[int, Interval(ge=1, le=16)] = 4
+    segments: Annotated[int, Interval(ge=1, le=16)] = 8
     gripper: Literal["free", "fixed"] = "free"
     gravity: tuple[float, float, float] = (0.0, 1.0, 0.0)
     towards_gripper: tuple[float, float, float] = (0.0, 0.0, 0.0)
