@@ -22,6 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.curvature import add_at
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
@@ -37,12 +38,13 @@ def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> N
         inverse: Σ (dim, dim), of the curvature of likelihood and priors.
         sensed: r and J of the sensors, in parts.
     """
-    covariance = inverse.copy()
+    excess = np.zeros_like(inverse)  # of Jᵀ diag(r² / (1 − h)) J over JᵀJ
     for part in sensed:
-        answer = part.jacobian @ inverse[part.parameters]
-        kept = np.maximum(1 - np.einsum("md,md->m", answer[:, part.parameters], part.jacobian), LEAST_KEPT)
-        covariance += (answer.T * (part.residual**2 / kept - 1)) @ answer
-    return covariance
+        own, jacobian = part.parameters, part.jacobian
+        answer = jacobian @ inverse[own][:, own]
+        kept = np.maximum(1 - np.einsum("md,md->m", answer, jacobian), LEAST_KEPT)
+        add_at(own, (jacobian.T * (part.residual**2 / kept - 1)) @ jacobian, excess)
+    return inverse + inverse @ excess @ inverse
 
 
 def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -64,12 +66,19 @@ def _multiply(
 ) -> None:
     """Products left rightᵀ (3, 3) of pairs of matrices (n, 3, k), which are symmetric, to the places `to` (n,)."""
     for v in range(to.size):
-        for i in range(3):
-            for j in range(i + 1):
-                total = 0.0
-                for d in range(left.shape[2]):
-                    total += left[v, i, d] * right[v, j, d]
-                result[to[v], i, j] = result[to[v], j, i] = total
+        a, b = left[v], right[v]
+        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for d in range(left.shape[2]):  # one pass over both for all six
+            xx += a[0, d] * b[0, d]
+            xy += a[0, d] * b[1, d]
+            xz += a[0, d] * b[2, d]
+            yy += a[1, d] * b[1, d]
+            yz += a[1, d] * b[2, d]
+            zz += a[2, d] * b[2, d]
+        square = result[to[v]]
+        square[0, 0], square[1, 1], square[2, 2] = xx, yy, zz
+        square[0, 1], square[0, 2], square[1, 2] = xy, xz, yz
+        square[1, 0], square[2, 0], square[2, 1] = xy, xz, yz
 
 
 def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:

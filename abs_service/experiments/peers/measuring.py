@@ -46,20 +46,21 @@ class Followed:
 
 
 def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -> Followed:
-    """Follows shots after the first.
+    """Follows shots after the first, one right after the other.
 
     Args:
         follower: has the first shot behind it.
         at: places (n, 2) [m] of its vertices on the flat sheet.
         shots: the sequence.
     """
-    fine = places(61, 41)
-    tracked, vertex, surface, cpu = [], [], [], []
+    tracked, cpu = [], []
     for shot in shots[1:]:
         begun = time.process_time()
-        vertices = follower.track(shot)
+        tracked.append(follower.track(shot))
         cpu.append(time.process_time() - begun)
-        tracked.append(vertices)
+    # Errors are found afterwards: in between, that would drive what the tracker needs out of the caches.
+    fine, vertex, surface = places(61, 41), [], []
+    for shot, vertices in zip(shots[1:], tracked):
         vertex.append(np.linalg.norm(vertices - shot.moment.points(at), axis=1).mean())
         closest = closest_points(vertices, shot.moment.points(fine))
         surface.append(np.linalg.norm(vertices - closest, axis=1).mean())
