@@ -23,7 +23,7 @@ class Step:
     Attributes:
         kernel: if it deforms, it takes parameters (1, dim) and returns vertices and normals as in `Surface`; if it
             judges, it takes parameters, vertices and normals and returns a cost. Those of parts of these, such as a
-            view's, say themselves what they take.
+            view's, and a chain's, say themselves what they take.
         arguments: arrays and numbers that the kernel takes after these; no tuples.
     """
 
@@ -38,19 +38,24 @@ def step_of(part: object) -> Step | None:
 
 
 class Chain:
-    """All that a posterior consists of: how the surface is made, what the priors and the measurements say of it."""
+    """All that a posterior consists of: how the surface is made, what the priors and the measurements say of it.
+
+    Attributes:
+        judge: what one candidate costs: a step that takes parameters (1, dim) only.
+    """
 
     def __init__(self, model: Step, stretch: Step, shape: Step, motion: Step, objective: Step):
         steps = {"deform": model, "stretch": stretch, "shape": shape, "motion": motion, "objective": objective}
         kernels = {name: step.kernel for name, step in steps.items()}
         deformed, stretched, shaped, moved, _ = np.cumsum([len(step.arguments) for step in steps.values()]).tolist()
-        self._kernel = composed(_cost, **kernels, DEFORMED=deformed, STRETCHED=stretched, SHAPED=shaped, MOVED=moved)
-        self._arguments = sum((step.arguments for step in steps.values()), ())
+        judged = composed(_judged, **kernels, DEFORMED=deformed, STRETCHED=stretched, SHAPED=shaped, MOVED=moved)
+        self.judge = Step(judged, sum((step.arguments for step in steps.values()), ()))
+        self._kernel = composed(_cost, judged=judged)
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Cost (population,) of parameters (population, dim)."""
         out = np.empty(len(thetas))
-        self._kernel(thetas, self._arguments, out)
+        self._kernel(thetas, self.judge.arguments, out)
         return out
 
 
@@ -148,12 +153,20 @@ def _available(
 
 
 @kernel
+def _judged(theta: NDArray[np.float64], *arguments: Any) -> float:
+    """What parameters (1, dim) cost."""
+    vertices, normals = deform(theta, *arguments[:DEFORMED])
+    priors = stretch(theta, vertices, normals, *arguments[DEFORMED:STRETCHED])
+    priors += shape(theta, vertices, normals, *arguments[STRETCHED:SHAPED])
+    priors += motion(theta, vertices, normals, *arguments[SHAPED:MOVED])
+    return priors + objective(theta, vertices, normals, *arguments[MOVED:])
+
+
+judged: Callable[..., float] = _judged
+
+
+@kernel
 def _cost(thetas: NDArray[np.float64], arguments: tuple[Any, ...], out: NDArray[np.float64]) -> None:
     """See `Chain.cost`."""
     for k in prange(len(thetas)):
-        theta = thetas[k : k + 1]
-        vertices, normals = deform(theta, *arguments[:DEFORMED])
-        priors = stretch(theta, vertices, normals, *arguments[DEFORMED:STRETCHED])
-        priors += shape(theta, vertices, normals, *arguments[STRETCHED:SHAPED])
-        priors += motion(theta, vertices, normals, *arguments[SHAPED:MOVED])
-        out[k] = priors + objective(theta, vertices, normals, *arguments[MOVED:])
+        out[k] = judged(thetas[k : k + 1], *arguments)

@@ -1,13 +1,12 @@
 """What a search minimises: the negative logarithm of likelihood times priors, for the observation in hand."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.observation import Observation
-from abs_service.tracker.chain import Chain, step_of
+from abs_service.tracker.chain import Chain, Step, step_of
 from abs_service.tracker.curvature import Quadratic, gauss_newton
 from abs_service.tracker.models.base import DeformationModel, Moves, Surface
 from abs_service.tracker.objectives.base import Objective
@@ -43,6 +42,7 @@ class Posterior:
 
     Attributes:
         dimension: number of parameters.
+        judge: what one candidate costs in this observation, if all parts can be steps of one compiled loop.
     """
 
     def __init__(
@@ -60,6 +60,7 @@ class Posterior:
         self._shape = shape
         self._motion = motion
         self._cost = self.cost_in_stages
+        self.judge: Step | None = None
         self._linearized: list[Linearized] = []
         self._fitted: list[tuple[NDArray[np.float64], tuple[SensorFit, ...]]] = []
 
@@ -70,7 +71,7 @@ class Posterior:
         self._motion.predict(observation.t_host_ns)
         predicted = self._motion.predicted
         self._objective.observe(observation, self._model.deform(predicted[None]), self._motion.reach_m)
-        self._cost = self._chained()
+        self._chain()
         return predicted
 
     def restart(self, theta: NDArray[np.float64]) -> None:
@@ -88,7 +89,7 @@ class Posterior:
     @property
     def is_chained(self) -> bool:
         """Whether all parts can be steps of one compiled loop, which then finds the costs in this observation."""
-        return self._cost != self.cost_in_stages
+        return self.judge is not None
 
     def cost_in_stages(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same, found by each part for the whole population."""
@@ -138,10 +139,13 @@ class Posterior:
         """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""
         return 1 - inlier_share(self.fits(theta))
 
-    def _chained(self) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    def _chain(self) -> None:
         parts = self._model, self._stretch, self._shape, self._motion, self._objective
         steps = [step for part in parts if (step := step_of(part))]
-        return Chain(*steps).cost if len(steps) == len(parts) else self.cost_in_stages
+        self._cost, self.judge = self.cost_in_stages, None
+        if len(steps) == len(parts):
+            chain = Chain(*steps)
+            self._cost, self.judge = chain.cost, chain.judge
 
     def _priors(self, surface: Surface, moves: Moves, theta: NDArray[np.float64]) -> list[Linearization]:
         return [

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from abs_service.tracker.curvature import Quadratic
 
 #: Step of the central differences.
@@ -21,12 +22,14 @@ class Known:
         residuals: (population, m) of parameters (population, dim); the cost is half their squares' sum.
         unexplained_at: what `Problem.unexplained` answers for parameters (dim,).
         deviation: of the prior, which `residuals` contains already.
+        judge: see `Problem`.
     """
 
     dimension: int
     residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     unexplained_at: Callable[[NDArray[np.float64]], float]
     deviation: float = 1.0
+    judge: Step | None = None
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Problem`."""

@@ -40,7 +40,7 @@ def test_one_step_solves_a_linear_problem_and_the_next_is_the_last():
 
 def test_a_step_that_promises_little_is_taken_and_is_the_last():
     (problem, asked), spent = counted(linear(TARGET, np.ones(3))), budget()
-    promise = 0.5 * TARGET @ TARGET
+    promise = 0.5 * float(TARGET @ TARGET)
     found = descend(problem, np.zeros(3), 5, 1.01 * promise, spent)
     np.testing.assert_allclose(found.theta, TARGET, atol=1e-8)
     assert (found.stop, spent.generations, spent.evaluations, len(asked)) == (Stop.CONVERGED, 1, 2, 1)

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
 from abs_service.tracker.curvature import Quadratic
 
 
@@ -19,6 +20,11 @@ class Problem(Protocol):
     """
 
     dimension: int
+
+    @property
+    def judge(self) -> Step | None:
+        """What one candidate costs, as a step that takes parameters (1, dim); None if only `cost` can tell."""
+        ...
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Cost (population,) of every row of `thetas` (population, dim), in nats."""
@@ -69,6 +75,11 @@ class Budget:
         """Enters what was done."""
         self.evaluations += evaluations
         self.generations += generations
+
+    @property
+    def left(self) -> int:
+        """How often the cost may still be computed."""
+        return max(0, self._limit - self.evaluations)
 
     def exhausted(self) -> Stop | None:
         """Why there must not be more; None if there may."""

@@ -9,6 +9,8 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
+from abs_service.tracker.optimizers.base import Budget, Problem
+from abs_service.tracker.optimizers.course import Course
 from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
 
 
@@ -89,5 +91,12 @@ class Cma:
         return self._origin + np.asarray(self._asked) @ self._metric.T
 
     def tell(self, costs: NDArray[np.float64]) -> None:
-        """Updates mean, step size and covariance."""
+        """Learns the costs (population,) of the candidates that `ask` returned."""
         self._search.tell(self._asked, costs.tolist())
+
+    def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
+        """One generation."""
+        costs = problem.cost(self.ask())
+        self.tell(costs)
+        budget.spend(len(costs), generations=1)
+        course.enter(costs)

@@ -1,5 +1,6 @@
 """CMA-ES, compiled: full covariance, evolution paths, what one frame teaches the next."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Annotated
@@ -8,8 +9,13 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
+from abs_service.tracker.chain import Step
+from abs_service.tracker.optimizers.base import Budget, Problem
+from abs_service.tracker.optimizers.course import Course
 from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, padded, propose, update
+from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose
+from abs_service.tracker.optimizers.loop import Distribution, generations, teach
+from calib.jit import composed
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,9 @@ class Settings:
 #: Share of the covariance that may be new before candidates are drawn with it.
 LEARNT = 0.1
 
+#: So many candidates at most are judged before the search looks at the clock again, or those of one generation.
+AT_ONCE = 256
+
 #: Share of the covariance that begins every frame anew, as the identity.
 FORGOTTEN = 0.5
 
@@ -70,16 +79,13 @@ class CmaEs:
         self._bits = generator.bit_generator
         self._steps = least_step, step
         self._constants = Constants(dimension, population)
-        self._mean = np.zeros(dimension)
         self._sigma = step
-        self._paths = np.zeros((2, dimension))
         self._generation = 0
         self._gap = max(1, int(LEARNT / (self._constants.rates[2] + self._constants.rates[3])))
+        self._z = np.zeros((population, dimension), np.float32)
         # Single precision takes half the time, and nobody needs to know a step better.
-        self._shape = population, dimension
-        self._z = padded(np.zeros(self._shape))
-        self._factor = np.eye(dimension)
-        self._learnt, self._axes = padded(self._factor), padded(self._factor)
+        axes, learnt = np.eye(dimension, dtype=np.float32), np.eye(dimension, dtype=np.float32)
+        self._own = Distribution(np.zeros(dimension), axes, learnt, np.eye(dimension), np.zeros((2, dimension)))
 
     @property
     def deviation(self) -> float:
@@ -89,7 +95,7 @@ class CmaEs:
     @property
     def mean(self) -> NDArray[np.float64]:
         """Centre (dim,) of the current distribution."""
-        return self._mean.copy()
+        return self._own.mean.copy()
 
     def restart(self, origin: NDArray[np.float64], metric: NDArray[np.float64]) -> None:
         """Moves the mean to the prediction; half of the covariance, and the step size, continue.
@@ -97,37 +103,61 @@ class CmaEs:
         In ξ every frame's cost is nearly round by itself. What long searches learn beyond that is how rough the cost of
         one frame is: where they have narrowed the covariance frame after frame, they cannot follow motion any more.
         """
-        self._mean = origin.copy()
+        mean, axes, learnt, old, paths = self._own
+        mean[:] = origin
         self._sigma = float(np.clip(self._sigma, *self._steps))
-        absorb(self._learnt, self._factor, self._paths[1], self._axes)
-        covariance = (1 - FORGOTTEN) * self._factor @ self._factor.T
+        absorb(learnt, old, paths[1], axes)
+        covariance = (1 - FORGOTTEN) * old @ old.T
         covariance.flat[:: len(covariance) + 1] += FORGOTTEN
         factor = np.asarray(np.linalg.cholesky(covariance), np.float64)
-        self._paths[1] = np.linalg.solve(factor, self._factor @ self._paths[1])
-        self._factor = factor
-        self._axes = padded(np.matmul(factor.T, metric.T))
+        paths[1] = np.linalg.solve(factor, old @ paths[1])
+        old[:] = factor
+        axes[:] = np.matmul(factor.T, metric.T)
 
     def ask(self) -> NDArray[np.float64]:
         """The next candidates (population, dim)."""
-        thetas = np.empty(self._shape)
-        bits = self._bits.random_raw((thetas.size + 3) // 4).view(np.uint16)
-        propose(bits, normal_quantiles(), self._axes, self._sigma, self._mean, self._z, thetas)
+        thetas = np.empty(self._z.shape)
+        propose(self._draw(1), normal_quantiles(), self._own.axes, self._sigma, self._own.mean, self._z, thetas)
         return thetas
 
     def tell(self, costs: NDArray[np.float64]) -> None:
-        """Updates mean, step size and covariance."""
+        """Learns the costs (population,) of the candidates that `ask` returned."""
         self._generation += 1
-        self._sigma = update(
-            self._z,
-            self._axes,
-            costs,
+        weights, rates = self._constants.weights, self._constants.rates
+        self._sigma = teach(self._own, self._z, costs, weights, rates, self._generation, self._gap, self._sigma)
+
+    def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
+        """As many generations at once as may be where a candidate's cost can be compiled into the loop, else one."""
+        before, population = course.done, len(self._z)
+        if problem.judge is None:
+            costs = problem.cost(self.ask())
+            self.tell(costs)
+            course.enter(costs)
+        else:
+            at_once = min(AT_ONCE // population, -(-budget.left // population), course.left)
+            self._advance_in_one_loop(problem.judge, course, 1 if budget.exhausted() else max(1, at_once))
+        budget.spend((course.done - before) * population, generations=course.done - before)
+
+    def _advance_in_one_loop(self, judge: Step, course: Course, count: int) -> None:
+        before = course.done
+        advanced: Callable[..., tuple[int, float, bool]] = composed(generations, judged=judge.kernel)
+        course.done, self._sigma, course.steady = advanced(
+            self._own,
             self._constants.weights,
             self._constants.rates,
             self._generation,
+            self._gap,
             self._sigma,
-            self._mean,
-            self._paths,
-            self._learnt,
+            self._draw(count),
+            normal_quantiles(),
+            course.least,
+            before,
+            course.tolerance,
+            judge.arguments,
         )
-        if self._generation % self._gap == 0:
-            absorb(self._learnt, self._factor, self._paths[1], self._axes)
+        self._generation += course.done - before
+
+    def _draw(self, count: int) -> NDArray[np.uint16]:
+        """Random bits for so many generations (count · population · dim,)."""
+        size = count * self._z.size
+        return self._bits.random_raw((size + 3) // 4).view(np.uint16)[:size]

@@ -1,6 +1,5 @@
 """How a strategy behind ask and tell searches a frame: in the metric of the curvature, from a Newton step."""
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
@@ -10,9 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.curvature import newton_step, search_metric
 from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Search, Stop
-
-#: Generations whose best costs must agree before a search counts as converged.
-PATIENCE = 5
+from abs_service.tracker.optimizers.course import Course
 
 #: Share of unexplained measurements below which a solution is not doubted, and nothing else is looked for.
 UNDOUBTED = 0.1
@@ -52,6 +49,16 @@ class Strategy(Protocol):
 
     def tell(self, costs: NDArray[np.float64]) -> None:
         """Learns the costs (population,) of the candidates that `ask` returned."""
+        ...
+
+    def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
+        """Asks and tells, for one generation at least, and for no more than are left.
+
+        Args:
+            problem: the cost over Θ.
+            course: of the search so far; the costs of every generation enter it.
+            budget: every generation is entered.
+        """
         ...
 
 
@@ -140,25 +147,17 @@ def evolve(
         The better of the origin and the strategy's mean.
     """
     strategy.restart(origin, metric)
-    stop, best = None, deque[float](maxlen=PATIENCE)
-    for _ in range(schedule.generations):
-        if best and (stop := budget.exhausted()):
-            break
-        thetas = strategy.ask()
-        costs = problem.cost(thetas)
-        strategy.tell(costs)
-        budget.spend(len(thetas), generations=1)
-        best.append(min(costs.tolist()))  # NumPy's own takes longer for so few
-        steady = len(best) == PATIENCE and max(best) - min(best) < schedule.tolerance
-        if steady and costs.max() - best[-1] < schedule.tolerance:
-            stop = Stop.CONVERGED
-            break
+    stop, course = None, Course(schedule.generations, schedule.tolerance)
+    while course.left and stop is None:
+        strategy.advance(problem, course, budget)
+        stop = budget.exhausted() if course.left else None
+    ended = Stop.CONVERGED if course.steady else Stop.GENERATIONS
     theta = strategy.mean
     found = float(problem.cost(theta[None])[0])
     budget.spend(1)
     if found > cost:
         theta, found = origin, cost
-    return Outcome(theta, found, schedule.name, stop or Stop.GENERATIONS, strategy.deviation)
+    return Outcome(theta, found, schedule.name, stop or ended, strategy.deviation)
 
 
 def explore(

@@ -42,17 +42,6 @@ def normal_quantiles() -> NDArray[np.float32]:
     return np.array([-_END, *inner, _END], np.float32)
 
 
-#: What is multiplied has multiples of so many columns and rows, what it does not need being zeros: loops over them then
-#: leave nothing over that would have to be computed one by one.
-LANES, ROWS = 8, 4
-
-
-def padded(matrix: NDArray[np.floating]) -> NDArray[np.float32]:
-    """A matrix in single precision, with zeros as `LANES` and `ROWS` ask for."""
-    rows, columns = matrix.shape
-    return np.pad(matrix, ((0, -rows % ROWS), (0, -columns % LANES))).astype(np.float32)
-
-
 @kernel
 def propose(
     bits: NDArray[np.uint16],
@@ -72,25 +61,18 @@ def propose(
         bits: random (population · dim,), or more.
         quantiles: see `normal_quantiles`.
         axes, sigma, mean: as in `update`.
-        z: result, standard normal numbers (population, dim), `padded`.
+        z: result, standard normal numbers (population, dim).
         thetas: result (population, dim).
     """
-    population, n = thetas.shape
-    step, lanes = np.zeros(z.shape[1], np.float32), np.uintp(z.shape[1] // LANES * LANES)
-    for k in range(population):
-        z_k, own = z[k], bits[k * n :]
-        for i in range(np.uintp(n)):
-            place, between = np.uintp(own[i] >> np.uint16(4)), np.int32(own[i] & np.uint16(15))
-            low, high = quantiles[place], quantiles[place + np.uintp(1)]
-            z_k[i] = low + (np.float32(between) + np.float32(0.5)) * np.float32(0.0625) * (high - low)
-        step[:] = 0
-        for i in range(0, n, ROWS):  # four at a time: what is added up is read and written less often
-            a, b, c, d = z_k[i], z_k[i + 1], z_k[i + 2], z_k[i + 3]
-            of_a, of_b, of_c, of_d = axes[i], axes[i + 1], axes[i + 2], axes[i + 3]
-            for j in range(lanes):
-                step[j] += (a * of_a[j] + b * of_b[j]) + (c * of_c[j] + d * of_d[j])
-        for j in range(n):
-            thetas[k, j] = mean[j] + sigma * step[j]
+    numbers = z.reshape(-1)
+    for i in range(np.uintp(z.size)):
+        place, between = np.uintp(bits[i] >> np.uint16(4)), np.int32(bits[i] & np.uint16(15))
+        low, high = quantiles[place], quantiles[place + np.uintp(1)]
+        numbers[i] = low + (np.float32(between) + np.float32(0.5)) * np.float32(0.0625) * (high - low)
+    steps = np.dot(z, axes)
+    for k in range(len(z)):
+        for j in range(mean.size):
+            thetas[k, j] = mean[j] + sigma * steps[k, j]
 
 
 @kernel
@@ -106,80 +88,75 @@ def update(
     paths: NDArray[np.float64],
     learnt: NDArray[np.float32],
 ) -> float:
-    """One generation of the tutorial's figure 6; changes mean, paths and the lower half of what is learnt.
+    """One generation of the tutorial's figure 6; changes mean, paths and what is learnt.
 
     Args:
-        z: standard normal numbers (population, dim), `padded`.
-        axes: what leads from them to Θ, a row for each (dim, dim), `padded`.
+        z: standard normal numbers (population, dim).
+        axes: what leads from them to Θ, a row for each (dim, dim).
         costs: of the candidates (population,).
         weights, rates: see `Constants`.
         generation: counts from one.
         sigma: step size.
         mean: (dim,).
         paths: of the step size and of the covariance, in the coordinates of z (2, dim).
-        learnt: the covariance in the coordinates of z (dim, dim), `padded`.
+        learnt: the covariance in the coordinates of z (dim, dim).
 
     Returns:
         The new step size.
     """
     c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length = rates
     population, n = costs.size, mean.size
-    order = np.argsort(costs, kind="mergesort")
+    ranked = np.empty((population + 1, n), np.float32)  # and in the end the path
+    for rank, k in enumerate(np.argsort(costs, kind="mergesort")):
+        ranked[rank] = z[k]
     p_sigma, p_c, z_mean = paths[0], paths[1], np.zeros(n)
     for rank in range(population // 2):
-        w, z_k = weights[rank], z[order[rank]]
+        w, step = weights[rank], ranked[rank]
         for i in range(n):
-            z_mean[i] += w * z_k[i]
+            z_mean[i] += w * step[i]
     gain = np.sqrt(c_sigma * (2 - c_sigma) * mu_eff)
     square = 0.0
     for i in range(n):
         p_sigma[i] = (1 - c_sigma) * p_sigma[i] + gain * z_mean[i]
         square += p_sigma[i] * p_sigma[i]
-        step, axis = sigma * z_mean[i], axes[i]
+        by, axis = sigma * z_mean[i], axes[i]
         for j in range(n):
-            mean[j] += step * axis[j]
+            mean[j] += by * axis[j]
     length = np.sqrt(square) / expected_length
     usual = length / np.sqrt(1 - (1 - c_sigma) ** (2 * generation)) < 1.4 + 2 / (n + 1)
     gain = np.sqrt(c_c * (2 - c_c) * mu_eff) if usual else 0.0
     for i in range(n):
         p_c[i] = (1 - c_c) * p_c[i] + gain * z_mean[i]
     decay = 1 - c_1 - c_mu * weights.sum() + (0.0 if usual else c_1 * c_c * (2 - c_c))
-    _learn(z, order, weights, p_c, decay, c_1, c_mu, learnt)
+    ranked[population] = p_c
+    _learn(ranked, weights, decay, c_1, c_mu, learnt)
     return sigma * np.exp(min(1.0, c_sigma / d_sigma * (length - 1)))
 
 
 @kernel
 def _learn(
-    z: NDArray[np.float32],
-    order: NDArray[np.intp],
+    steps: NDArray[np.float32],
     weights: NDArray[np.float64],
-    path: NDArray[np.float64],
     decay: float,
     c_1: float,
     c_mu: float,
     learnt: NDArray[np.float32],
 ) -> None:
-    """Eq. 47 in the coordinates of z: the lower half, and in each row what is left up to a multiple of `LANES`."""
-    n, population = path.size, order.size
-    p, scales, rows = np.zeros(z.shape[1], np.float32), np.zeros(len(z), np.float32), np.arange(len(z))
-    p[:n] = path
-    for rank in range(population):
-        rows[rank], w = order[rank], c_mu * weights[rank]
+    """Eq. 47 in the coordinates of z, from its rows, ranked by cost, and the path (population + 1, dim)."""
+    weighted, n = np.empty_like(steps), steps.shape[1]
+    for rank in range(len(steps)):
+        step, w = steps[rank], c_mu * weights[rank] if rank < weights.size else c_1
         if w < 0:  # eq. 46: the longer a bad step, the less is learnt from its length
-            w *= n / np.dot(z[order[rank]], z[order[rank]])
-        scales[rank] = w
-    for i in range(n):
-        row, scaled, lanes = learnt[i], np.float32(c_1) * p[i], np.uintp((i // LANES + 1) * LANES)
-        for j in range(lanes):
-            row[j] = np.float32(decay) * row[j] + scaled * p[j]
-    for rank in range(0, len(z), ROWS):
-        z_a, z_b, z_c, z_d = z[rows[rank]], z[rows[rank + 1]], z[rows[rank + 2]], z[rows[rank + 3]]
+            square = np.float32(0)
+            for i in range(n):
+                square += step[i] * step[i]
+            w *= n / square
         for i in range(n):
-            a, b = scales[rank] * z_a[i], scales[rank + 1] * z_b[i]
-            c, d = scales[rank + 2] * z_c[i], scales[rank + 3] * z_d[i]
-            row, lanes = learnt[i], np.uintp((i // LANES + 1) * LANES)
-            for j in range(lanes):
-                row[j] += (a * z_a[j] + b * z_b[j]) + (c * z_c[j] + d * z_d[j])
+            weighted[rank, i] = np.float32(w) * step[i]
+    learning = np.dot(weighted.T, steps)
+    for i in range(n):
+        for j in range(n):
+            learnt[i, j] = np.float32(decay) * learnt[i, j] + learning[i, j]
 
 
 @kernel
@@ -189,13 +166,13 @@ def absorb(
     """Changes to the coordinates in which what was learnt is the identity.
 
     Args:
-        learnt: the covariance in the old coordinates (dim, dim), `padded`, its lower half; then the identity.
+        learnt: the covariance in the old coordinates (dim, dim); then the identity.
         factor: lower Cholesky factor (dim, dim) of the covariance of ξ when the old coordinates were made, then now.
         path: (dim,) in these coordinates.
-        axes: what leads from them to Θ, a row for each (dim, dim), `padded`.
+        axes: what leads from them to Θ, a row for each (dim, dim).
     """
     n = path.size
-    root, row, axis, sound = np.zeros((n, n)), np.empty(n), np.empty(n, np.float32), True
+    root, sound = np.zeros((n, n)), True
     for i in range(n):
         for j in range(i + 1):
             left, right, rest = root[i], root[j], np.float64(learnt[i, j])
@@ -207,18 +184,9 @@ def absorb(
         root[:] = 0
         for i in range(n):
             root[i, i] = np.sqrt(abs(learnt[i, i]))
+    factor[:] = np.dot(factor, root)
+    axes[:] = np.dot(root.astype(np.float32).T, axes)
     for i in range(n):
-        row[:] = 0
-        for k in range(i + 1):
-            for j in range(k + 1):
-                row[j] += factor[i, k] * root[k, j]
-        factor[i] = row
-        axis[:] = 0
-        for k in range(i, n):
-            share = np.float32(root[k, i])
-            for j in range(n):
-                axis[j] += share * axes[k, j]
-        axes[i, :n] = axis
         for j in range(i):
             path[i] -= root[i, j] * path[j]
         path[i] /= root[i, i]
