@@ -6,7 +6,7 @@ import pytest
 from abs_service.experiments import peers
 from abs_service.experiments.base import Context
 from abs_service.experiments.peers.gauss_newton import GaussNewton
-from abs_service.experiments.peers.measuring import follow, with_template
+from abs_service.experiments.peers.measuring import Followed, follow, least, with_template
 from abs_service.experiments.peers.ours import SETUPS, Ours
 from abs_service.experiments.peers.rivals import KNOWN, Still, installed
 from abs_service.experiments.peers.scene import CAMERA, SIZE, Moment, Scene, film, places, spin, swing
@@ -71,3 +71,8 @@ def test_quick_peers():
     missed = [goal.what for goal in findings.goals if not goal.met]
     assert not [what for what in missed if "error" in what]
     assert {"5 mm", "15 mm", "hole", "turn", "spin"} == set(findings.values["scenes"])
+
+
+def test_the_least_time_of_each_frame_counts():
+    fast, slow = (Followed(np.zeros((1, 2)), [], np.ones(3), np.ones(3), np.array(ms)) for ms in ([1, 5, 2], [2, 3, 9]))
+    np.testing.assert_array_equal(least([fast, slow]).cpu_ms, [1, 3, 2])

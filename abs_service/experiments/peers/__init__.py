@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.experiments.base import Context, Findings, Goal, at_most
 from abs_service.experiments.peers import report, rivals
 from abs_service.experiments.peers.gauss_newton import GaussNewton
-from abs_service.experiments.peers.measuring import Followed, Make, follow, with_template
+from abs_service.experiments.peers.measuring import Followed, Make, follow, least, with_template
 from abs_service.experiments.peers.ours import SETUPS, Ours
 from abs_service.experiments.peers.rivals import Follower
 from abs_service.experiments.peers.scene import Leap, Scene, Shot, film, spin, turn
@@ -48,6 +48,7 @@ class Settings:
     Attributes:
         seeds: sequences of every scene.
         frames: of a sequence.
+        repeats: how often every tracker follows a sequence, in turns; the least time of each frame counts.
         setups: which of our trackers.
         peers: which other programs, if they are installed.
         slow: which of them follow a few frames only.
@@ -57,6 +58,7 @@ class Settings:
 
     seeds: int = 3
     frames: int = 40
+    repeats: int = 5
     setups: tuple[str, ...] = tuple(SETUPS)
     peers: tuple[str, ...] = tuple(rivals.KNOWN)
     slow: tuple[str, ...] = ("pycpd", "rustcpd, full rank", "trimesh nricp_amberg", "trimesh nricp_sumner")
@@ -64,7 +66,7 @@ class Settings:
     leapers: tuple[str, ...] = (BEST,)
 
 
-QUICK = Settings(1, 6, (BEST,), (FASTEST,), (), 2, (BEST,))
+QUICK = Settings(1, 6, 1, (BEST,), (FASTEST,), (), 2, (BEST,))
 
 
 def run(settings: Settings, context: Context) -> Findings:
@@ -73,7 +75,11 @@ def run(settings: Settings, context: Context) -> Findings:
     for name, scene in SCENES.items():
         context.progress(f"scene {name}")
         makers = _makers(settings, scene, first=name == "5 mm")
-        found[name] = {title: _sequences(title, make, scene, settings, context.seed) for title, make in makers.items()}
+        rounds = [
+            {title: _sequences(title, make, scene, settings, context.seed) for title, make in makers.items()}
+            for _ in range(settings.repeats)
+        ]
+        found[name] = {title: [least(same) for same in zip(*(one[title] for one in rounds))] for title in makers}
     context.progress("leaps")
     leapt = {title: _leaps(make, settings, context.seed) for title, make in _leapers(settings).items()}
     missing = sorted(
