@@ -103,7 +103,7 @@ class View:
     def activity(self) -> str:
         """What is being waited for; "" once there are estimates, or if nothing is tracked."""
         if self.live.preparing():
-            return "Preparing kernels; the first start compiles them, which takes up to half a minute …"
+            return "Preparing kernels; the first start compiles them, which takes up to a minute …"
         if "capture" not in self.live.heard:
             return "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):

@@ -48,9 +48,9 @@ class Chain:
         steps = {"deform": model, "stretch": stretch, "shape": shape, "motion": motion, "objective": objective}
         kernels = {name: step.kernel for name, step in steps.items()}
         deformed, stretched, shaped, moved, _ = np.cumsum([len(step.arguments) for step in steps.values()]).tolist()
-        judged = composed(_judged, **kernels, DEFORMED=deformed, STRETCHED=stretched, SHAPED=shaped, MOVED=moved)
-        self.judge = Step(judged, sum((step.arguments for step in steps.values()), ()))
-        self._kernel = composed(_cost, judged=judged)
+        parts = {**kernels, "DEFORMED": deformed, "STRETCHED": stretched, "SHAPED": shaped, "MOVED": moved}
+        self.judge = Step(composed(_judged, **parts), sum((step.arguments for step in steps.values()), ()))
+        self._kernel = composed(_cost, **parts)
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Cost (population,) of parameters (population, dim)."""
@@ -162,11 +162,13 @@ def _judged(theta: NDArray[np.float64], *arguments: Any) -> float:
     return priors + objective(theta, vertices, normals, *arguments[MOVED:])
 
 
-judged: Callable[..., float] = _judged
-
-
 @kernel
 def _cost(thetas: NDArray[np.float64], arguments: tuple[Any, ...], out: NDArray[np.float64]) -> None:
-    """See `Chain.cost`."""
+    """See `Chain.cost`. What `_judged` does is written again: as a level of its own, it would be compiled twice."""
     for k in prange(len(thetas)):
-        out[k] = judged(thetas[k : k + 1], *arguments)
+        theta = thetas[k : k + 1]
+        vertices, normals = deform(theta, *arguments[:DEFORMED])
+        priors = stretch(theta, vertices, normals, *arguments[DEFORMED:STRETCHED])
+        priors += shape(theta, vertices, normals, *arguments[STRETCHED:SHAPED])
+        priors += motion(theta, vertices, normals, *arguments[SHAPED:MOVED])
+        out[k] = priors + objective(theta, vertices, normals, *arguments[MOVED:])

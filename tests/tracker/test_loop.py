@@ -89,6 +89,15 @@ def test_what_is_late_anyway_judges_one_generation():
     assert (course.done, budget.evaluations) == (1, POPULATION)
 
 
+def test_one_generation_at_once_needs_no_loop():
+    """Nothing of it is compiled for the problem, which then need not be a kernel."""
+    made = CmaEs(DIMENSION, np.random.default_rng(1), 0.5, POPULATION, 1.0, at_once=1)
+    budget, course = everlasting(), Course(10, 0.0)
+    made.advance(problem(Step(lambda theta: np.nan)), course, budget)
+    assert (course.done, budget.evaluations) == (1, POPULATION)
+    assert np.isfinite(course.least[0])
+
+
 @pytest.mark.parametrize("population", [AT_ONCE, AT_ONCE + 1])
 def test_a_large_population_is_judged_as_a_whole(population):
     made = CmaEs(DIMENSION, np.random.default_rng(1), 0.5, population, 1.0)

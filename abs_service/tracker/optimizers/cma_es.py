@@ -13,8 +13,8 @@ from abs_service.tracker.chain import Step
 from abs_service.tracker.optimizers.base import Budget, Problem
 from abs_service.tracker.optimizers.course import Course
 from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose
-from abs_service.tracker.optimizers.loop import Distribution, generations, teach
+from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.loop import Distribution, generations
 from calib.jit import composed
 
 
@@ -50,7 +50,7 @@ class Settings:
 #: Share of the covariance that may be new before candidates are drawn with it.
 LEARNT = 0.1
 
-#: So many candidates at most are judged before the search looks at the clock again, or those of one generation.
+#: Candidates that are judged at once, by default: less than a millisecond, or a few with several sensors.
 AT_ONCE = 256
 
 #: Share of the covariance that begins every frame anew, as the identity.
@@ -73,11 +73,22 @@ class CmaEs:
         least_step: the step size never starts a frame below this.
         population: candidates per generation.
         step: standard deviation of the first candidates.
+        at_once: so many candidates at most are judged before the search looks at the clock again, or those of one
+            generation. If they are those of several, a loop over generations is compiled for the problem.
     """
 
-    def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
+    def __init__(
+        self,
+        dimension: int,
+        generator: np.random.Generator,
+        least_step: float,
+        population: int,
+        step: float,
+        at_once: int = AT_ONCE,
+    ):
         self._bits = generator.bit_generator
         self._steps = least_step, step
+        self._at_once = at_once // population
         self._constants = Constants(dimension, population)
         self._sigma = step
         self._generation = 0
@@ -123,19 +134,23 @@ class CmaEs:
     def tell(self, costs: NDArray[np.float64]) -> None:
         """Learns the costs (population,) of the candidates that `ask` returned."""
         self._generation += 1
+        mean, axes, learnt, factor, paths = self._own
         weights, rates = self._constants.weights, self._constants.rates
-        self._sigma = teach(self._own, self._z, costs, weights, rates, self._generation, self._gap, self._sigma)
+        self._sigma = update(self._z, axes, costs, weights, rates, self._generation, self._sigma, mean, paths, learnt)
+        if self._generation % self._gap == 0:
+            absorb(learnt, factor, paths[1], axes)
 
     def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
         """As many generations at once as may be where a candidate's cost can be compiled into the loop, else one."""
         before, population = course.done, len(self._z)
-        if problem.judge is None:
+        enough = 1 if budget.exhausted() else -(-budget.left // population)
+        count = min(self._at_once, course.left, enough)
+        if problem.judge is None or count <= 1:
             costs = problem.cost(self.ask())
             self.tell(costs)
             course.enter(costs)
         else:
-            at_once = min(AT_ONCE // population, -(-budget.left // population), course.left)
-            self._advance_in_one_loop(problem.judge, course, 1 if budget.exhausted() else max(1, at_once))
+            self._advance_in_one_loop(problem.judge, course, count)
         budget.spend((course.done - before) * population, generations=course.done - before)
 
     def _advance_in_one_loop(self, judge: Step, course: Course, count: int) -> None:

@@ -49,7 +49,8 @@ class Settings:
 
     def build(self, dimension: int, generator: np.random.Generator) -> "Hybrid":
         """A search in `dimension` dimensions that draws from `generator`."""
-        make = partial(CmaEs, dimension, generator, LEAST_STEP * self.step)
+        # It samples so rarely that nobody should wait for the compiler because of that.
+        make = partial(CmaEs, dimension, generator, LEAST_STEP * self.step, at_once=1)
         return Hybrid(self, make, self.population or usual_population(dimension))
 
 

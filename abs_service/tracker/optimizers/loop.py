@@ -30,25 +30,6 @@ class Distribution(NamedTuple):
 
 
 @kernel
-def teach(
-    distribution: Distribution,
-    z: NDArray[np.float32],
-    costs: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    rates: NDArray[np.float64],
-    generation: int,
-    gap: int,
-    sigma: float,
-) -> float:
-    """What a generation teaches, as `update` has it; every `gap` generations, in new coordinates from then on."""
-    mean, axes, learnt, factor, paths = distribution
-    sigma = update(z, axes, costs, weights, rates, generation, sigma, mean, paths, learnt)
-    if generation % gap == 0:
-        absorb(learnt, factor, paths[1], axes)
-    return sigma
-
-
-@kernel
 def _free(theta: NDArray[np.float64], *arguments: Any) -> float:
     """A cost in whose place `composed` puts a problem's."""
     return 0.0
@@ -75,8 +56,11 @@ def generations(
     """Draws, judges and learns, for as many generations as there are bits, or until costs are steady.
 
     Args:
-        distribution, weights, rates, gap, sigma: as in `teach`.
-        generation: how many have taught `distribution` before.
+        distribution: is changed.
+        weights, rates: see `Constants`.
+        generation: how many have taught `distribution` something before.
+        gap: generations from one set of coordinates to the next.
+        sigma: step size.
         bits: random (generations · population · dim,).
         quantiles: see `normal_quantiles`.
         least: best cost of every generation of the search; those that are done, and results.
@@ -87,14 +71,17 @@ def generations(
     Returns:
         How many generations are done then, the step size, whether costs are steady.
     """
-    population, n, steady = weights.size, distribution.mean.size, False
+    mean, axes, learnt, factor, paths = distribution
+    population, n, steady = weights.size, mean.size, False
     z, thetas, costs = np.empty((population, n), np.float32), np.empty((population, n)), np.empty(population)
     for first in range(0, bits.size, z.size):
-        propose(bits[first : first + z.size], quantiles, distribution.axes, sigma, distribution.mean, z, thetas)
+        propose(bits[first : first + z.size], quantiles, axes, sigma, mean, z, thetas)
         for k in prange(population):
             costs[k] = judged(thetas[k : k + 1], *arguments)
         generation += 1
-        sigma = teach(distribution, z, costs, weights, rates, generation, gap, sigma)
+        sigma = update(z, axes, costs, weights, rates, generation, sigma, mean, paths, learnt)
+        if generation % gap == 0:
+            absorb(learnt, factor, paths[1], axes)
         least[done] = costs.min()
         done += 1
         steady = is_steady(least, done, costs.max(), tolerance)
