@@ -75,13 +75,15 @@ def run(settings: Settings, context: Context) -> Findings:
     for name, scene in SCENES.items():
         context.progress(f"scene {name}")
         makers = _makers(settings, scene, first=name == "5 mm")
+        films = _films(scene, settings, context.seed)
         rounds = [
-            {title: _sequences(title, make, scene, settings, context.seed) for title, make in makers.items()}
+            {title: _sequences(title, make, scene, films, settings, context.seed) for title, make in makers.items()}
             for _ in range(settings.repeats)
         ]
         found[name] = {title: [least(same) for same in zip(*(one[title] for one in rounds))] for title in makers}
     context.progress("leaps")
-    leapt = {title: _leaps(make, settings, context.seed) for title, make in _leapers(settings).items()}
+    leaps = _films_of_leaps(settings, context.seed)
+    leapt = {title: _leaps(make, leaps, context.seed) for title, make in _leapers(settings).items()}
     missing = sorted(
         {rivals.KNOWN[name][0].partition(".")[0] for name in settings.peers if not rivals.installed([name])}
     )
@@ -116,24 +118,31 @@ def _leapers(settings: Settings) -> dict[str, Make]:
     return {name: _ours(name) for name in settings.leapers} | {GAUSS_NEWTON: newton}
 
 
-def _sequences(title: str, make: Make, scene: Scene, settings: Settings, seed: int) -> list[Followed]:
-    """What a tracker makes of a scene, once for each seed; the slow ones of one seed and a few frames."""
-    slow = title in settings.slow
-    followed = []
-    for k in range(1 if slow else settings.seeds):
-        shots = film(scene, range(SLOW_FRAMES if slow else settings.frames), np.random.default_rng([seed, k]))
-        followed.append(_follow(make, scene, shots, seed + k))
-    return followed
+def _films(scene: Scene, settings: Settings, seed: int) -> list[list[Shot]]:
+    """A sequence of the scene for each seed."""
+    return [film(scene, range(settings.frames), np.random.default_rng([seed, k])) for k in range(settings.seeds)]
 
 
-def _leaps(make: Make, settings: Settings, seed: int) -> list[Followed]:
-    followed = []
+def _sequences(
+    title: str, make: Make, scene: Scene, films: Sequence[Sequence[Shot]], settings: Settings, seed: int
+) -> list[Followed]:
+    """What a tracker makes of a scene's sequences; the slow ones of a few frames of the first."""
+    if title in settings.slow:
+        films = [films[0][:SLOW_FRAMES]]
+    return [_follow(make, scene, shots, seed + k) for k, shots in enumerate(films)]
+
+
+def _leaps(make: Make, films: Sequence[tuple[Scene, Sequence[Shot]]], seed: int) -> list[Followed]:
+    return [_follow(make, scene, shots, seed + k) for k, (scene, shots) in enumerate(films)]
+
+
+def _films_of_leaps(settings: Settings, seed: int) -> list[tuple[Scene, list[Shot]]]:
+    filmed = []
     for k in range(settings.leaps):
         generator = np.random.default_rng([seed, k])
         scene = Scene("leap", Leap(generator))
-        shots = film(scene, range(LEAP_FRAMES), generator)
-        followed.append(_follow(make, scene, shots, seed + k))
-    return followed
+        filmed.append((scene, film(scene, range(LEAP_FRAMES), generator)))
+    return filmed
 
 
 def _follow(make: Make, scene: Scene, shots: Sequence[Shot], seed: int) -> Followed:
