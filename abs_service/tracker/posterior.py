@@ -86,11 +86,6 @@ class Posterior:
         """Negative logarithm (population,) of likelihood times priors."""
         return self._cost(thetas)
 
-    @property
-    def is_chained(self) -> bool:
-        """Whether all parts can be steps of one compiled loop, which then finds the costs in this observation."""
-        return self.judge is not None
-
     def cost_in_stages(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """The same, found by each part for the whole population."""
         surface = self._model.deform(thetas)

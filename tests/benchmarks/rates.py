@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
+from abs_service.tracker.chain import NOTHING, Step
 from abs_service.tracker.curvature import Quadratic, search_metric
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
@@ -38,13 +38,8 @@ Answer = TypeVar("Answer")
 FIRST = 0
 
 
-@kernel
-def _free(theta: NDArray[np.float64], *arguments: Any) -> float:
-    """A cost in whose place `composed` puts a problem's."""
-    return 0.0
-
-
-judged: Callable[..., float] = _free
+#: A cost in whose place `composed` puts a problem's.
+judged: Callable[..., float] = NOTHING.kernel
 
 
 @kernel
@@ -87,11 +82,11 @@ class Clocked:
 
 @dataclass
 class Watched:
-    """Settings of a search, and of every frame its time without what others answered [s], and how to judge again."""
+    """Settings of a search; of every frame its time without what others answered [s]; how to judge the last again."""
 
     settings: OptimizerSettings
     took_s: list[float] = field(default_factory=list)
-    judge_again: list[Callable[[int], float]] = field(default_factory=list)
+    judge_again: Callable[[int], float] = lambda population: 0.0
 
     def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
         return WatchedSearch(self.settings.build(dimension, generator), self)
@@ -108,7 +103,7 @@ class WatchedSearch:
         clocked, begin = Clocked(problem, problem.dimension), time.thread_time()
         found = self.search.follow(clocked, start, budget)
         self.watched.took_s.append(time.thread_time() - begin - clocked.spent_s)
-        self.watched.judge_again.append(partial(judging_s, problem, found.theta, budget.generations))
+        self.watched.judge_again = partial(judging_s, problem, found.theta, budget.generations)
         return found
 
     def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
@@ -172,7 +167,7 @@ def measure(case: Case, frames: int) -> dict[str, float]:
         took_s.append(time.perf_counter() - begin)
         worked_s.append(time.thread_time() - began)
         if k > FIRST:
-            judged_s.append(watched.judge_again[-1](case.in_one_loop) if case.in_one_loop else 0.0)
+            judged_s.append(watched.judge_again(case.in_one_loop) if case.in_one_loop else 0.0)
     assert tracking.mesh is not None, case
     own_s, least_s = min(watched.took_s[2:]) - min(judged_s[2:]), min(worked_s[3:])
     return {"ms": 1e3 * min(took_s[3:]), "cpu_ms": 1e3 * least_s, "search_share": own_s / least_s}

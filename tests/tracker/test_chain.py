@@ -77,7 +77,7 @@ def candidates(model: DeformationModel, generator: np.random.Generator, count: i
 
 def agree(posterior: Posterior, thetas: np.ndarray) -> None:
     """Not to the last digit: the compiler may order sums otherwise where it knows more of what is around them."""
-    assert posterior.is_chained
+    assert posterior.judge is not None
     np.testing.assert_allclose(posterior.cost(thetas), posterior.cost_in_stages(thetas), rtol=1e-5, atol=1e-3)
 
 
@@ -128,7 +128,7 @@ def test_parts_that_are_no_steps_are_asked_for_the_whole_population() -> None:
     ]
     for tracked, model in zip(cases, (still, rigid.Rigid(PLANE), FLEXPAD)):
         tracked.observe(seen_by(cameras, generator))
-        assert not tracked.is_chained
+        assert tracked.judge is None
         thetas = candidates(model, generator)
         np.testing.assert_array_equal(tracked.cost(thetas), tracked.cost_in_stages(thetas))
 

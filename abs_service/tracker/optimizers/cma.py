@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Budget, Problem
 from abs_service.tracker.optimizers.course import Course
-from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
+from abs_service.tracker.optimizers.evolution import Evolution, Schedule, advance_by_one, usual_population
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,4 @@ class Cma:
 
     def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
         """One generation."""
-        costs = problem.cost(self.ask())
-        self.tell(costs)
-        budget.spend(len(costs), generations=1)
-        course.enter(costs)
+        advance_by_one(self, problem, course, budget)

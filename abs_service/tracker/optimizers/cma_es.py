@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.chain import Step
 from abs_service.tracker.optimizers.base import Budget, Problem
 from abs_service.tracker.optimizers.course import Course
-from abs_service.tracker.optimizers.evolution import Evolution, Schedule, usual_population
+from abs_service.tracker.optimizers.evolution import Evolution, Schedule, advance_by_one, usual_population
 from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
 from abs_service.tracker.optimizers.loop import Distribution, generations
 from calib.jit import composed
@@ -142,16 +142,14 @@ class CmaEs:
 
     def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
         """As many generations at once as may be where a candidate's cost can be compiled into the loop, else one."""
-        before, population = course.done, len(self._z)
-        enough = 1 if budget.exhausted() else -(-budget.left // population)
+        enough = 1 if budget.exhausted() else -(-budget.left // len(self._z))
         count = min(self._at_once, course.left, enough)
         if problem.judge is None or count <= 1:
-            costs = problem.cost(self.ask())
-            self.tell(costs)
-            course.enter(costs)
+            advance_by_one(self, problem, course, budget)
         else:
+            before = course.done
             self._advance_in_one_loop(problem.judge, course, count)
-        budget.spend((course.done - before) * population, generations=course.done - before)
+            budget.spend((course.done - before) * len(self._z), generations=course.done - before)
 
     def _advance_in_one_loop(self, judge: Step, course: Course, count: int) -> None:
         before = course.done

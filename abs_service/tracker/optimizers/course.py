@@ -14,11 +14,11 @@ class Course:
 
     Args:
         generations: at most.
-        tolerance: see `is_steady`.
+        tolerance: see `enter`.
 
     Attributes:
         least: best cost [nats] of every generation that is done, and room for the others (generations,).
-        tolerance: see `is_steady`.
+        tolerance: see `enter`.
         done: how many generations are.
         steady: whether it has converged.
     """
@@ -36,22 +36,23 @@ class Course:
 
     def enter(self, costs: NDArray[np.float64]) -> None:
         """Takes the costs (population,) of the next generation."""
-        self.least[self.done] = costs.min()
+        self.steady = enter(costs, self.least, self.done, self.tolerance)
         self.done += 1
-        self.steady = is_steady(self.least, self.done, costs.max(), self.tolerance)
 
 
 @kernel
-def is_steady(least: NDArray[np.float64], done: int, most: float, tolerance: float) -> bool:
-    """Whether costs differ by little, within the last generation and between the best ones of the last `PATIENCE`.
+def enter(costs: NDArray[np.float64], least: NDArray[np.float64], done: int, tolerance: float) -> bool:
+    """Enters a generation; whether costs differ by little within it, and between the best of the last `PATIENCE`.
 
     Args:
-        least: best cost of every generation.
-        done: how many there are.
-        most: worst cost of the last one.
-        tolerance: by how much [nats].
+        costs: of the generation (population,).
+        least: best cost of every generation; that of this one is written.
+        done: how many generations there were before.
+        tolerance: by how much costs may differ [nats].
     """
-    if done < PATIENCE or most - least[done - 1] >= tolerance:
+    best = costs.min()
+    least[done] = best
+    if done + 1 < PATIENCE or costs.max() - best >= tolerance:
         return False
-    last = least[done - PATIENCE : done]
+    last = least[done + 1 - PATIENCE : done + 1]
     return last.max() - last.min() < tolerance

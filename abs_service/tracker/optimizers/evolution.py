@@ -62,6 +62,14 @@ class Strategy(Protocol):
         ...
 
 
+def advance_by_one(strategy: Strategy, problem: Problem, course: Course, budget: Budget) -> None:
+    """Asks for one generation, has it judged, and tells what it costs; see `Strategy.advance`."""
+    costs = problem.cost(strategy.ask())
+    strategy.tell(costs)
+    budget.spend(len(costs), generations=1)
+    course.enter(costs)
+
+
 #: Makes a strategy with a population and the standard deviation of its first candidates.
 Make = Callable[[int, float], Strategy]
 

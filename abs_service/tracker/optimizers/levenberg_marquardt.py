@@ -34,10 +34,7 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
         budget.spend(1, generations=int(better))
         if better:
             theta, cost, damping, steps = theta + step, moved, damping / GROWTH, steps + 1
-        if promise < tolerance:
-            stop = Stop.CONVERGED
-            break
-        stop = budget.exhausted()
+        stop = Stop.CONVERGED if promise < tolerance else budget.exhausted()
         if not better:
             damping = max(damping * GROWTH, FIRST_DAMPING)
         elif stop is None and steps < iterations:

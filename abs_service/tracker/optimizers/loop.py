@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.course import is_steady
+from abs_service.tracker.chain import NOTHING
+from abs_service.tracker.optimizers.course import enter
 from abs_service.tracker.optimizers.generation import absorb, propose, update
 from calib.jit import kernel, prange
 
@@ -29,13 +30,8 @@ class Distribution(NamedTuple):
     paths: NDArray[np.float64]
 
 
-@kernel
-def _free(theta: NDArray[np.float64], *arguments: Any) -> float:
-    """A cost in whose place `composed` puts a problem's."""
-    return 0.0
-
-
-judged: Callable[..., float] = _free
+#: A cost in whose place `composed` puts a problem's.
+judged: Callable[..., float] = NOTHING.kernel
 
 
 @kernel
@@ -65,7 +61,7 @@ def generations(
         quantiles: see `normal_quantiles`.
         least: best cost of every generation of the search; those that are done, and results.
         done: how many that are.
-        tolerance: see `is_steady`.
+        tolerance: see `enter`.
         arguments: of `judged`, after the candidate.
 
     Returns:
@@ -82,9 +78,8 @@ def generations(
         sigma = update(z, axes, costs, weights, rates, generation, sigma, mean, paths, learnt)
         if generation % gap == 0:
             absorb(learnt, factor, paths[1], axes)
-        least[done] = costs.min()
+        steady = enter(costs, least, done, tolerance)
         done += 1
-        steady = is_steady(least, done, costs.max(), tolerance)
         if steady:
             break
     return done, sigma, steady
