@@ -58,7 +58,7 @@ class Settings:
 
     seeds: int = 3
     frames: int = 40
-    repeats: int = 5
+    repeats: int = 15
     setups: tuple[str, ...] = tuple(SETUPS)
     peers: tuple[str, ...] = tuple(rivals.KNOWN)
     slow: tuple[str, ...] = ("pycpd", "rustcpd, full rank", "trimesh nricp_amberg", "trimesh nricp_sumner")
