@@ -53,12 +53,13 @@ class Settings:
     """The full evaluation.
 
     Attributes:
-        sequences: with seeds that follow each other.
+        sequences: with seeds that follow each other; so many because how far a sheet slides along itself, where no
+            colour holds it, is chance.
         frames: of each sequence.
         subsets: the combinations.
     """
 
-    sequences: int = 3
+    sequences: int = 12
     frames: int = 150
     subsets: tuple[tuple[str, ...], ...] = tuple(tuple(sorted(subset)) for subset in SUBSETS)
 
