@@ -13,6 +13,7 @@ from tests.benchmarks import rates
 THREADS = (1, 2)
 
 
+@pytest.mark.timeout(1200)
 def test_frames(benchmark):
     if benchmark.disabled:
         pytest.skip("its parts are tested below")
