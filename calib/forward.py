@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.fisheye import KannalaBrandt
-from calib.jit import kernel
+from calib.jit import composed, kernel
 from calib.lens import LensModel
 
 #: Below this radius, in normalised coordinates, a fisheye does not bend in single precision.
@@ -53,8 +53,24 @@ def bend(
 
 
 @kernel
+def straight(
+    x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
+) -> tuple[np.float32, np.float32]:
+    """What `bend` is without distortion, whose coefficients are ignored."""
+    return x, y
+
+
+@kernel
+def straighten(
+    x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: tuple[np.float32, ...]
+) -> tuple[np.float32, np.float32]:
+    """The small step (right, down) from (x, y) on as it is: what a lens other than a fisheye bends it by is little."""
+    return right, down
+
+
+@kernel
 def straighten_fisheye(
-    x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: NDArray[np.float32]
+    x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
     """The step in ideal coordinates from (x, y) on that the lens bends into a small step (right, down)."""
     one = np.float32(1)
@@ -80,34 +96,19 @@ def projector(lens: LensModel) -> Callable[..., None]:
     return _to_pixels_pinhole if lens.is_pinhole else _to_pixels
 
 
-@kernel
-def _to_pixels_pinhole(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
-    fx, fy, cx, cy = matrix
-    for r in range(place.shape[0]):
-        for c in range(place.shape[1]):
-            place[r, c, 0] = fx * place[r, c, 0] + cx
-            place[r, c, 1] = fy * place[r, c, 1] + cy
+#: What a lens has; `composed` puts those of another in its place.
+coefficients = eight
 
 
 @kernel
 def _to_pixels(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
-    one, two = np.float32(1), np.float32(2)
-    fx, fy, cx, cy = matrix
-    k1, k2, p1, p2, k3, k4, k5, k6 = lens
+    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     for r in range(place.shape[0]):
         for c in range(place.shape[1]):
-            x, y = place[r, c, 0], place[r, c, 1]
-            r2 = x * x + y * y
-            radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-            place[r, c, 0] = fx * (x * radial + two * p1 * x * y + p2 * (r2 + two * x * x)) + cx
-            place[r, c, 1] = fy * (y * radial + p1 * (r2 + two * y * y) + two * p2 * x * y) + cy
-
-
-@kernel
-def _to_pixels_fisheye(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: NDArray[np.float32]) -> None:
-    fx, fy, cx, cy = matrix
-    for r in range(place.shape[0]):
-        for c in range(place.shape[1]):
-            x, y = bend_fisheye(place[r, c, 0], place[r, c, 1], lens)
+            x, y = bend(place[r, c, 0], place[r, c, 1], own_lens)
             place[r, c, 0] = fx * x + cx
             place[r, c, 1] = fy * y + cy
+
+
+_to_pixels_pinhole: Callable[..., None] = composed(_to_pixels, bend=straight)
+_to_pixels_fisheye: Callable[..., None] = composed(_to_pixels, bend=bend_fisheye, coefficients=four)

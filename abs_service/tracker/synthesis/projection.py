@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from calib.forward import bend_fisheye
-from calib.jit import kernel
+from calib.forward import bend, bend_fisheye, four
+from calib.forward import eight as coefficients
+from calib.jit import composed, kernel
 
 
 def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
@@ -87,40 +88,8 @@ def _project(
     inverse_z: NDArray[np.float32],
 ) -> None:
     """Eq. 10; pose (3, 4) = T_sr, limit of r²."""
-    one, two, farthest = np.float32(1), np.float32(2), np.float32(limit)
-    fx, fy, cx, cy = matrix
-    k1, k2, p1, p2, k3, k4, k5, k6 = lens
-    for k in range(vertices.shape[0]):
-        for v in range(vertices.shape[2]):
-            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
-            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
-            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
-            inverse = one / z
-            u, w = x * inverse, y * inverse
-            r2 = u * u + w * w
-            radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-            seen = z > np.float32(1e-6) and r2 < farthest
-            column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx
-            row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy
-            place[k, v, 0] = column if seen else np.float32(0)
-            place[k, v, 1] = row if seen else np.float32(0)
-            inverse_z[k, v] = inverse if seen else np.float32(np.nan)
-
-
-@kernel
-def _project_fisheye(
-    vertices: NDArray[np.float32],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    place: NDArray[np.float32],
-    inverse_z: NDArray[np.float32],
-) -> None:
-    """What `_project` is with the four coefficients of a fisheye."""
     one, farthest = np.float32(1), np.float32(limit)
-    fx, fy, cx, cy = matrix
+    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):
             a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
@@ -129,11 +98,12 @@ def _project_fisheye(
             z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
             inverse = one / z
             u, w = x * inverse, y * inverse
-            r2 = u * u + w * w
-            seen = z > np.float32(1e-6) and r2 < farthest
-            bent_u, bent_w = bend_fisheye(u, w, lens)
-            column = fx * bent_u + cx
-            row = fy * bent_w + cy
-            place[k, v, 0] = column if seen else np.float32(0)
-            place[k, v, 1] = row if seen else np.float32(0)
+            seen = z > np.float32(1e-6) and u * u + w * w < farthest
+            bent_u, bent_w = bend(u, w, own_lens)
+            place[k, v, 0] = fx * bent_u + cx if seen else np.float32(0)
+            place[k, v, 1] = fy * bent_w + cy if seen else np.float32(0)
             inverse_z[k, v] = inverse if seen else np.float32(np.nan)
+
+
+#: The same with the four coefficients of a fisheye.
+_project_fisheye = composed(_project, bend=bend_fisheye, coefficients=four)

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.fisheye import KannalaBrandt
-from calib.forward import bend_fisheye, straighten_fisheye
-from calib.jit import kernel, prange
+from calib.forward import bend, bend_fisheye, four, straight, straighten, straighten_fisheye
+from calib.forward import eight as coefficients
+from calib.jit import composed, kernel, prange
 from calib.lens import LensModel
 
 #: Flattest angle (cosine) at which a surface's slope is followed to a pixel's centre.
@@ -73,58 +74,8 @@ def _sample(
 
     A pixel's line of sight d, beside the vertex's by Δ, meets the tangential plane at z (1 − n · Δ / (n · d)).
     """
-    zero, half, one, two = np.float32(0), np.float32(0.5), np.float32(1), np.float32(2)
-    fx, fy, cx, cy = matrix
-    k1, k2, p1, p2, k3, k4, k5, k6 = lens
-    stride = width + 2
-    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
-    columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
-    for k in prange(vertices.shape[0]):
-        for v in range(vertices.shape[2]):
-            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
-            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
-            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
-            a, b, c = normals[k, 0, v], normals[k, 1, v], normals[k, 2, v]
-            nx = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
-            ny = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
-            nz = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
-            inverse = one / z
-            u, w = x * inverse, y * inverse
-            r2 = u * u + w * w
-            facing = nx * x + ny * y + nz * z < 0
-            radial = (one + r2 * (k1 + r2 * (k2 + r2 * k3))) / (one + r2 * (k4 + r2 * (k5 + r2 * k6)))
-            column = fx * (u * radial + two * p1 * u * w + p2 * (r2 + two * u * u)) + cx + half
-            row = fy * (w * radial + p1 * (r2 + two * w * w) + two * p2 * u * w) + cy + half
-            inside = column >= 0 and column < columns and row >= 0 and row < rows
-            seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
-            place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
-            pixel[k, v] = -1 if hidden[v] else place
-            right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
-            down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
-            u, w = u + right, w + down
-            length = np.sqrt(u * u + w * w + one)
-            along = min(nx * u + ny * w + nz, flattest * length)
-            distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
-
-
-@kernel
-def _sample_pinhole(
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    hidden: NDArray[np.bool_],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    height: int,
-    width: int,
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-) -> None:
-    """Eqs. 11, 12 and 20: what `_sample` is without distortion, whose coefficients are ignored."""
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    fx, fy, cx, cy = matrix
+    (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     stride = width + 2
     per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
     columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
@@ -142,55 +93,7 @@ def _sample_pinhole(
             u, w = x * inverse, y * inverse
             r2 = u * u + w * w
             facing = nx * x + ny * y + nz * z < 0
-            column = fx * u + cx + half
-            row = fy * w + cy + half
-            inside = column >= 0 and column < columns and row >= 0 and row < rows
-            seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
-            place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
-            pixel[k, v] = -1 if hidden[v] else place
-            right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
-            down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
-            u, w = u + right, w + down
-            length = np.sqrt(u * u + w * w + one)
-            along = min(nx * u + ny * w + nz, flattest * length)
-            distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
-
-
-@kernel
-def _sample_fisheye(
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    hidden: NDArray[np.bool_],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    height: int,
-    width: int,
-    pixel: NDArray[np.int32],
-    distance: NDArray[np.float32],
-) -> None:
-    """What `_sample` is with the four coefficients of a fisheye, which bends even the steps to the pixels' centres."""
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    fx, fy, cx, cy = matrix
-    stride = width + 2
-    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
-    columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
-    for k in prange(vertices.shape[0]):
-        for v in range(vertices.shape[2]):
-            a, b, c = vertices[k, 0, v], vertices[k, 1, v], vertices[k, 2, v]
-            x = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]
-            y = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]
-            z = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3]
-            a, b, c = normals[k, 0, v], normals[k, 1, v], normals[k, 2, v]
-            nx = pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c
-            ny = pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c
-            nz = pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c
-            inverse = one / z
-            u, w = x * inverse, y * inverse
-            r2 = u * u + w * w
-            facing = nx * x + ny * y + nz * z < 0
-            bent_u, bent_w = bend_fisheye(u, w, lens)
+            bent_u, bent_w = bend(u, w, own_lens)
             column = fx * bent_u + cx + half
             row = fy * bent_w + cy + half
             inside = column >= 0 and column < columns and row >= 0 and row < rows
@@ -199,8 +102,15 @@ def _sample_fisheye(
             pixel[k, v] = -1 if hidden[v] else place
             right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
             down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
-            right, down = straighten_fisheye(u, w, right, down, lens)
+            right, down = straighten(u, w, right, down, own_lens)
             u, w = u + right, w + down
             length = np.sqrt(u * u + w * w + one)
             along = min(nx * u + ny * w + nz, flattest * length)
             distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
+
+
+#: What `_sample` is without distortion, and with the four coefficients of a fisheye, which bends even small steps.
+_sample_pinhole: Callable[..., None] = composed(_sample, bend=straight)
+_sample_fisheye: Callable[..., None] = composed(
+    _sample, bend=bend_fisheye, coefficients=four, straighten=straighten_fisheye
+)
