@@ -3,41 +3,28 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated
 
 import numpy as np
-from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.chain import Step
 from abs_service.tracker.optimizers.base import Budget, Problem
 from abs_service.tracker.optimizers.course import Course
-from abs_service.tracker.optimizers.evolution import Evolution, Schedule, advance_by_one, usual_population
+from abs_service.tracker.optimizers.evolution import (
+    Evolution,
+    EvolutionSettings,
+    Schedule,
+    advance_by_one,
+    usual_population,
+)
 from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
 from abs_service.tracker.optimizers.loop import Distribution, generations
 from calib.jit import composed
 
 
 @dataclass(frozen=True)
-class Settings:
-    """TOML keys of the search.
-
-    Attributes:
-        population: candidates per generation; 0 lets CMA-ES choose 4 + 3 ln dim.
-        generations: generations per frame at most.
-        step: standard deviation of the first candidates, in posterior deviations of the parameters.
-        least_step: the step size never starts a frame below this, so that the search can follow motion.
-        tolerance: the search has converged when costs differ by less than this [nats], within a generation and between
-            the best ones of five.
-        restarts: how often the population may double in the first frame, where the object is searched for widely.
-    """
-
-    population: Annotated[int, Ge(0)] = 0
-    generations: Annotated[int, Ge(1)] = 20
-    step: Annotated[float, Gt(0)] = 1.0
-    least_step: Annotated[float, Gt(0)] = 0.5
-    tolerance: Annotated[float, Gt(0)] = 0.5
-    restarts: Annotated[int, Ge(0)] = 3
+class Settings(EvolutionSettings):
+    """TOML keys of the search."""
 
     def build(self, dimension: int, generator: np.random.Generator) -> Evolution:
         """A search in `dimension` dimensions that draws from `generator`."""

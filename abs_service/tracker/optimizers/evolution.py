@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.curvature import newton_step, search_metric
@@ -92,6 +93,28 @@ class Schedule:
 
 #: Of each search that explores.
 _EXPLORATION = Schedule("exploration", generations=60, tolerance=SIGNIFICANT)
+
+
+@dataclass(frozen=True)
+class EvolutionSettings:
+    """TOML keys of a search by generations.
+
+    Attributes:
+        population: candidates per generation; 0 lets CMA-ES choose 4 + 3 ln dim.
+        generations: generations per frame at most.
+        step: standard deviation of the first candidates, in posterior deviations of the parameters.
+        least_step: the step size never starts a frame below this, so that the search can follow motion.
+        tolerance: the search has converged when costs differ by less than this [nats], within a generation and between
+            the best ones of five.
+        restarts: how often the population may double in the first frame, where the object is searched for widely.
+    """
+
+    population: Annotated[int, Ge(0)] = 0
+    generations: Annotated[int, Ge(1)] = 20
+    step: Annotated[float, Gt(0)] = 1.0
+    least_step: Annotated[float, Gt(0)] = 0.5
+    tolerance: Annotated[float, Gt(0)] = 0.5
+    restarts: Annotated[int, Ge(0)] = 3
 
 
 class Evolution:
