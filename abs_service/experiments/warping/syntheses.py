@@ -12,7 +12,6 @@ import numpy as np
 
 from abs_service.experiments.tracked import Shot, demo_plan, demo_rig, follow, shoot, simulate
 from abs_service.observation import Observer
-from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives.base import Objective
@@ -78,10 +77,9 @@ def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row
 
 def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     """Time to synthesise one candidate of a sequence's first frame and to compare it [µs], for every synthesis."""
-    mesh = follow(sequence.rig, demo_plan(nurbs.Settings()), sequence.shots[:1]).model.mesh
+    model = Rigid(follow(sequence.rig, demo_plan(nurbs.Settings()), sequence.shots[:1]).model.mesh)
     thetas = np.random.default_rng(0).normal(0, 2e-3, (POPULATION, 6))
-    objectives = {name: _objective(SYNTHESES[name], sequence, mesh) for name in names}
-    model = Rigid(mesh)
+    objectives = {name: _objective(SYNTHESES[name], sequence, model) for name in names}
     least = dict.fromkeys(names, np.inf)
     for _ in range(TIMES):
         for name, objective in objectives.items():
@@ -92,9 +90,9 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     return {name: seconds / POPULATION * 1e6 for name, seconds in least.items()}
 
 
-def _objective(synthesis: SynthesisSettings, sequence: Recorded, mesh: Mesh) -> Objective:
+def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> Objective:
     """What judges candidates of the first frame."""
-    model = Rigid(mesh)
-    objective = demo_plan(nurbs.Settings()).objective.build(sequence.rig, mesh, synthesis.build(sequence.rig, mesh))
-    objective.observe(Observer(sequence.rig).observe(sequence.shots[0].frames), model.deform(model.rest[None]))
+    rig, mesh = sequence.rig, model.mesh
+    objective = demo_plan(nurbs.Settings()).objective.build(rig, mesh, synthesis.build(rig, mesh))
+    objective.observe(Observer(rig).observe(sequence.shots[0].frames), model.deform(model.rest[None]))
     return objective
