@@ -41,6 +41,10 @@ SCENES: Mapping[str, Scene] = {
 }
 
 
+#: A scene, and one sequence of it.
+Film = tuple[Scene, Sequence[Shot]]
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """How much is measured.
@@ -74,16 +78,19 @@ def run(settings: Settings, context: Context) -> Findings:
     found: dict[str, dict[str, list[Followed]]] = {}
     for name, scene in SCENES.items():
         context.progress(f"scene {name}")
+        rows: dict[str, list[Followed]] = {}
         makers = _makers(settings, scene, first=name == "5 mm")
         films = _films(scene, settings, context.seed)
-        rounds = [
-            {title: _sequences(title, make, scene, films, settings, context.seed) for title, make in makers.items()}
-            for _ in range(settings.repeats)
-        ]
-        found[name] = {title: [least(same) for same in zip(*(one[title] for one in rounds))] for title in makers}
+        few = [(scene, shots[:SLOW_FRAMES]) for _, shots in films[:1]]
+        for _ in range(settings.repeats):
+            for title, make in makers.items():
+                again = _follow(make, few if title in settings.slow else films, context.seed)
+                before = rows.setdefault(title, again)
+                rows[title] = [least(same) for same in zip(before, again)]
+        found[name] = rows
     context.progress("leaps")
-    leaps = _films_of_leaps(settings, context.seed)
-    leapt = {title: _leaps(make, leaps, context.seed) for title, make in _leapers(settings).items()}
+    leaps = _leaps(settings, context.seed)
+    leapt = {title: _follow(make, leaps, context.seed) for title, make in _leapers(settings).items()}
     missing = sorted(
         {rivals.KNOWN[name][0].partition(".")[0] for name in settings.peers if not rivals.installed([name])}
     )
@@ -118,25 +125,14 @@ def _leapers(settings: Settings) -> dict[str, Make]:
     return {name: _ours(name) for name in settings.leapers} | {GAUSS_NEWTON: newton}
 
 
-def _films(scene: Scene, settings: Settings, seed: int) -> list[list[Shot]]:
+def _films(scene: Scene, settings: Settings, seed: int) -> list[Film]:
     """A sequence of the scene for each seed."""
-    return [film(scene, range(settings.frames), np.random.default_rng([seed, k])) for k in range(settings.seeds)]
+    generators = (np.random.default_rng([seed, k]) for k in range(settings.seeds))
+    return [(scene, film(scene, range(settings.frames), generator)) for generator in generators]
 
 
-def _sequences(
-    title: str, make: Make, scene: Scene, films: Sequence[Sequence[Shot]], settings: Settings, seed: int
-) -> list[Followed]:
-    """What a tracker makes of a scene's sequences; the slow ones of a few frames of the first."""
-    if title in settings.slow:
-        films = [films[0][:SLOW_FRAMES]]
-    return [_follow(make, scene, shots, seed + k) for k, shots in enumerate(films)]
-
-
-def _leaps(make: Make, films: Sequence[tuple[Scene, Sequence[Shot]]], seed: int) -> list[Followed]:
-    return [_follow(make, scene, shots, seed + k) for k, (scene, shots) in enumerate(films)]
-
-
-def _films_of_leaps(settings: Settings, seed: int) -> list[tuple[Scene, list[Shot]]]:
+def _leaps(settings: Settings, seed: int) -> list[Film]:
+    """A sequence of every leap."""
     filmed = []
     for k in range(settings.leaps):
         generator = np.random.default_rng([seed, k])
@@ -145,9 +141,13 @@ def _films_of_leaps(settings: Settings, seed: int) -> list[tuple[Scene, list[Sho
     return filmed
 
 
-def _follow(make: Make, scene: Scene, shots: Sequence[Shot], seed: int) -> Followed:
-    follower, at = make(shots[0], scene.sigma, seed)
-    return follow(follower, at, shots)
+def _follow(make: Make, films: Sequence[Film], seed: int) -> list[Followed]:
+    """What a tracker makes of sequences."""
+    followed = []
+    for k, (scene, shots) in enumerate(films):
+        follower, at = make(shots[0], scene.sigma, seed + k)
+        followed.append(follow(follower, at, shots))
+    return followed
 
 
 def _goals(

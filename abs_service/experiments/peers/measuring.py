@@ -1,15 +1,16 @@
 """Runs a follower through a scene: its errors and what it costs."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.evaluation import closest_points
 from abs_service.experiments.peers.rivals import Follower
-from abs_service.experiments.peers.scene import SIDE, Shot, places
+from abs_service.experiments.peers.scene import SIDE, Moment, Shot, places
 
 #: A follower whose vertices are on average farther than this from their material, in so many frames in a row, has lost
 #: the object [m]; five frames are a sixth of a second.
@@ -22,16 +23,26 @@ class Followed:
 
     Attributes:
         at: places (n, 2) [m] of the vertices on the flat sheet.
+        moments: the sheet in every frame.
         vertices: of every frame (n, 3) [m].
-        vertex_mm, surface_mm: mean distance of the vertices from their own material, and from the surface [mm].
         cpu_ms: processor time of every frame, all threads [ms].
     """
 
     at: NDArray[np.float64]
+    moments: Sequence[Moment]
     vertices: Sequence[NDArray[np.floating]]
-    vertex_mm: NDArray[np.float64]
-    surface_mm: NDArray[np.float64]
     cpu_ms: NDArray[np.float64]
+
+    @cached_property
+    def vertex_mm(self) -> NDArray[np.float64]:
+        """Mean distance of the vertices from their own material [mm], of every frame."""
+        return _mean_mm(self.vertices, (moment.points(self.at) for moment in self.moments))
+
+    @cached_property
+    def surface_mm(self) -> NDArray[np.float64]:
+        """Mean distance of the vertices from the surface [mm], of every frame."""
+        pairs, fine = zip(self.vertices, self.moments), places(61, 41)
+        return _mean_mm(self.vertices, (closest_points(vertices, moment.points(fine)) for vertices, moment in pairs))
 
     @property
     def far(self) -> int:
@@ -43,6 +54,10 @@ class Followed:
     def lost(self) -> bool:
         """Whether the object was lost."""
         return self.far > LOST_FRAMES
+
+
+def _mean_mm(found: Iterable[NDArray[np.floating]], true: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
+    return np.array([1e3 * np.linalg.norm(one - other, axis=1).mean() for one, other in zip(found, true)])
 
 
 def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -> Followed:
@@ -58,13 +73,8 @@ def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -
         begun = time.process_time()
         tracked.append(follower.track(shot))
         cpu.append(time.process_time() - begun)
-    # Errors are found afterwards: in between, that would drive what the tracker needs out of the caches.
-    fine, vertex, surface = places(61, 41), [], []
-    for shot, vertices in zip(shots[1:], tracked):
-        vertex.append(np.linalg.norm(vertices - shot.moment.points(at), axis=1).mean())
-        closest = closest_points(vertices, shot.moment.points(fine))
-        surface.append(np.linalg.norm(vertices - closest, axis=1).mean())
-    return Followed(at, tracked, 1e3 * np.array(vertex), 1e3 * np.array(surface), 1e3 * np.array(cpu))
+    # Errors are found when they are asked for: in between, that would drive what the tracker needs out of the caches.
+    return Followed(at, [shot.moment for shot in shots[1:]], tracked, 1e3 * np.array(cpu))
 
 
 def least(repeats: Sequence[Followed]) -> Followed:
