@@ -18,18 +18,20 @@ lint: .venv/.dev ## format, style, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
 format: .venv/.dev ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
+evaluate: .venv/.run ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
+	@$(BIN)/python -m evaluation $(ARGS)
 bench: .venv/.dev ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
-	@$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
+	@$(BIN)/pytest evaluation/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
 cost: .venv/.dev ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
-	@$(BIN)/python -m tests.benchmarks.growth docs/images/cost.png
-proto: .venv/.dev ## regenerate the wire code from proto/abs/v1/*.proto
-	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/abs/v1/*.proto
+	@$(BIN)/python -m evaluation.benchmarks.growth docs/images/cost.png
+proto: .venv/.dev ## regenerate the wire code from proto/absmsg/v1/*.proto
+	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/absmsg/v1/*.proto
 constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
 	@$(COMPILE) --group dev --constraints constraints.txt --output-file constraints-dev.txt
 	@$(COMPILE) $(DEVICES:%=--extra %) --constraints constraints-dev.txt --output-file constraints-devices.txt
 	@$(COMPILE) --extra peers --constraints constraints-dev.txt --output-file constraints-peers.txt
-peers: .venv/.peers ## install what `abs-service evaluate peers` compares with; without, those rows are left out
+peers: .venv/.peers ## install what `make evaluate ARGS=peers` compares with; without, those rows are left out
 devices: .venv/.devices ## install every device SDK as well; the tests of their drivers are skipped without
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
@@ -48,4 +50,4 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-devices.txt && touch $@
 .venv/.peers: .venv/.dev constraints-peers.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-peers.txt && touch $@
-.PHONY: help run test check lint format bench cost proto constraints devices peers clean
+.PHONY: help run test check lint format evaluate bench cost proto constraints devices peers clean

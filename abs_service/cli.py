@@ -16,8 +16,8 @@ from importlib import import_module
 from types import ModuleType
 
 import abs_service
-from abs_service import lifeline
-from abs_service.exits import Exit, is_for_user
+from abs_service.supervision import parent_watchdog
+from abs_service.supervision.exit_codes import Exit, is_for_user
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
@@ -27,7 +27,6 @@ COMMANDS = {
     "devices": "what is attached, and what to do about what cannot be used",
     "calibrate": "where the sensors of a rig are, how they project and how they err",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
-    "evaluate": "measure how well it all works: the experiments of the paper and more, with reports",
     "import": "turn a folder of images into a recording",
     "recover": "repair recordings that were cut short",
     "capture": "only the devices: publish their images",
@@ -58,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
-    lifeline.hold()
+    parent_watchdog.hold()
     name, commands, given = "", COMMANDS, list(sys.argv[1:] if argv is None else argv)
     module = import_module("abs_service.commands")
     while commands:

@@ -10,7 +10,7 @@ import sys
 import time
 
 import zenoh
-from abs.v1.health_pb2 import Health
+from absmsg.v1.health_pb2 import Health
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 PATIENCE_S = 2.5  # each part speaks once a second

@@ -10,9 +10,9 @@ from types import ModuleType
 from urllib.parse import urlsplit
 
 import drivers
-from drivers.device import AddressError, Device, DeviceInfo
-from drivers.discovery import Availability, Found
-from drivers.footage import Footage
+from drivers.contract.device import AddressError, Device, DeviceInfo
+from drivers.contract.discovery import Availability, Found
+from drivers.encoding.foreign_recording import Footage
 
 #: What a driver may take longer than it was given before it is left behind [s].
 _GRACE_S = 1.0

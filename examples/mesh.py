@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 import zenoh
-from abs.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="bus.endpoint of the rig")

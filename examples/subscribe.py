@@ -2,7 +2,7 @@
 
   python examples/subscribe.py [--endpoint tcp/127.0.0.1:7447] [--topic abs/demo/sheet/state] [--count N]
 
-Needs only zenoh (`pip install eclipse-zenoh`) and the messages in proto/abs/v1. The age is taken on the monotonic
+Needs only zenoh (`pip install eclipse-zenoh`) and the messages in proto/absmsg/v1. The age is taken on the monotonic
 clock, so it is right on the host of the cameras; elsewhere compare `header.stamp` with a synchronised wall clock.
 """
 
@@ -13,7 +13,7 @@ from contextlib import suppress
 from itertools import islice
 
 import zenoh
-from abs.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformation_state_pb2 import DeformationState
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--endpoint", default="tcp/127.0.0.1:7447", help="bus.endpoint of the rig")

@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 from statistics import fmean
 
-from abs.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformation_state_pb2 import DeformationState
 from mcap.reader import make_reader
 
 #: What the tracker promises for the simulated sheet: mean distance of the vertices from where they truly are [mm].

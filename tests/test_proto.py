@@ -62,7 +62,7 @@ def test_a_reused_number_is_noticed() -> None:
     header = next(message for file in new.file for message in file.message_type if message.name == "Header")
     header.field[2].name = "count"
     assert breaks(old, new) == [
-        "abs.v1.Header 3 was seq: optional uint64, implicit presence, is count: optional uint64, implicit presence"
+        "absmsg.v1.Header 3 was seq: optional uint64, implicit presence, is count: optional uint64, implicit presence"
     ]
 
 

@@ -110,7 +110,7 @@ def test_what_the_packages_import_is_required_by_name() -> None:
         f"{path.relative_to(ROOT)}: {module}"
         for package in PACKAGES
         for path in (ROOT / package).rglob("*.py")
-        for module in _imported(path) - sys.stdlib_module_names - {*PACKAGES, "abs"}
+        for module in _imported(path) - sys.stdlib_module_names - {*PACKAGES, "absmsg"}
         if module in distributions and not declared & set(map(_normal, distributions[module]))
     }
     assert undeclared == set()

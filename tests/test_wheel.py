@@ -12,7 +12,7 @@ import pytest
 import abs_service
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = {"abs_service", "drivers", "calib", "abs"}
+PACKAGES = {"abs_service", "drivers", "calib", "absmsg"}
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,10 @@ def test_wheel_holds_the_four_packages_typed_and_nothing_else(wheel: Path) -> No
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(names)
 
 
-@pytest.mark.parametrize(("folder", "pattern"), [(ROOT / "proto", "abs/v1/*.proto"), (ROOT, "abs_service/rigs/*.toml")])
+DATA_FILES = [(ROOT / "proto", "absmsg/v1/*.proto"), (ROOT, "abs_service/rigs/*.toml")]
+
+
+@pytest.mark.parametrize(("folder", "pattern"), DATA_FILES)
 def test_wheel_holds_the_data_files(wheel: Path, folder: Path, pattern: str) -> None:
     wanted = {str(path.relative_to(folder)) for path in folder.glob(pattern)}
     assert wanted
@@ -51,7 +54,7 @@ def test_wheel_runs_away_from_the_checkout(wheel: Path, tmp_path: Path) -> None:
     origin = _run(
         str(python),
         "-c",
-        "import abs_service as s, drivers as d, calib as c, abs.v1 as a; print(s, d, c, a)",
+        "import abs_service as s, drivers as d, calib as c, absmsg.v1 as a; print(s, d, c, a)",
         cwd=tmp_path,
     )
     assert origin.count(str(site)) == len(PACKAGES)

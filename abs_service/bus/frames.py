@@ -5,20 +5,20 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Self
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
-from abs_service.queues import LatestQueue
-from abs_service.stamps import Speaker
-from drivers import codec
-from drivers.device import DeviceState, Truth
-from drivers.frame import Frame
+from abs_service.bus.queues import LatestQueue
+from abs_service.bus.stamps import Speaker
+from drivers.contract.device import DeviceState, Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
 
 #: Frames per stream that may wait to be published. More would only make them old.
 DEPTH = 4
 
 
 class FramePublisher:
-    """Takes what one device delivers and publishes it from a thread of its own; a `drivers.device.Sink`.
+    """Takes what one device delivers and publishes it from a thread of its own; a `drivers.contract.device.Sink`.
 
     The device is never held up: if publishing falls behind, the oldest frame of the stream is dropped and counted.
 
@@ -49,18 +49,18 @@ class FramePublisher:
         return self._queue.dropped
 
     def on_frame(self, frame: Frame) -> None:
-        """See `drivers.device.Sink.on_frame`."""
+        """See `drivers.contract.device.Sink.on_frame`."""
         self._queue.put(keys.image(frame.sensor, frame.stream), frame)
 
     def on_truth(self, truth: Truth) -> None:
-        """See `drivers.device.Sink.on_truth`."""
+        """See `drivers.contract.device.Sink.on_truth`."""
         self._queue.put(keys.truth(self._device), truth)
 
     def on_state(self, state: DeviceState, reason: str) -> None:
-        """See `drivers.device.Sink.on_state`; the state travels in the health of whoever looks after the device."""
+        """See `drivers.contract.device.Sink.on_state`; the device supervisor publishes it in its health."""
 
     def on_warning(self, condition: str, message: str) -> None:
-        """See `drivers.device.Sink.on_warning`; warnings travel in the health, too."""
+        """See `drivers.contract.device.Sink.on_warning`; warnings travel in the health, too."""
 
     def close(self) -> None:
         """Publishes what waits and ends the thread; may be called again."""

@@ -7,10 +7,10 @@ from typing import Any, Self
 import zenoh
 from zenoh import ext
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
 from abs_service.bus.session import Role, open_session
-from drivers.callbacks import outside_daemons
+from drivers.contract.callbacks import outside_daemons
 
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].

@@ -6,8 +6,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from abs_service import config, plugins
-from abs_service.calibration.rig_file import Covariance, Residuals, RigCalibration, SensorCalibration, read_covariance
+from abs_service import config
+from abs_service.calibration.files.rig_file import (
+    Covariance,
+    Residuals,
+    RigCalibration,
+    SensorCalibration,
+    read_covariance,
+)
+from abs_service.config import plugins
 from abs_service.config.calibration import CovarianceTable, ProvenanceTable, SensorEvidence
 from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera

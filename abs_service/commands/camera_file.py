@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from abs_service.config.camera import PoseTable
-from abs_service.problems import Key, from_pydantic
+from abs_service.config.problems import Key, from_pydantic
 from calib.camera import Camera
 from calib.lenses import LensName, lens_of
 

@@ -11,17 +11,21 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 
-from abs_service import announcements, config, keys, pauses, plugins
+from abs_service import config
+from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
-from abs_service.capture import DeviceKeeper
-from abs_service.commands import participant, rig_devices
-from abs_service.envelope import CALIBRATION, CONFIG, MODEL, TRANSFORMS
-from abs_service.exits import Exit
-from abs_service.health import Health, Level
-from abs_service.stamps import Speaker, WallClock
+from abs_service.bus.health import Health, Level
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.capture import sensor_metadata
+from abs_service.capture.device_supervisor import DeviceKeeper
+from abs_service.commands import rig_devices, rig_process
+from abs_service.config import plugins
+from abs_service.supervision import gc_tuning
+from abs_service.supervision.exit_codes import Exit
+from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
-from drivers.device import Device
+from drivers.contract.device import Device
 from drivers.opening import open_device
 
 #: Time that the devices have to close [s].
@@ -30,19 +34,19 @@ CLOSE_S = 1.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service capture`."""
-    participant.add_arguments(parser)
+    rig_process.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Captures until told to stop."""
-    rig = participant.load_config(arguments)
-    stop = participant.stop_on_signals()
+    rig = rig_process.load_config(arguments)
+    stop = rig_process.stop_on_signals()
     clock = WallClock()
     speaker = Speaker(rig.name, clock)
-    with participant.open_bus(rig, arguments) as bus:
+    with rig_process.open_bus(rig, arguments) as bus:
         health = Health(bus, "capture", speaker)
         bus.show_alive("capture")
-        bus.answer(keys.SCHEMA, announcements.SCHEMA_MESSAGE, announcements.schema)
+        bus.answer(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
         crier = Crier(bus, speaker, rig)
         publishers = {name: FramePublisher(bus, speaker, name) for name in rig.devices}
         source = str(arguments.config or "demo.toml")
@@ -68,7 +72,7 @@ def _keeper(
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
         crier.add_device(name, device)
-        pauses.keep_what_is_loaded()
+        gc_tuning.keep_what_is_loaded()
 
     return DeviceKeeper(
         name,
@@ -148,17 +152,17 @@ class Crier:
             header = self._speaker.now(self._seq)
             self._seq += 1
             wall_ns = header.stamp.ToNanoseconds()
-            self._put(keys.CONFIG, CONFIG, announcements.config(header, self._toml).SerializeToString())
+            self._put(keys.CONFIG, CONFIG, sensor_metadata.config(header, self._toml).SerializeToString())
             for sensor, camera in self._cameras.items():
                 table = self._rig.sensors[sensor]
                 outliers = table.model_dump(include={"outlier_share", "range_m"}, exclude_none=True)
                 noise = {} if table.noise is None else plugins.table(table.noise) | outliers
-                model = announcements.sensor_model(header, sensor, camera, noise)
-                calibration = announcements.calibration(sensor, camera, wall_ns)
+                model = sensor_metadata.sensor_model(header, sensor, camera, noise)
+                calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
                 self._put(keys.model(sensor), MODEL, model.SerializeToString())
                 self._put(keys.calibration(sensor), CALIBRATION, calibration.SerializeToString())
             if self._cameras:
-                poses = announcements.transforms(self._cameras, wall_ns)
+                poses = sensor_metadata.transforms(self._cameras, wall_ns)
                 self._put(keys.TRANSFORMS, TRANSFORMS, poses.SerializeToString())
 
     def _put(self, topic: str, message: str, payload: bytes) -> None:

@@ -14,11 +14,13 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from abs_service import config, keys, plugins
-from abs_service.commands import participant, plans
-from abs_service.exits import Exit, is_for_user
-from abs_service.problems import none_of
-from abs_service.readers import kinds
+from abs_service import config, wiring
+from abs_service.bus import keys
+from abs_service.commands import rig_process
+from abs_service.config import plugins
+from abs_service.config.problems import none_of
+from abs_service.pairing.image_decoders import kinds
+from abs_service.supervision.exit_codes import Exit, is_for_user
 from calib.rig import Noise
 from drivers import opening
 
@@ -32,14 +34,14 @@ class CheckError(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service check`."""
-    participant.add_config(parser)
+    rig_process.add_config(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks one configuration."""
     try:
-        rig = participant.load_config(arguments)
+        rig = rig_process.load_config(arguments)
         found = describe(rig, str(arguments.config or "demo.toml"))
     except (config.ConfigError, CheckError) as error:
         if not arguments.json:
@@ -70,14 +72,14 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
     for name, sensor in rig.sensors.items():
         with _noting(f"sensors.{name}.noise", problems):
             if sensor.noise is not None:
-                plans.noise(sensor.noise, sensor.range_m)
+                wiring.noise(sensor.noise, sensor.range_m)
         with _noting(f"sensors.{name}.texture", problems):
             if sensor.texture is not None:
-                plans.texture(sensor.texture)
+                wiring.texture(sensor.texture)
     for name, tracker in rig.trackers.items():
         with _noting(f"trackers.{name}", problems):
-            plans.plan(rig, name)
-            _check_streams(plans.noises(rig, name), streams)
+            wiring.plan(rig, name)
+            _check_streams(wiring.noises(rig, name), streams)
         with _noting(f"trackers.{name}.region", problems):
             tracker.region.build()
     if problems:

@@ -21,12 +21,12 @@ from typing import Any
 
 from rich.console import Console
 
-from abs_service.commands import participant
+from abs_service.commands import rig_process
 from abs_service.display import devices as display
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 from drivers import opening
-from drivers.device import Device
-from drivers.discovery import Found
+from drivers.contract.device import Device
+from drivers.contract.discovery import Found
 
 RULES = "60-abs-service.rules"
 #: Time between two looks with --watch [s].
@@ -91,7 +91,7 @@ def changes(before: Sequence[Found], after: Sequence[Found]) -> Iterator[tuple[s
 
 
 def _watch(console: Console, arguments: argparse.Namespace) -> None:
-    stop = participant.stop_on_signals()
+    stop = rig_process.stop_on_signals()
     known: Sequence[Found] = ()
     if not arguments.json:
         console.print("Watching; Ctrl-C ends.", style="dim")

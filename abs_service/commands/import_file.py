@@ -5,16 +5,17 @@ from collections.abc import Mapping
 from itertools import chain
 from pathlib import Path
 
-from abs.v1.common_pb2 import Header
+from absmsg.v1.common_pb2 import Header
 from rich.console import Console
 from rich.progress import track
 
-from abs_service import announcements, keys
+from abs_service.bus import keys
+from abs_service.capture import sensor_metadata
 from calib.camera import Camera
-from drivers import codec
-from drivers.footage import Footage, FootageError
-from drivers.frame import Frame
-from drivers.mcap_file import McapFile
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.foreign_recording import Footage, FootageError
+from drivers.encoding.mcap_file import McapFile
 
 
 def write(path: Path, rig: str, footage: Footage, rig_toml: bytes) -> Mapping[tuple[str, str], int]:
@@ -53,11 +54,11 @@ def write(path: Path, rig: str, footage: Footage, rig_toml: bytes) -> Mapping[tu
 
 def _write_cameras(file: McapFile, rig: str, cameras: Mapping[str, Camera], wall_ns: int) -> None:
     for sensor, camera in cameras.items():
-        model = announcements.sensor_model(_header(rig, wall_ns, 0), sensor, camera, {})
-        calibration = announcements.calibration(sensor, camera, wall_ns)
+        model = sensor_metadata.sensor_model(_header(rig, wall_ns, 0), sensor, camera, {})
+        calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
         for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
             file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
-    transforms = announcements.transforms(cameras, wall_ns)
+    transforms = sensor_metadata.transforms(cameras, wall_ns)
     file.write(f"/{keys.TRANSFORMS}", transforms.DESCRIPTOR.full_name, transforms.SerializeToString(), wall_ns, 0)
 
 

@@ -39,9 +39,9 @@ from pathlib import Path
 
 from abs_service.commands import camera_file, import_file
 from abs_service.commands.camera_file import CameraFile
-from abs_service.exits import Exit
-from drivers.footage import Footage
-from drivers.frame import Geometry
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.frame import Geometry
+from drivers.encoding.foreign_recording import Footage
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 from drivers.opening import open_recording

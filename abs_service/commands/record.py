@@ -14,14 +14,15 @@ import sys
 import tempfile
 import threading
 
-from abs_service import config, pauses
-from abs_service.commands import participant
-from abs_service.exits import Exit
-from abs_service.health import Health, Level
-from abs_service.record import Recorder, RecorderSettings
-from abs_service.recovery import RecoveryError, leftovers, recover
-from abs_service.stamps import Speaker, WallClock
-from drivers.mcap_file import Compression
+from abs_service import config
+from abs_service.bus.health import Health, Level
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.commands import rig_process
+from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recovery import RecoveryError, leftovers, recover
+from abs_service.supervision import gc_tuning
+from abs_service.supervision.exit_codes import Exit
+from drivers.encoding.mcap_file import Compression
 
 #: Time to write what still waits when told to stop [s].
 DRAIN_S = 2.5
@@ -35,17 +36,17 @@ class DirectoryError(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service record`."""
-    participant.add_arguments(parser)
+    rig_process.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Records until told to stop."""
-    rig = participant.load_config(arguments)
+    rig = rig_process.load_config(arguments)
     settings = _settings(rig)
-    stop = participant.stop_on_signals()
+    stop = rig_process.stop_on_signals()
     clock = WallClock()
     speaker = Speaker(rig.name, clock)
-    with participant.open_bus(rig, arguments) as bus:
+    with rig_process.open_bus(rig, arguments) as bus:
         health = Health(bus, "record", speaker)
         bus.show_alive("record")
         # Beside the recording, which must not wait for what may take minutes.
@@ -53,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         recorder = Recorder(bus, settings, health, clock)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         recorder.start()
-        pauses.keep_what_is_loaded()
+        gc_tuning.keep_what_is_loaded()
         while not stop.wait(0.2):
             if health.due():
                 clock.measure()

@@ -10,8 +10,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from abs_service.exits import Exit
-from abs_service.recovery import RecoveryError, recover
+from abs_service.recording.recovery import RecoveryError, recover
+from abs_service.supervision.exit_codes import Exit
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

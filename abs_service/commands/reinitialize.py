@@ -9,13 +9,14 @@ A tracker that has lost its object does so by itself; this is for another object
 import argparse
 import threading
 
-from abs.v1 import common_pb2, deformation_state_pb2
+from absmsg.v1 import common_pb2, deformation_state_pb2
 
-from abs_service import keys
+from abs_service import wiring
+from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Bus, Sample
-from abs_service.commands import participant, plans
-from abs_service.exits import Exit
-from abs_service.stamps import Speaker, WallClock
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.commands import rig_process
+from abs_service.supervision.exit_codes import Exit
 
 #: How long the tracker may take to find an object [s].
 PATIENCE_S = 10.0
@@ -23,16 +24,16 @@ PATIENCE_S = 10.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service reinitialize`."""
-    participant.add_arguments(parser)
+    rig_process.add_arguments(parser)
     parser.add_argument("tracker", metavar="TRACKER", nargs="?", help="its name (default: the first one)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Sends the command and waits for the new mesh."""
-    settings = participant.load_config(arguments)
+    settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
-    plans.plan(settings, name)
-    with participant.open_bus(settings, arguments) as bus:
+    wiring.plan(settings, name)
+    with rig_process.open_bus(settings, arguments) as bus:
         return _reinitialize(bus, name, Speaker(settings.name, WallClock()))
 
 

@@ -21,16 +21,15 @@ from urllib.parse import quote
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from abs_service import config
-from abs_service.commands import plans
+from abs_service import config, wiring
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.commands import run as run_command
-from abs_service.exits import Exit
-from abs_service.replay import OfflineTracker, free_path, replay
-from abs_service.stamps import Speaker, WallClock
-from abs_service.synchroniser import Synchroniser
-from abs_service.tracking import Tracking, streams
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.supervision.exit_codes import Exit
+from abs_service.tracking.replay import OfflineTracker, free_path, replay
+from abs_service.tracking.session import Tracking, streams
 from calib.rig import Rig
-from drivers.mcap_file import McapFile
+from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
 
 #: Time that the processes of a live replay have to get ready before its first frame [s].
@@ -112,12 +111,12 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
         for sensor, camera in recording.cameras.items()
         if sensor in settings.sensors
     }
-    rig = plans.rig(settings, name, cameras)
+    rig = wiring.rig(settings, name, cameras)
     members = streams(rig.sensors.values())
     missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
     if missing:
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
-    return rig, plans.synchroniser(settings, name, rig.sensors.values())
+    return rig, wiring.synchroniser(settings, name, rig.sensors.values())
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
@@ -125,9 +124,9 @@ def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, fi
     clock = WallClock(monotonic=lambda: 0, wall=lambda: recording.wall_offset_ns)
     return OfflineTracker(
         name,
-        Tracking(rig, plans.plan(settings, name)),
+        Tracking(rig, wiring.plan(settings, name)),
         synchroniser,
-        plans.model_name(settings, name),
+        wiring.model_name(settings, name),
         rig.calib_id,
         Speaker(settings.name, clock, boot_id="replay"),
         file,

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 from abs_service import config
 from calib.camera import Camera
-from drivers.controls import Value
-from drivers.device import ControlError, Device
+from drivers.contract.controls import Value
+from drivers.contract.device import ControlError, Device
 
 
 class HeadError(Exception):

@@ -21,18 +21,20 @@ from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
 
 from rich.console import Console
 
-from abs_service import config, keys, pauses
+from abs_service import config
+from abs_service.bus import keys
 from abs_service.bus.session import Role
+from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands import participant
+from abs_service.commands import rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
-from abs_service.display.view import Display
-from abs_service.exits import Exit
-from abs_service.processes import ChildProcess, Process
-from abs_service.session import Session
-from abs_service.stamps import WallClock
-from abs_service.supervisor import Child, Limits, Supervisor
+from abs_service.supervision import gc_tuning
+from abs_service.supervision.child_process import ChildProcess, Process
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.rig_view import Display
+from abs_service.supervision.run_session import Session
+from abs_service.supervision.supervisor import Child, Limits, Supervisor
 
 
 class ChildError(Exception):
@@ -41,7 +43,7 @@ class ChildError(Exception):
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service run`."""
-    participant.add_config(parser)
+    rig_process.add_config(parser)
     parser.add_argument("--duration", metavar="S", type=float, default=float("inf"), help="end after this many seconds")
     parser.add_argument("--no-record", action="store_true", help="keep nothing on disk")
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
@@ -52,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until told to stop, until its devices are at their end, or until nothing can go on."""
-    rig = effective(participant.load_config(arguments), arguments)
-    stop = participant.stop_on_signals()
-    pauses.take_short_turns()  # what the router passes on may have to wait for the threads of this process
+    rig = effective(rig_process.load_config(arguments), arguments)
+    stop = rig_process.stop_on_signals()
+    gc_tuning.take_short_turns()  # what the router passes on may have to wait for the threads of this process
     with (
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,

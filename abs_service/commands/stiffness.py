@@ -12,13 +12,13 @@ import json
 import sys
 from pathlib import Path
 
-from abs_service import config
-from abs_service.commands import plans, replay
+from abs_service import config, wiring
+from abs_service.commands import replay
 from abs_service.display.stiffness_plot import draw
-from abs_service.exits import Exit
-from abs_service.hanging_strip import HangingStrip, follow
+from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.models import gravity
-from abs_service.tracker.stiffness import Stiffness, estimate_stiffness
+from abs_service.tracking.hanging_strip import HangingStrip, follow
+from abs_service.tracking.stiffness import Stiffness, estimate_stiffness
 from drivers.replay import Recording
 
 #: Standard gravity [m/s²].
@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = replay.configuration(recording, arguments.config)
     name = _tracker(settings, arguments.tracker, path)
-    strip = follow(recording, *replay.recorded_rig(settings, name, recording), plans.plan(settings, name))
+    strip = follow(recording, *replay.recorded_rig(settings, name, recording), wiring.plan(settings, name))
     model = strip.model
     seen = model.strip
     found = estimate_stiffness(strip.hangings, seen.length, seen.length_deviation, seen.load_deviation)

@@ -11,22 +11,24 @@ import threading
 import time
 from collections.abc import Mapping
 
-from abs.v1.sensor_model_pb2 import SensorModel
+from absmsg.v1.sensor_model_pb2 import SensorModel
 
-from abs_service import config, keys, pauses
+from abs_service import config, wiring
+from abs_service.bus import keys
 from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
-from abs_service.commands import participant, plans
-from abs_service.exits import Exit
-from abs_service.health import Health, Level
-from abs_service.residuals import ResidualWatch
-from abs_service.stamps import Speaker, WallClock
-from abs_service.track import EstimatePublisher, LiveTracker, WaitingSets
-from abs_service.tracking import Plan, Tracking, streams
-from abs_service.warmup import warm_up
+from abs_service.bus.health import Health, Level
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.commands import rig_process
+from abs_service.supervision import gc_tuning
+from abs_service.supervision.exit_codes import Exit
+from abs_service.tracking.live_tracker import EstimatePublisher, LiveTracker, WaitingSets
+from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.session import Plan, Tracking, streams
+from abs_service.tracking.warmup import warm_up
 from calib.camera import Camera
 from calib.rig import Noise, Rig
-from drivers.sensor_model import decode_camera
+from drivers.encoding.sensor_model import decode_camera
 
 #: How long one question for calibrations waits for answers [s].
 ASK_S = 0.5
@@ -34,23 +36,23 @@ ASK_S = 0.5
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service track`."""
-    participant.add_arguments(parser)
+    rig_process.add_arguments(parser)
     parser.add_argument("tracker", metavar="TRACKER", nargs="?", help="its name (default: the first one)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Tracks until told to stop."""
-    settings = participant.load_config(arguments)
+    settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
-    plan = plans.plan(settings, name)
-    stop = participant.stop_on_signals()
+    plan = wiring.plan(settings, name)
+    stop = rig_process.stop_on_signals()
     clock = WallClock()
     speaker = Speaker(settings.name, clock)
-    with participant.open_bus(settings, arguments) as bus:
+    with rig_process.open_bus(settings, arguments) as bus:
         health = Health(bus, f"track/{name}", speaker)
         bus.show_alive(f"track/{name}")
         # At once, because it takes longer than the devices take to open, and neither needs the other.
-        noises = plans.noises(settings, name)
+        noises = wiring.noises(settings, name)
         preparing = threading.Thread(target=_prepare, args=(noises, plan, health), daemon=True)
         preparing.start()
         cameras = _cameras(bus, settings.trackers[name].sensors, health, stop)
@@ -60,8 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         health.publish()
         if stop.is_set():
             return Exit.OK
-        pauses.keep_what_is_loaded()
-        rig = plans.rig(settings, name, cameras)
+        gc_tuning.keep_what_is_loaded()
+        rig = wiring.rig(settings, name, cameras)
         tracking = Tracking(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
         live = _live(bus, settings, name, rig, tracking, speaker, health)
@@ -86,11 +88,11 @@ def _live(
     health: Health,
 ) -> LiveTracker:
     frames = FrameSubscriber(bus, streams(rig.sensors.values()))
-    synchroniser = plans.synchroniser(settings, name, rig.sensors.values())
+    synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,
         WaitingSets(frames, synchroniser, time.monotonic_ns),
-        EstimatePublisher(bus, speaker, name, plans.model_name(settings, name), rig.calib_id),
+        EstimatePublisher(bus, speaker, name, wiring.model_name(settings, name), rig.calib_id),
         health,
         ResidualWatch(health),
         time.monotonic_ns,

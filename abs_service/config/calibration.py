@@ -69,7 +69,7 @@ class SensorEvidence(Table):
 
     Attributes:
         factory: the device's own calibration, which the file's takes the place of.
-        sigma: standard deviation of every parameter that was determined; see `calib.solve.layout` for their names.
+        sigma: standard deviation of every determined parameter; names as in `calib.solve.bundle.layout`.
         residuals: what is left.
     """
 

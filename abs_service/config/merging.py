@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from abs_service.config.calibration import SHARED, CalibratedSensor, CalibrationFile, CalibrationOrigin, SensorOrigin
 from abs_service.config.mistakes import ConfigError, allowed_at, error_of
-from abs_service.problems import Key, Problem, dotted, from_pydantic, none_of
+from abs_service.config.problems import Key, Problem, dotted, from_pydantic, none_of
 
 
 def load_calibration(path: Path) -> CalibrationFile:

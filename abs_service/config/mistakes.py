@@ -5,7 +5,7 @@ from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
-from abs_service.problems import Key, Problem
+from abs_service.config.problems import Key, Problem
 
 
 class ConfigError(Exception):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from abs_service.problems import Problem, none_of
+from abs_service.config.problems import Problem, none_of
 
 
 def check(file: dict[str, Any]) -> list[Problem]:

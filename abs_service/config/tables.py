@@ -89,7 +89,7 @@ class TrackerTable(Table):
         reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
         model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
         mesh: the triangle mesh.
-        priors, relief: `Settings` of `abs_service.tracker.priors` and `.relief`.
+        priors, relief: `Settings` of `abs_service.tracker.posterior.priors` and `.relief`.
         status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
         budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
@@ -98,14 +98,14 @@ class TrackerTable(Table):
     sensors: Annotated[tuple[str, ...], Field(min_length=1)]
     reference: Stream | Literal[""] = ""
     model: Annotated[Any, Plugin("abs_service.tracker.models")]
-    region: Annotated[Any, Plugin("abs_service.tracker.regions")] = Field(default={"type": "nearest"})
+    region: Annotated[Any, Plugin("abs_service.tracker.detection.regions")] = Field(default={"type": "nearest"})
     mesh: MeshTable = MeshTable()
     synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
-    priors: Annotated[Any, SettingsOf("abs_service.tracker.priors")] = Field(default={})
-    relief: Annotated[Any, SettingsOf("abs_service.tracker.relief")] = Field(default={})
+    priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors")] = Field(default={})
+    relief: Annotated[Any, SettingsOf("abs_service.tracking.vertex_offsets")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
-    reinitialization: Annotated[Any, SettingsOf("abs_service.tracker.loss")] = Field(default={})
+    reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.loss_monitor")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
     budget_ms: Positive = 24.0
     budget_evaluations: Annotated[int, Field(ge=1)] = 100_000

@@ -10,7 +10,8 @@ from urllib.parse import quote, unquote, urlsplit
 from pydantic import AfterValidator, GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
-from abs_service import keys, plugins
+from abs_service.bus import keys
+from abs_service.config import plugins
 
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
 FILE_SCHEMES = frozenset({"replay"})

@@ -7,9 +7,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from drivers.controls import Controls
-from drivers.device import Device
-from drivers.discovery import Availability, Found
+from drivers.contract.controls import Controls
+from drivers.contract.device import Device
+from drivers.contract.discovery import Availability, Found
 
 _STYLES = {
     Availability.READY: "green",

@@ -3,8 +3,8 @@
 import json
 from typing import Self, TextIO
 
-from abs_service.display.view import View, size
-from abs_service.tracker_log import Report
+from abs_service.supervision.rig_view import View, size
+from abs_service.tracking.tracker_log import Report
 
 PERIOD_NS = 1_000_000_000
 

@@ -2,7 +2,7 @@
 
 from typing import Self
 
-from abs.v1.health_pb2 import Health
+from absmsg.v1.health_pb2 import Health
 from rich.console import Console, Group, RenderableType
 from rich.live import Live as LiveRegion
 from rich.markup import escape
@@ -10,9 +10,9 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from abs_service.display.view import View, size
-from abs_service.supervisor import State
-from abs_service.tracker_log import Report, TrackerLog
+from abs_service.supervision.rig_view import View, size
+from abs_service.supervision.supervisor import State
+from abs_service.tracking.tracker_log import Report, TrackerLog
 
 REFRESH_HZ = 6
 

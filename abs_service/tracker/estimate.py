@@ -7,7 +7,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import Source
+from abs_service.pairing.observation import Source
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.terms.base import SensorFit
 

@@ -5,14 +5,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import Observation
-from abs_service.tracker import status, uncertainty
-from abs_service.tracker.curvature import posterior_covariance
+from abs_service.pairing.observation import Observation
+from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel, Surface
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome
-from abs_service.tracker.posterior import Posterior
-from abs_service.tracker.relocation import laid_over
+from abs_service.tracker.posterior.covariance import along_normals, propagated, remaining, sandwich
+from abs_service.tracker.posterior.curvature import posterior_covariance
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracker.posterior.relocation import laid_over
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 
 
@@ -66,9 +67,9 @@ class Tracker:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
         near = self._posterior.linearized_near(theta)
-        covariance = uncertainty.sandwich(posterior_covariance(near.quadratic), near.sensed)
-        own = uncertainty.along_normals(surface, self._own)
-        return covariance, uncertainty.propagated(near.moves, covariance) + own
+        covariance = sandwich(posterior_covariance(near.quadratic), near.sensed)
+        own = along_normals(surface, self._own)
+        return covariance, propagated(near.moves, covariance) + own
 
     def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.
@@ -83,7 +84,7 @@ class Tracker:
         deviation = np.broadcast_to(self.model.mesh.deviation, len(normals))
         inverse = posterior_covariance(self._posterior.linearize(theta))
         response = -inverse @ self._posterior.answers(theta, normals * deviation[:, None])
-        return uncertainty.remaining(normals, deviation, self.model.jacobian(theta), response)
+        return remaining(normals, deviation, self.model.jacobian(theta), response)
 
     def _estimate(self, observation: Observation, found: Outcome, budget: Budget) -> Estimate:
         surface = self.model.deform(found.theta[None])

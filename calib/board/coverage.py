@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board import mirrored
-from calib.board.stance import Stance, differs, extent, stance
+from calib.board.board_pose_features import Stance, differs, extent, stance
 from calib.views import CornerView
 
 #: Views of a sensor below which no calibration is attempted, and with which one is reliable.

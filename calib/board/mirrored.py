@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
-from calib.board.stance import extent, stance
+from calib.board.board_pose_features import extent, stance
 from calib.views import CornerView
 
 #: Moments that two sensors must have in common for this to be told.

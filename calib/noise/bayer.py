@@ -7,8 +7,8 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import ArrayLike, NDArray
 
-from calib.noise import fitting, pictures
 from calib.noise.base import LEVELS, NoiseError
+from calib.noise.fit import fitting, pictures
 
 #: Every filter lets its own colour through and nothing else.
 IDEAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

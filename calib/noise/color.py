@@ -7,8 +7,8 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import ArrayLike, NDArray
 
-from calib.noise import pictures
 from calib.noise.base import LEVELS
+from calib.noise.fit import pictures
 
 
 @dataclass(frozen=True)

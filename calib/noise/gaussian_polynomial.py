@@ -7,10 +7,10 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import NDArray
 
-from calib.noise import fitting
 from calib.noise.base import Pixels
-from calib.noise.polynomial import EVERYWHERE, Polynomials, Span, Table, check_span, check_table
-from calib.noise.samples import Samples
+from calib.noise.fit import fitting
+from calib.noise.fit.polynomial import EVERYWHERE, Polynomials, Span, Table, check_span, check_table
+from calib.noise.fit.samples import Samples
 
 
 @dataclass(frozen=True)

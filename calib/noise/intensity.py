@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import ArrayLike, NDArray
 
-from calib.noise import fitting, pictures
+from calib.noise.fit import fitting, pictures
 
 #: Streams of one number per pixel that tell of reflectivity.
 Stream = Literal["amplitude", "intensity", "ir"]

@@ -7,9 +7,9 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import NDArray
 
-from calib.noise import fitting
 from calib.noise.base import Pixels
-from calib.noise.samples import Samples
+from calib.noise.fit import fitting
+from calib.noise.fit.samples import Samples
 
 #: A deviation beyond any sensor's range says no more than this [m], for which single precision has room.
 LARGEST_M = 100.0

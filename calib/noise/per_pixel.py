@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.noise import maps, shrinkage
 from calib.noise.base import DepthNoise, NoiseError, Pixels
-from calib.noise.polynomial import Span, evaluate
-from calib.noise.samples import Samples, domain
-from calib.noise.shrinkage import ONCE, Repeats
+from calib.noise.fit import maps, shrinkage
+from calib.noise.fit.polynomial import Span, evaluate
+from calib.noise.fit.samples import Samples, domain
+from calib.noise.fit.shrinkage import ONCE, Repeats
 
 #: The amplitude does not occur in a pixel's own offset.
 _ANY: Span = (0.0, 1.0)

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.noise import fitting, maps, shrinkage
 from calib.noise.base import NoiseError, Pixels
-from calib.noise.polynomial import Polynomials
-from calib.noise.samples import Samples
+from calib.noise.fit import fitting, maps, shrinkage
+from calib.noise.fit.polynomial import Polynomials
+from calib.noise.fit.samples import Samples
 
 
 @dataclass(frozen=True, eq=False)

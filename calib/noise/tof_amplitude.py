@@ -8,10 +8,10 @@ from annotated_types import Ge, Gt
 from numpy.polynomial.polynomial import polyvander
 from numpy.typing import NDArray
 
-from calib.noise import fitting
 from calib.noise.base import NoiseError, Pixels
-from calib.noise.polynomial import EVERYWHERE, Span, check_span, evaluate
-from calib.noise.samples import Samples, domain
+from calib.noise.fit import fitting
+from calib.noise.fit.polynomial import EVERYWHERE, Span, check_span, evaluate
+from calib.noise.fit.samples import Samples, domain
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from calib.noise import constant, gaussian_polynomial, per_pixel, region_polynomial, structured_light, tof_amplitude
 from calib.noise.base import DepthNoise
+from calib.noise.fit.samples import Samples
 from calib.noise.per_pixel import PerPixel
-from calib.noise.samples import Samples
 from calib.sequences.evidence import Evidence
 from calib.sequences.steps import Steps
 

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError
-from calib.noise.samples import Samples, joined
-from calib.noise.shrinkage import Repeats
+from calib.noise.fit.samples import Samples, joined
+from calib.noise.fit.shrinkage import Repeats
 from calib.sequences.reference import Reference
 from calib.sequences.static import Static
 

@@ -12,7 +12,7 @@ from calib.camera import Camera
 from calib.noise.base import NoiseError
 from calib.pose import Pose
 from calib.sequences import plane
-from calib.solve.sightings import sightings
+from calib.solve.start.board_poses import sightings
 from calib.views import CornerView
 
 #: Increments of a pose that derivatives are told from [rad, m].

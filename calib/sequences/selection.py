@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from calib.noise.base import DepthNoise, NoiseError
-from calib.noise.quality import Quality, judge
+from calib.noise.fit.quality import Quality, judge
 from calib.sequences.candidates import Candidate
 from calib.sequences.evidence import Evidence, thinned, together
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError
-from calib.noise.samples import Samples, from_images
+from calib.noise.fit.samples import Samples, from_images
 from calib.sequences import stillness
 from calib.sequences.steps import Steps, recognize
 from calib.sequences.stillness import Segment

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from calib.noise.base import NoiseError
-from calib.noise.fitting import MAD_TO_SIGMA
+from calib.noise.fit.fitting import MAD_TO_SIGMA
 
 #: Frames that are judged together, and the fewest that anything can be said of.
 SEGMENT, LEAST_FRAMES = 30, 8

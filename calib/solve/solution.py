@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve import robust
-from calib.solve.adjust import Adjustment
-from calib.solve.blocks import Corners
-from calib.solve.formulation import groups_of
-from calib.solve.layout import DEPTH_TERMS, POSE, Freedom
-from calib.solve.lenses import MATRIX
-from calib.solve.state import SensorState, State
-from calib.solve.tasks import Task
+from calib.solve.bundle import robust
+from calib.solve.bundle.adjustment import Adjustment
+from calib.solve.bundle.blocks import Corners
+from calib.solve.bundle.formulation import groups_of
+from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Freedom
+from calib.solve.bundle.lens_parameters import MATRIX
+from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.tasks import Task
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from drivers.azure import calibration
 from drivers.azure.calibration import CalibrationError
-from drivers.footage import FootageError
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 
 #: Sensor, stream and kind by the title of a track.
 _TRACKS: Mapping[str, tuple[str, str, Kind]] = {

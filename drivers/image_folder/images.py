@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.image_folder.listing import ImageFile, ImageFolderError
 
 

@@ -6,8 +6,8 @@ Codec: `packets`, `assembly`, `unpacking`, `reference_plane`. Protocol: `command
 
 from collections.abc import Callable
 
-from drivers.device import Device, DeviceInfo, SdkMissingError
-from drivers.discovery import Availability, Found
+from drivers.contract.device import Device, DeviceInfo, SdkMissingError
+from drivers.contract.discovery import Availability, Found
 from drivers.kinect1.address import parse
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 from drivers.kinect1.camera import Stream
 
 

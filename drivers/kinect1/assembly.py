@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel
-from drivers.kinect1.packets import HEADER_BYTES, PacketFormat
+from drivers.kinect1.transport.packets import HEADER_BYTES, PacketFormat
 
 #: Why an image was dropped: packets that never came; a packet that is none of this stream; one that is too short, or
 #: too many or too few of them; an image that began before the one before it had ended.
@@ -136,7 +136,7 @@ class Assembler:
         """The images that the packets complete, one after the other.
 
         Args:
-            packets: (n, drivers.kinect1.packets.PACKET_BYTES), one packet a row.
+            packets: (n, drivers.kinect1.transport.packets.PACKET_BYTES), one packet a row.
             lengths: (n,) how many bytes of each row came.
         """
         row = 0

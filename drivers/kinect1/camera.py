@@ -3,9 +3,9 @@
 from enum import StrEnum
 
 from drivers.kinect1 import reference_plane
-from drivers.kinect1.commands import Commands, Opcode
-from drivers.kinect1.packets import COLOR, DEPTH, INFRARED, PacketFormat
 from drivers.kinect1.reference_plane import ReferencePlane
+from drivers.kinect1.transport.commands import Commands, Opcode
+from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PacketFormat
 
 
 class Stream(StrEnum):

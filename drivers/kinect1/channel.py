@@ -7,15 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from drivers.capabilities import ClockInfo, StreamInfo
-from drivers.clock import DeviceClock
-from drivers.frame import Frame, Geometry, Kind, Reference
+from drivers.contract.capabilities import ClockInfo, StreamInfo
+from drivers.contract.clock import DeviceClock
+from drivers.contract.frame import Frame, Geometry, Kind, Reference
 from drivers.kinect1 import unpacking
 from drivers.kinect1.assembly import Assembler, RawImage
 from drivers.kinect1.camera import Stream
-from drivers.kinect1.packets import TICK_HZ
 from drivers.kinect1.reference_plane import DEPTH_SCALE, ReferencePlane
-from drivers.kinect1.transfer import Transfer
+from drivers.kinect1.transport.packets import TICK_HZ
+from drivers.kinect1.transport.transfer import Transfer
 
 _STREAMS = {
     Stream.DEPTH: ("depth", "depth", Kind.DEPTH, "16UC1"),

@@ -5,16 +5,16 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 
 from calib.camera import Camera
-from drivers.capabilities import Capabilities
-from drivers.controls import Control, ControlInfo, ControlKind, Controls
-from drivers.delivery import Delivery
-from drivers.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.capabilities import Capabilities
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
+from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.frame_gate import Delivery
 from drivers.kinect1.assembly import CAUSES
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
 from drivers.kinect1.channel import Channel, camera_of, describe
-from drivers.kinect1.commands import Commands
-from drivers.kinect1.losses import LossWatch
-from drivers.kinect1.port import Port
+from drivers.kinect1.transport.commands import Commands
+from drivers.kinect1.transport.losses import LossWatch
+from drivers.kinect1.transport.port import Port
 
 #: The longest that the thread waits for packets before it looks whether it shall stop [s].
 _PATIENCE_S = 0.1
@@ -62,7 +62,7 @@ class Kinect1Device:
 
     @property
     def state(self) -> DeviceState:
-        """See `drivers.device.Device.state`."""
+        """See `drivers.contract.device.Device.state`."""
         return self._delivery.state
 
     @property

@@ -5,13 +5,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 
-from drivers.device import DeviceError
-from drivers.discovery import Found, choose
+from drivers.contract.device import DeviceError
+from drivers.contract.discovery import Found, choose
 from drivers.kinect1.address import Address
-from drivers.kinect1.attached import Backends, attached, fresh_backend
 from drivers.kinect1.device import Kinect1Device
-from drivers.kinect1.port import Port, Streaming
-from drivers.kinect1.ring import IsochronousRing
+from drivers.kinect1.transport.attached import Backends, attached, fresh_backend
+from drivers.kinect1.transport.port import Port, Streaming
+from drivers.kinect1.transport.ring import IsochronousRing
 
 
 def find(backends: Backends = fresh_backend) -> list[Found]:

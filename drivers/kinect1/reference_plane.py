@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.camera import Camera
-from drivers.device import DeviceError
+from drivers.contract.device import DeviceError
 
 #: The raw value that means no return; raw values are numbers of 11 bits.
 NO_RETURN, RAW_VALUES = 2047, 2048

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from calib.camera import Camera
-from drivers.footage import FootageError
-from drivers.frame import ENCODINGS, Frame, Geometry, Kind
+from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 from drivers.o3r import tof_info
 from drivers.o3r.chunks import Chunk, ChunkError, ChunkType, messages
 from drivers.o3r.tof_info import TofInfo

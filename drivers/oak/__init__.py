@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from drivers.device import Device
-from drivers.discovery import Found
+from drivers.contract.device import Device
+from drivers.contract.discovery import Found
 from drivers.oak import live, playback
 from drivers.oak.address import parse
 from drivers.oak.device import OakDevice

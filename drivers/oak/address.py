@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 
 _CHOICES = {
     "mode": ("auto", "tof", "stereo"),

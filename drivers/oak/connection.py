@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from drivers.capabilities import ClockInfo, SyncRole
-from drivers.clock import Stamp
-from drivers.controls import Controls
-from drivers.device import DeviceInfo
+from drivers.contract.capabilities import ClockInfo, SyncRole
+from drivers.contract.clock import Stamp
+from drivers.contract.controls import Controls
+from drivers.contract.device import DeviceInfo
 from drivers.oak.eeprom import Poses
 from drivers.oak.messages import Queue
 from drivers.oak.picture import Picture
@@ -18,7 +18,7 @@ CLOCK = ClockInfo("oak", 1e9)
 
 
 class HostTimes(Protocol):
-    """From a stream's device times to host times; `drivers.clock.DeviceClock` is one."""
+    """From a stream's device times to host times; `drivers.contract.clock.DeviceClock` is one."""
 
     @property
     def gauges(self) -> Mapping[str, float]:

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from typing import Any
 
-from drivers.controls import Control, ControlInfo, ControlKind, Controls, Value
-from drivers.device import DeviceError
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
+from drivers.contract.device import DeviceError
 from drivers.oak.address import Address
 from drivers.oak.pipelines import Outputs
 

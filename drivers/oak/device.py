@@ -5,9 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from calib.camera import Camera
-from drivers.capabilities import Capabilities, StreamInfo
-from drivers.delivery import Delivery
-from drivers.device import DeviceError, DeviceState, Sink
+from drivers.contract.capabilities import Capabilities, StreamInfo
+from drivers.contract.device import DeviceError, DeviceState, Sink
+from drivers.contract.frame_gate import Delivery
 from drivers.oak.connection import CLOCK, Connection, HostTimes
 from drivers.oak.eeprom import EepromError
 from drivers.oak.heads import cameras
@@ -58,7 +58,7 @@ class OakDevice:
 
     @property
     def state(self) -> DeviceState:
-        """See `drivers.device.Device.state`."""
+        """See `drivers.contract.device.Device.state`."""
         return self._delivery.state
 
     @property
@@ -77,7 +77,7 @@ class OakDevice:
         return clocks | dict(self._connection.gauges()) if self._open else clocks
 
     def start(self, sink: Sink) -> None:
-        """See `drivers.device.Device.start`."""
+        """See `drivers.contract.device.Device.start`."""
         stop = self._delivery.begin(sink, "the pipeline runs already")
         if stop is None:
             return
@@ -95,14 +95,14 @@ class OakDevice:
             thread.start()
 
     def stop(self) -> None:
-        """See `drivers.device.Device.stop`."""
+        """See `drivers.contract.device.Device.stop`."""
         self._delivery.end("stopped")
         # From within the sink it would wait for threads that wait for the sink; they end by themselves.
         if threading.current_thread() not in self._threads:
             _join(self._threads)
 
     def close(self) -> None:
-        """See `drivers.device.Device.close`."""
+        """See `drivers.contract.device.Device.close`."""
         self._delivery.release()
         self.stop()
         self._release()

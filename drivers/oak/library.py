@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from drivers.device import DeviceError, SdkMissingError
-from drivers.discovery import UDEV_REMEDY
+from drivers.contract.device import DeviceError, SdkMissingError
+from drivers.contract.discovery import UDEV_REMEDY
 
 #: Time to look for a device [ms]; depthai's own is ten seconds.
 SEARCH_MS = 1500

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
-from drivers.capabilities import SyncRole
-from drivers.clock import DeviceClock
-from drivers.device import DeviceError, DeviceInfo, SdkMissingError
-from drivers.discovery import UDEV_REMEDY, Availability, Found, choose
+from drivers.contract.capabilities import SyncRole
+from drivers.contract.clock import DeviceClock
+from drivers.contract.device import DeviceError, DeviceInfo, SdkMissingError
+from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.oak import eeprom, library
 from drivers.oak.address import Address
 from drivers.oak.connection import CLOCK, Connection, synchronised

@@ -13,7 +13,7 @@ from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
 from calib.pose import Pose
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.oak.roles import Role
 
 #: Lens models of depthai that are understood. The first has up to 14 coefficients in OpenCV's order.

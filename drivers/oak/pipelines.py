@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from drivers.device import DeviceError
+from drivers.contract.device import DeviceError
 from drivers.oak.address import Address
 from drivers.oak.roles import ROLES, Role
 

@@ -4,9 +4,9 @@ import threading
 from collections.abc import Mapping
 from pathlib import Path
 
-from drivers.clock import Stamp
-from drivers.device import AddressError, DeviceInfo
-from drivers.footage import FootageError
+from drivers.contract.clock import Stamp
+from drivers.contract.device import AddressError, DeviceInfo
+from drivers.encoding.foreign_recording import FootageError
 from drivers.oak import library, recording
 from drivers.oak.address import Address
 from drivers.oak.connection import Connection

@@ -19,8 +19,8 @@ from mcap.reader import make_reader
 
 from calib import pose
 from calib.camera import Camera
-from drivers.footage import FootageError
-from drivers.frame import Frame
+from drivers.contract.frame import Frame
+from drivers.encoding.foreign_recording import FootageError
 from drivers.oak import eeprom
 from drivers.oak.eeprom import NOWHERE, UNITS_M, EepromError, Link, Poses
 from drivers.oak.heads import cameras

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from drivers.frame import Kind
+from drivers.contract.frame import Kind
 
 
 @dataclass(frozen=True, slots=True)

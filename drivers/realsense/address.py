@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, urlsplit
 
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 
 _DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "recording": ""}
 _SIZE = re.compile(r"([1-9]\d{1,3})x([1-9]\d{1,3})")

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.camera import Camera
-from drivers.footage import FootageError
-from drivers.frame import Frame, Kind, Reference
+from drivers.contract.frame import Frame, Kind, Reference
+from drivers.encoding.foreign_recording import FootageError
 from drivers.realsense.picture import unpadded
 from drivers.realsense.ros import Bag
 from drivers.realsense.streams import ROLES, Role, StreamError, camera

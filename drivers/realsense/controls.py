@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from drivers.controls import Control, ControlInfo, ControlKind, Controls, Value
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
 from drivers.realsense.library import naming
 from drivers.realsense.streams import Role
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from calib.camera import Camera
-from drivers.capabilities import Capabilities, StreamInfo, SyncRole
-from drivers.clock import DeviceClock
-from drivers.delivery import Delivery
-from drivers.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.capabilities import Capabilities, StreamInfo, SyncRole
+from drivers.contract.clock import DeviceClock
+from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.frame_gate import Delivery
 from drivers.realsense import controls
 from drivers.realsense.inbox import Inbox
 from drivers.realsense.library import naming
@@ -84,7 +84,7 @@ class RealsenseDevice:
 
     @property
     def state(self) -> DeviceState:
-        """See `drivers.device.Device.state`."""
+        """See `drivers.contract.device.Device.state`."""
         return self._delivery.state
 
     @property
@@ -102,7 +102,7 @@ class RealsenseDevice:
         }
 
     def start(self, sink: Sink) -> None:
-        """See `drivers.device.Device.start`."""
+        """See `drivers.contract.device.Device.start`."""
         with self._lock:
             stop = self._delivery.begin(sink, "opening the camera's sensors")
             if stop is None:
@@ -122,7 +122,7 @@ class RealsenseDevice:
             self._thread.start()
 
     def stop(self) -> None:
-        """See `drivers.device.Device.stop`."""
+        """See `drivers.contract.device.Device.stop`."""
         self._delivery.end("stopped")
         with self._lock:
             self._halt()
@@ -131,7 +131,7 @@ class RealsenseDevice:
             thread.join()
 
     def close(self) -> None:
-        """See `drivers.device.Device.close`."""
+        """See `drivers.contract.device.Device.close`."""
         self._delivery.release()
         self.stop()
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from drivers.device import DeviceError, SdkMissingError
+from drivers.contract.device import DeviceError, SdkMissingError
 
 
 def load() -> Any:

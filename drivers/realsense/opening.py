@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit
 
-from drivers.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
-from drivers.discovery import UDEV_REMEDY, Availability, Found, choose
+from drivers.contract.device import AddressError, DeviceError, DeviceInfo, SdkMissingError
+from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.realsense import library
 from drivers.realsense.address import Address, parse
 from drivers.realsense.device import RealsenseDevice, Used

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.capabilities import ClockInfo
-from drivers.frame import ENCODINGS, Frame, Kind, Reference
+from drivers.contract.capabilities import ClockInfo
+from drivers.contract.frame import ENCODINGS, Frame, Kind, Reference
 from drivers.realsense.streams import Role, StreamError
 
 #: Our encodings by pixel format, for the kinds that come in it.

@@ -8,8 +8,8 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from drivers.device import DeviceError
-from drivers.frame import Kind
+from drivers.contract.device import DeviceError
+from drivers.contract.frame import Kind
 from drivers.realsense.address import Address
 from drivers.realsense.picture import FORMATS
 from drivers.realsense.streams import ROLES, Role, camera

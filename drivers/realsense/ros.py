@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.footage import FootageError
+from drivers.encoding.foreign_recording import FootageError
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from calib.camera import Camera
 from calib.lens import Lens
 from calib.pose import Pose
-from drivers.frame import Geometry, Kind
+from drivers.contract.frame import Geometry, Kind
 
 #: Distortion models that OpenCV's k1 k2 p1 p2 k3 stand for. librealsense projects with all of them forwards; "modified"
 #: and "inverse" apply p1 and p2 to the point that k1…k3 moved already, which is a few thousandths of a pixel.

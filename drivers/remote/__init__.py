@@ -1,12 +1,12 @@
 """A rig whose frames arrive over the network, from another `abs-service capture`, as a device of this one.
 
-Protocol: `survey`, `device`. Transport: `link`, whose SDK is zenoh. Codec: that of the wire, `drivers.codec`.
+Protocol: `survey`, `device`. Transport: `link`, whose SDK is zenoh. Codec: that of the wire, `drivers.encoding.codec`.
 """
 
 from collections.abc import Callable
 
-from drivers.device import Device, DeviceError, DeviceInfo
-from drivers.discovery import Found
+from drivers.contract.device import Device, DeviceError, DeviceInfo
+from drivers.contract.discovery import Found
 from drivers.remote.address import DEFAULT_PORT, Address, parse
 from drivers.remote.device import RemoteDevice
 from drivers.remote.link import open_link

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
 
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 
 DEFAULT_PORT = 7447
 PROTOCOLS = ("tcp", "tls", "quic", "udp", "ws")

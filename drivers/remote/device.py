@@ -5,14 +5,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from calib.camera import Camera
-from drivers import codec
-from drivers.capabilities import Capabilities, ClockInfo
-from drivers.clock import DeviceClock
-from drivers.codec import CodecError
-from drivers.controls import Controls
-from drivers.delivery import Delivery
-from drivers.device import DeviceInfo, DeviceState, Sink
-from drivers.frame import Frame
+from drivers.contract.capabilities import Capabilities, ClockInfo
+from drivers.contract.clock import DeviceClock
+from drivers.contract.controls import Controls
+from drivers.contract.device import DeviceInfo, DeviceState, Sink
+from drivers.contract.frame import Frame
+from drivers.contract.frame_gate import Delivery
+from drivers.encoding import codec
+from drivers.encoding.codec import CodecError
 from drivers.remote.link import Link
 from drivers.remote.survey import IMAGES, Survey
 
@@ -35,7 +35,7 @@ class RemoteDevice:
     """Delivers what another `abs-service capture` publishes. Sequence numbers, ticks and settings stay as they are.
 
     Host times stay, too, if both processes read the same clock; else each stream's are mapped from the other host's
-    clock by `drivers.clock`. An epoch there is one here. If the other process ends, the device has FAILED.
+    clock by `drivers.contract.clock`. An epoch there is one here. If the other process ends, the device has FAILED.
 
     Args:
         uri: address that opens it again.
@@ -59,7 +59,7 @@ class RemoteDevice:
 
     @property
     def state(self) -> DeviceState:
-        """See `drivers.device.Device.state`."""
+        """See `drivers.contract.device.Device.state`."""
         return self._delivery.state
 
     @property
@@ -69,7 +69,7 @@ class RemoteDevice:
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Of each stream's mapping from the other host's clock, see `drivers.clock.DeviceClock.gauges`."""
+        """Of each stream's mapping from the other host's clock, see `drivers.contract.clock.DeviceClock.gauges`."""
         streams = {} if self._same_clock else dict(self._streams)
         return {
             f"clock.{sensor}/{stream}.{name}": value

@@ -10,8 +10,8 @@ from typing import Any
 
 import zenoh
 
-from drivers.callbacks import outside_daemons
-from drivers.device import DeviceError
+from drivers.contract.callbacks import outside_daemons
+from drivers.contract.device import DeviceError
 from drivers.remote.address import Address
 
 #: Without a sign of life for this long the other side counts as gone [ms].

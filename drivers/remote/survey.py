@@ -5,20 +5,20 @@ import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from abs.v1.sensor_model_pb2 import Config, SensorModel
+from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 from google.protobuf.message import DecodeError
 
 from calib.camera import Camera
-from drivers import codec
-from drivers.capabilities import ClockInfo, StreamInfo
-from drivers.codec import CodecError
-from drivers.device import DeviceError, DeviceInfo
-from drivers.discovery import Found, choose
-from drivers.frame import Frame
-from drivers.host_clock import host_clock
+from drivers.contract.capabilities import ClockInfo, StreamInfo
+from drivers.contract.device import DeviceError, DeviceInfo
+from drivers.contract.discovery import Found, choose
+from drivers.contract.frame import Frame
+from drivers.contract.host_clock import host_clock
+from drivers.encoding import codec
+from drivers.encoding.codec import CodecError
+from drivers.encoding.sensor_model import decode_camera
 from drivers.remote.address import Address
 from drivers.remote.link import Link
-from drivers.sensor_model import decode_camera
 
 IMAGES = "*/*/image"
 #: How long to wait for the first image [s].

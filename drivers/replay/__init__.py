@@ -4,8 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit
 
-from drivers.device import AddressError, Device
-from drivers.discovery import Found
+from drivers.contract.device import AddressError, Device
+from drivers.contract.discovery import Found
 from drivers.replay.contents import RecordingError
 from drivers.replay.device import ReplayDevice
 from drivers.replay.recording import Recording

@@ -15,7 +15,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.summary import Summary
 from zstandard import ZstdError
 
-from drivers.device import DeviceError
+from drivers.contract.device import DeviceError
 
 #: What the MCAP reader and its decompressors raise about bytes that are cut off or damaged.
 DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from calib.camera import Camera
-from drivers.capabilities import Capabilities, ClockInfo, StreamInfo
-from drivers.controls import Controls
-from drivers.delivery import Delivery
-from drivers.device import DeviceInfo, DeviceState, Sink, Truth
-from drivers.frame import Frame
+from drivers.contract.capabilities import Capabilities, ClockInfo, StreamInfo
+from drivers.contract.controls import Controls
+from drivers.contract.device import DeviceInfo, DeviceState, Sink, Truth
+from drivers.contract.frame import Frame
+from drivers.contract.frame_gate import Delivery
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
 
@@ -62,7 +62,7 @@ class ReplayDevice:
 
     @property
     def state(self) -> DeviceState:
-        """See `drivers.device.Device.state`."""
+        """See `drivers.contract.device.Device.state`."""
         return self._delivery.state
 
     @property

@@ -6,18 +6,18 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from abs.v1.frame_info_pb2 import FrameInfo
-from abs.v1.sensor_model_pb2 import SensorModel
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.sensor_model_pb2 import SensorModel
 from google.protobuf.message import DecodeError
 from mcap.records import Message
 
 from calib.camera import Camera
-from drivers import codec
-from drivers.codec import CodecError
-from drivers.device import Truth
-from drivers.frame import Frame
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.codec import CodecError
+from drivers.encoding.sensor_model import decode_camera
 from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, survey
-from drivers.sensor_model import decode_camera
 
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
@@ -148,7 +148,7 @@ def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], in
         match = _IMAGE.fullmatch(topic.name)
         if not match or f"{topic.name.removesuffix('image')}info" not in names:
             raise RecordingError(
-                f"{path}: topic {topic.name} holds images that no abs.v1.FrameInfo describes, so this is no recording "
+                f"{path}: topic {topic.name} holds images without absmsg.v1.FrameInfo, so this is no recording "
                 "of abs-service; `abs-service import` makes one from image files"
             )
         counts[match["sensor"], match["stream"]] = topic.count

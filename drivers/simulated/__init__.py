@@ -5,8 +5,8 @@ Nothing here knows the tracker's models: what makes the images shares no code wi
 
 from collections.abc import Callable
 
-from drivers.device import Device
-from drivers.discovery import Found
+from drivers.contract.device import Device
+from drivers.contract.discovery import Found
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 

@@ -8,15 +8,15 @@ from urllib.parse import parse_qsl, urlsplit
 
 from calib.lens import COEFFICIENTS, LensError, LensModel
 from calib.lenses import lens_of
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 from drivers.simulated import faults, values
-from drivers.simulated.bayer import ORDERS, Mosaic
-from drivers.simulated.excursion import Excursion
 from drivers.simulated.faults import Misbehaviour
-from drivers.simulated.heads import Equipment
-from drivers.simulated.optics import BEAMS, OPTICS
-from drivers.simulated.printed import TARGETS
-from drivers.simulated.scenes import SCENES, Choices
+from drivers.simulated.scene.excursion import Excursion
+from drivers.simulated.scene.scenes import SCENES, Choices
+from drivers.simulated.sensors.bayer import ORDERS, Mosaic
+from drivers.simulated.sensors.heads import Equipment
+from drivers.simulated.sensors.optics import BEAMS, OPTICS
+from drivers.simulated.shapes.printed import TARGETS
 from drivers.simulated.simulation import Simulation
 
 #: The keys, and what reads their values.

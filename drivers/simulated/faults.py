@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from drivers.frame import Frame, Kind
+from drivers.contract.frame import Frame, Kind
 
 
 class Fault(StrEnum):

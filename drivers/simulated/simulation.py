@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.device import Truth
-from drivers.frame import Frame
-from drivers.simulated.exposure import Exposure, Head
-from drivers.simulated.scene import Scene
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.simulated.scene.scene import Scene
+from drivers.simulated.sensors.exposure import Exposure, Head
 
 
 @dataclass(frozen=True, eq=False)

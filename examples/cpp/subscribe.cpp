@@ -3,14 +3,14 @@
 //   subscribe [tcp/127.0.0.1:7447 [abs/demo/sheet/state [COUNT]]]
 //
 // The age is taken on the monotonic clock, so it is right on the host of the cameras.
-#include <abs/v1/deformation_state.pb.h>
+#include <absmsg/v1/deformation_state.pb.h>
 #include <zenoh-pico.h>
 
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
-using abs_service::v1::DeformationState;
+using absmsg::v1::DeformationState;
 
 static void print(const DeformationState& state) {
   const std::chrono::nanoseconds now = std::chrono::steady_clock::now().time_since_epoch();

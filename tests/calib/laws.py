@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from calib.noise.samples import Samples
-from drivers.simulated.active_light import WHITE
-from drivers.simulated.structured_light import StructuredLightNoise
-from drivers.simulated.time_of_flight import LEVELS, RANGE_M, TimeOfFlightNoise
+from calib.noise.fit.samples import Samples
+from drivers.simulated.sensors.active_light import WHITE
+from drivers.simulated.sensors.structured_light import StructuredLightNoise
+from drivers.simulated.sensors.time_of_flight import LEVELS, RANGE_M, TimeOfFlightNoise
 
 #: A time-of-flight head with a mean offset of its own and one of dark surfaces.
 TOF = TimeOfFlightNoise(mu_offset=0.01, mu_amplitude=-8.0)

@@ -7,12 +7,12 @@ import pytest
 
 from calib import pose
 from calib.board import coverage
+from calib.board.board_pose_features import stance
 from calib.board.mirrored import MirroredSensorError
-from calib.board.stance import stance
 from calib.board.target import Chessboard
 from calib.views import CornerView
 from drivers.simulated.address import parse
-from drivers.simulated.printed import TARGETS, board_pose
+from drivers.simulated.shapes.printed import TARGETS, board_pose
 from tests.calib.boards import VGA, centered
 
 BOARD = Chessboard(9, 6, 0.03)

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from calib import pose
-from calib.board import refusal
-from calib.board.detection import detect
+from calib.board.corners import refusal
+from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 from tests.calib.boards import TOF, VGA, as_bytes, centered, photograph
 

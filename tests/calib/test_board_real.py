@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from calib.board.detection import Detection, detect
+from calib.board.corners.detection import Detection, detect
 from calib.board.target import Charuco, Chessboard, Circles, Target
 
 pytestmark = pytest.mark.slow

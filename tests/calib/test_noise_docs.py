@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from abs_service import plugins
-from abs_service.config import SensorTable
+from abs_service.config import SensorTable, plugins
 from calib.noise import pixel_polynomial
 
 PAGE = (Path(__file__).parents[2] / "docs" / "noise.md").read_text(encoding="utf-8")

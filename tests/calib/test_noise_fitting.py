@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service import plugins
-from calib.noise import constant, fitting, gaussian_polynomial, measured, structured_light, tof_amplitude
+from abs_service.config import plugins
+from calib.noise import constant, gaussian_polynomial, measured, structured_light, tof_amplitude
 from calib.noise.base import NoiseError
-from calib.noise.quality import judge
-from calib.noise.samples import Samples, domain, from_images, joined
+from calib.noise.fit import fitting
+from calib.noise.fit.quality import judge
+from calib.noise.fit.samples import Samples, domain, from_images, joined
 from tests.calib import laws
 
 SEEDS = range(4)

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service import plugins
-from abs_service.problems import ProblemsError
+from abs_service.config import plugins
+from abs_service.config.problems import ProblemsError
 from calib.noise import per_pixel, tof_amplitude
 from calib.noise.base import NoiseError
-from calib.noise.quality import judge
+from calib.noise.fit.quality import judge
+from calib.noise.fit.samples import Samples
+from calib.noise.fit.shrinkage import Repeats
 from calib.noise.region_polynomial import blocks
-from calib.noise.samples import Samples
-from calib.noise.shrinkage import Repeats
 from calib.noise.tof_amplitude import TofAmplitude
 from tests.calib.noise_models import DISTANCES, HEIGHT, WIDTH, own_of_pixels
 from tests.calib.test_noise_shrinkage import Head

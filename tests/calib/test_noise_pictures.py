@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calib.noise import bayer, binary, color, grey, intensity, pictures
+from calib.noise import bayer, binary, color, grey, intensity
 from calib.noise.base import LEVELS, NoiseError
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
+from calib.noise.fit import pictures
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
 from drivers.simulated.address import parse

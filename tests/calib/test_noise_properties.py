@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.polynomial.polynomial import polyval2d
 
 from calib.noise.base import WINDOW_M, log_density, sample
-from calib.noise.polynomial import evaluate
+from calib.noise.fit.polynomial import evaluate
 from tests.calib.noise_models import AMPLITUDES, DISTANCES, HEIGHT, MODELS, WIDTH, any_model
 from tests.calib.texels import negative_log_density, render_texture
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from calib.noise import gaussian_polynomial, pixel_polynomial, region_polynomial
-from calib.noise.quality import judge
+from calib.noise.fit.quality import judge
+from calib.noise.fit.samples import Samples, from_images
 from calib.noise.region_polynomial import blocks
-from calib.noise.samples import Samples, from_images
 
 HEIGHT, WIDTH = 18, 24
 LABELS = blocks(HEIGHT, WIDTH, 6)

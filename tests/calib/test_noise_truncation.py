@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib.noise.truncation import deviation_within
+from calib.noise.fit.truncation import deviation_within
 
 
 def told(residuals: np.ndarray, cut: float = 3.0) -> float:

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from calib import pose
+from calib.calibration_check.changes import pair_changes
+from calib.calibration_check.hypotheses import Explanation, distance_bias, explained, own_fit, suspects
+from calib.calibration_check.stored import RecheckError, Stored, Views, usable
 from calib.camera import Camera
-from calib.recheck.changes import pair_changes
-from calib.recheck.hypotheses import Explanation, distance_bias, explained, own_fit, suspects
-from calib.recheck.stored import RecheckError, Stored, Views, usable
-from calib.solve.layout import POSE
-from calib.solve.state import SensorState
+from calib.solve.bundle.layout import POSE
+from calib.solve.bundle.state import SensorState
 from tests.calib.board_views import Head, look, random_boards, three_heads
 
 SIGMAS = {"light": (2e-4, 2e-4), "color": (2e-4, 2e-4)}

@@ -5,7 +5,7 @@ import pytest
 
 from calib.noise.base import NoiseError
 from calib.noise.constant import Constant
-from calib.noise.quality import Quality
+from calib.noise.fit.quality import Quality
 from calib.sequences import local, parts, plane, reference, stillness
 from calib.sequences.candidates import Candidate, Level, of_image
 from calib.sequences.reference import Kind

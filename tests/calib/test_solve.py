@@ -10,10 +10,10 @@ from scipy import stats
 
 from calib import pose
 from calib.pose import Pose
+from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
-from calib.solve.tasks import SensorTask, Task
-from calib.solve.verdict import assess
+from calib.solve.validation.verdict import assess
 from tests.calib import board_views
 from tests.calib.board_views import Head, Seen
 

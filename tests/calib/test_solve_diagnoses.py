@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calib.solve import chains
+from calib.solve.bundle.observability import UndeterminedError, require_determined
+from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
-from calib.solve.chains import ContradictionError, NotConnectedError
-from calib.solve.determined import UndeterminedError, require_determined
-from calib.solve.diagnoses import MixedUpError, SquareSizeError, ViewsError
-from calib.solve.tasks import SensorTask, Task, TaskError
+from calib.solve.start import extrinsics_graph
+from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
+from calib.solve.validation.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from calib.views import CornerView, PlaneView
 from tests.calib import board_views
 from tests.calib.board_views import Head
@@ -143,7 +143,7 @@ def test_a_sensor_needs_a_calibration_to_keep_and_depth_terms_that_exist() -> No
 
 
 def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
-    from calib.solve.sightings import sightings
+    from calib.solve.start.board_poses import sightings
 
     heads, task = scene()
     seen = {
@@ -152,5 +152,5 @@ def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
     }
     flipped = {shot: found[::-1] for shot, found in seen["tof"].items()}
     np.testing.assert_allclose(
-        chains.between({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
+        extrinsics_graph.between({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
     )

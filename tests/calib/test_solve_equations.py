@@ -9,13 +9,14 @@ from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
-from calib.solve import projection, rotations
-from calib.solve.equations import Equations
-from calib.solve.formulation import formulate, groups_of
-from calib.solve.layout import Layout
-from calib.solve.lenses import BROWN_CONRADY, FISHEYE, RATIONAL, LensKind
-from calib.solve.state import SensorState, State
-from calib.solve.tasks import SensorTask, Task
+from calib.solve.bundle import rotations
+from calib.solve.bundle.equations import Equations
+from calib.solve.bundle.formulation import formulate, groups_of
+from calib.solve.bundle.layout import Layout
+from calib.solve.bundle.lens_parameters import BROWN_CONRADY, FISHEYE, RATIONAL, LensKind
+from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.validation import projection_uncertainty
 from tests.calib import board_views
 
 KINDS = {"tof": BROWN_CONRADY, "light": RATIONAL, "color": FISHEYE}
@@ -106,12 +107,15 @@ def test_derivatives_from_image_to_image_are_those_of_finite_differences(kind: L
     system = equations()
     layout, state = system.layout, system.base
     source, target = ("tof", "light") if kind is BROWN_CONRADY else ("tof", "color")
-    changes = projection.pair_changes(state, layout, source, target, 1.1)
-    pixels = projection.grid(state.sensors[source].camera).reshape(-1, 2)
-    for index, column in enumerate(projection.pair_columns(layout, source, target)):
+    changes = projection_uncertainty.pair_changes(state, layout, source, target, 1.1)
+    pixels = projection_uncertainty.grid(state.sensors[source].camera).reshape(-1, 2)
+    for index, column in enumerate(projection_uncertainty.pair_columns(layout, source, target)):
         step = np.zeros(layout.size)
         step[column] = 1e-6
-        ends = [projection.mapped(layout.move(state, sign * step), source, target, pixels, 1.1) for sign in (1, -1)]
+        ends = [
+            projection_uncertainty.mapped(layout.move(state, sign * step), source, target, pixels, 1.1)
+            for sign in (1, -1)
+        ]
         seen = np.isfinite(ends[0]).all(axis=1) & np.isfinite(ends[1]).all(axis=1)
         differences = (ends[0] - ends[1])[seen] / 2e-6
         scale = max(1.0, float(np.abs(differences).max()))
@@ -124,7 +128,7 @@ def test_a_turn_of_the_camera_is_no_change_of_a_projection() -> None:
     turn = pose.from_rotation_vector((1e-5, -2e-5, 3e-5), (1e-5, 2e-5, -1e-5))
     alone = replace(camera, T_rs=np.eye(4), lens=Lens())
     change = (alone.project(pose.transform(turn, points)) - alone.project(points))[:, :, None]
-    undone = projection.Undone(alone, points).at(points, change, change)
+    undone = projection_uncertainty.Undone(alone, points).at(points, change, change)
     assert np.abs(undone).max() < 1e-3 * np.abs(change).max()
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from calib.sequences.static import Static, reduce
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.address import parse
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from abs_service.experiments.scenes.solids import Ball, Plane, cast, image, seen_by
 from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens
+from evaluation.scenes.solids import Ball, Plane, cast, image, seen_by
 
 __all__ = ["BOARD", "SOURCE", "VIEWS", "WALL", "Ball", "Plane", "cast", "image", "seen_by"]
 

@@ -8,15 +8,15 @@ from abs_service.commands import import_file
 from calib.board.target import Target
 from calib.camera import Camera
 from calib.pose import Pose
-from drivers.frame import Frame
+from drivers.contract.frame import Frame
 from drivers.simulated.address import parse
-from drivers.simulated.printed import TARGETS, board_pose
+from drivers.simulated.shapes.printed import TARGETS, board_pose
 from drivers.simulated.simulation import Simulation
 
 
 @dataclass(frozen=True)
 class Filmed:
-    """The first exposures of a simulated board; see `drivers.footage.Footage`."""
+    """The first exposures of a simulated board; see `drivers.encoding.foreign_recording.Footage`."""
 
     simulation: Simulation
     exposures: int

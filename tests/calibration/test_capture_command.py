@@ -10,15 +10,15 @@ import pytest
 from rich.console import Console
 
 from abs_service import cli
-from abs_service.calibration import target_file
-from abs_service.calibration.collecting import Collector
-from abs_service.calibration.guide import LineGuide, coverage_map, draw
-from abs_service.calibration.seeing import Seen, see_all
-from abs_service.calibration.shot_sources import RecordingShots
-from abs_service.exits import Exit
-from calib.board.refusal import BlurredError, MovedError
+from abs_service.calibration.files import target_file
+from abs_service.calibration.shots.collection import Collector
+from abs_service.calibration.shots.corner_extraction import Seen, see_all
+from abs_service.calibration.shots.guide import LineGuide, coverage_map, draw
+from abs_service.calibration.shots.shot_sources import RecordingShots
+from abs_service.supervision.exit_codes import Exit
+from calib.board.corners.refusal import BlurredError, MovedError
 from drivers.replay.recording import Recording
-from drivers.simulated.printed import TARGETS
+from drivers.simulated.shapes.printed import TARGETS
 from tests.calib.test_board_coverage import SIZES, many, view
 
 RIG = """

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration import rig_file
+from abs_service.calibration.files import rig_file
 from abs_service.commands import calibrations
-from abs_service.exits import Exit
 from abs_service.report.provenance import Provenance
+from abs_service.supervision.exit_codes import Exit
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

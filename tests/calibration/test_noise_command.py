@@ -11,10 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service import plugins
-from abs_service.calibration import noise, sequences
+from abs_service.calibration.noise import measurement
+from abs_service.calibration.shots import sequences
 from abs_service.cli import main
-from abs_service.exits import Exit
+from abs_service.config import plugins
+from abs_service.supervision.exit_codes import Exit
 from calib.noise.base import NoiseError
 from calib.noise.per_pixel import PerPixel
 from calib.noise.tof_amplitude import TofAmplitude
@@ -39,10 +40,10 @@ def walls(query: str, n: int = 30) -> tuple[list[sequences.Sequence], list[float
 
 def learnt(
     found: list[sequences.Sequence], depths: list[float], box: tuple[slice, slice] = (slice(None), slice(None))
-) -> noise.Found:
+) -> measurement.Found:
     region = np.zeros(found[0].lengths.shape[1:], bool)
     region[box] = True
-    return noise.calibrate(found, depths, region, np.random.default_rng(0), lambda text: None)
+    return measurement.calibrate(found, depths, region, np.random.default_rng(0), lambda text: None)
 
 
 @pytest.mark.slow

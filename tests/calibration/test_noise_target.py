@@ -7,15 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service.calibration import placing, sequences, target_file
+from abs_service.calibration.files import target_file
+from abs_service.calibration.noise import board_poses
+from abs_service.calibration.shots import sequences
 from abs_service.cli import main
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 from calib.board.target import Chessboard
 from calib.sequences import reference
 from calib.sequences.reference import Kind
 from calib.sequences.static import reduce
+from evaluation.studies.noise_board import ERRORS, at_rest, filmed, learnt, true_distances
 from tests.calibration.simulated import Filmed, record, scene
-from tests.evaluation.noise_board import ERRORS, at_rest, filmed, learnt, true_distances
 
 
 @pytest.mark.parametrize(
@@ -24,7 +26,7 @@ from tests.evaluation.noise_board import ERRORS, at_rest, filmed, learnt, true_d
 def test_the_board_tells_real_distances_that_a_fitted_plane_cannot(sensors: str, seer: str) -> None:
     one, simulation = filmed(sensors, "seed=3", "color=640x480", *(ERRORS if sensors == "tof" else ()))
     sequence = at_rest(simulation, 0, 8)
-    board = placing.placed(one.target, sequence)
+    board = board_poses.placed(one.target, sequence)
     truth = true_distances(one, simulation, 0, sequence)
     assert board.seen_by == seer
     assert board.uncertainty < 5e-4
@@ -92,7 +94,7 @@ def test_cameras_of_a_calibration_take_the_place_of_the_source_s_own() -> None:
     longer = replace(sequence.camera, fx=1.01 * sequence.camera.fx, fy=1.01 * sequence.camera.fy)
     calibrated = sequences.with_cameras(sequence, {"tof": longer, "color": longer})
     assert set(calibrated.cameras) == {"tof"}
-    near, far = (placing.placed(one.target, taken) for taken in (sequence, calibrated))
+    near, far = (board_poses.placed(one.target, taken) for taken in (sequence, calibrated))
     assert np.linalg.norm(near.plane) / np.linalg.norm(far.plane) == pytest.approx(1.01, abs=1e-3)
     with pytest.raises(sequences.SequenceError, match="176 × 144 pixels, but was calibrated with 100 × 144"):
         sequences.with_cameras(sequence, {"tof": replace(longer, width=100)})
@@ -104,4 +106,4 @@ def test_a_board_that_moves_during_the_sequence_is_refused() -> None:
     cameras = {"tof": simulation.heads["tof"].camera}
     (sequence,) = sequences.of_frames("x", taken, cameras, "", 16)
     with pytest.raises(sequences.SequenceError):
-        placing.placed(Chessboard(8, 5, 0.04), sequence)
+        board_poses.placed(Chessboard(8, 5, 0.04), sequence)

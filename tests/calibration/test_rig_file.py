@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service import config
-from abs_service.calibration import toml_text
-from abs_service.calibration.rig_file import (
+from abs_service import config, wiring
+from abs_service.calibration.files import toml_text
+from abs_service.calibration.files.rig_file import (
     Covariance,
     Residuals,
     RigCalibration,
@@ -20,7 +20,7 @@ from abs_service.calibration.rig_file import (
     read_covariance,
     write,
 )
-from abs_service.commands import calibrations, plans
+from abs_service.commands import calibrations
 from abs_service.report.provenance import DataFile, Provenance
 from calib import pose
 from calib.camera import Camera
@@ -135,7 +135,7 @@ def test_a_rig_uses_the_calibration_that_it_names(rig: Path) -> None:
     cameras = {name: made.sensors[name].camera.applied_to(camera) for name, camera in factory.items()}
     assert_same_camera(cameras["tof"], TOF)
     assert_same_camera(cameras["color"], COLOR)
-    tof = plans.rig(made, "sheet", cameras).sensors["tof"]
+    tof = wiring.rig(made, "sheet", cameras).sensors["tof"]
     assert (tof.depth_offset, tof.depth_scale) == (0.004, -0.002)
 
 

@@ -7,12 +7,12 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.calibration.live_shots import LiveShots, Wired
-from abs_service.calibration.seeing import Seen, see_all
-from abs_service.calibration.shot_sources import FolderShots, RecordingShots
-from abs_service.calibration.shots import Look, Shot, ShotsError
+from abs_service.calibration.shots.corner_extraction import Seen, see_all
+from abs_service.calibration.shots.live_shots import LiveShots, Wired
+from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
+from abs_service.calibration.shots.shots import Look, Shot, ShotsError
 from calib import pose
-from calib.board import refusal
+from calib.board.corners import refusal
 from calib.camera import Camera
 from calib.pose import Pose
 from drivers.opening import open_device

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration import target_file
+from abs_service.calibration.files import target_file
 from abs_service.commands import calibrations
 from calib import pose
 from tests.calibration.simulated import Filmed, record, scene

@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from abs_service import cli
-from abs_service.calibration import target_file
-from abs_service.exits import Exit
-from calib.board.detection import detect
+from abs_service.calibration.files import target_file
+from abs_service.supervision.exit_codes import Exit
+from calib.board.corners.detection import detect
 from calib.board.target import outline
 
 KINDS = ["charuco", "chessboard", "circles", "asymmetric_circles"]

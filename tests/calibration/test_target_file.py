@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from abs_service.calibration import target_file
+from abs_service.calibration.files import target_file
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
 CHARUCO = """

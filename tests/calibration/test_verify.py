@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration import rig_file, target_file
-from abs_service.calibration.seeing import Seen, see
+from abs_service.calibration.files import rig_file, target_file
+from abs_service.calibration.shots.corner_extraction import Seen, see
 from abs_service.commands.calibrate import verify as command
-from abs_service.exits import Exit
 from abs_service.report.provenance import Provenance
+from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from drivers.replay import Recording
 from tests.calibration.simulated import Filmed, record, scene

@@ -24,8 +24,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
-from drivers.device import Device, DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.frame import Frame
 
 #: Frames of each stream that a fake delivers before its fault shows.
 BEFORE = 3

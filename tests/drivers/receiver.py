@@ -4,8 +4,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from drivers.device import DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import DeviceState, Truth
+from drivers.contract.frame import Frame
 
 
 class Receiver:

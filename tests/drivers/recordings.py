@@ -4,14 +4,14 @@ import dataclasses
 from collections.abc import Iterable
 from pathlib import Path
 
-from abs.v1.common_pb2 import Header
-from abs.v1.sensor_model_pb2 import SensorModel
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.sensor_model_pb2 import SensorModel
 
 from calib.camera import Camera
-from drivers import codec
-from drivers.device import Truth
-from drivers.frame import Frame
-from drivers.mcap_file import Compression, McapFile
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.replay.contents import survey
 from drivers.simulated.address import parse
 
@@ -56,7 +56,7 @@ def write_model(file: McapFile, sensor: str, camera: Camera, **changes: object) 
     )
     for name, value in changes.items():
         setattr(model, name, value)
-    file.write(f"/{sensor}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
+    file.write(f"/{sensor}/model", "absmsg.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
 
 
 def write(

@@ -16,8 +16,8 @@ from calib.camera import Camera
 from drivers.azure import calibration, mkv
 from drivers.azure.calibration import CalibrationError
 from drivers.azure.mkv import AzureRecording
-from drivers.footage import FootageError
-from drivers.frame import Geometry, Kind
+from drivers.contract.frame import Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 
 ROTATION = cv2.Rodrigues(np.array([0.09, 0.0, 0.01]))[0]
 

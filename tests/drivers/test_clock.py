@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from drivers.capabilities import ClockInfo
-from drivers.clock import DeviceClock, lower_line
+from drivers.contract.capabilities import ClockInfo
+from drivers.contract.clock import DeviceClock, lower_line
 
 KINECT = ClockInfo("kinect", 60e6, 32)
 NANOSECONDS = ClockInfo("device", 1e9)

@@ -5,17 +5,17 @@ import math
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
-from abs.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.frame_info_pb2 import FrameInfo
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from drivers import codec
-from drivers.codec import CodecError
-from drivers.device import Truth
-from drivers.frame import ENCODINGS, Frame, Geometry, Kind, Reference
+from drivers.contract.device import Truth
+from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind, Reference
+from drivers.encoding import codec
+from drivers.encoding.codec import CodecError
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 NAMES = st.text(st.characters(codec="utf-8"), min_size=1, max_size=8)
@@ -124,7 +124,7 @@ def damaged(*, image: dict[str, object] | None = None, info: dict[str, object] |
         (damaged(info={"t_sigma_ns": -1}), "t_sigma_ns must be 0 or more"),
         (damaged(info={"stream": ""}), "names no sensor or no stream"),
         ((b"\xff\xff", codec.encode_info(small_frame(), Header())), "are no foxglove.RawImage"),
-        ((codec.encode_image(small_frame(), 0), b"\x12\x01\xff"), r"are no abs\.v1\.FrameInfo"),
+        ((codec.encode_image(small_frame(), 0), b"\x12\x01\xff"), r"are no absmsg\.v1\.FrameInfo"),
     ],
 )
 def test_errors_name_what_is_wrong(messages: tuple[bytes, bytes], complaint: str) -> None:

@@ -11,9 +11,9 @@ from urllib.parse import urlsplit
 import numpy as np
 import pytest
 
-from drivers.controls import ControlInfo, ControlKind, Value
-from drivers.device import ControlError, Device, DeviceError, DeviceState
-from drivers.frame import Kind
+from drivers.contract.controls import ControlInfo, ControlKind, Value
+from drivers.contract.device import ControlError, Device, DeviceError, DeviceState
+from drivers.contract.frame import Kind
 from drivers.opening import open_device
 from tests.drivers import benches
 from tests.drivers.conformance import Bench, Ear, Fault, dropped, eventually, resources

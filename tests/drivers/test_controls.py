@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from drivers.controls import Control, ControlInfo, ControlKind, Controls, Value
-from drivers.errors import ControlError
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
+from drivers.contract.errors import ControlError
 
 INFOS = [
     ControlInfo("exposure_s", ControlKind.NUMBER, "s", 1e-5, 0.033),

@@ -8,8 +8,8 @@ import pytest
 
 import drivers
 from drivers import opening
-from drivers.device import DeviceError, DeviceInfo
-from drivers.discovery import Availability, Found, choose
+from drivers.contract.device import DeviceError, DeviceInfo
+from drivers.contract.discovery import Availability, Found, choose
 
 ONE, OTHER = (Found(DeviceInfo(f"oak://{serial}", "OAK-D", serial)) for serial in ("111", "222"))
 BUSY = Found(DeviceInfo("oak://333", "OAK-D", "333"), Availability.BUSY, "another program has it", "close that program")

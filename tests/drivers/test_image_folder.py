@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from calib.camera import Camera
-from drivers.frame import Geometry, Kind
+from drivers.contract.frame import Geometry, Kind
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 

@@ -4,15 +4,15 @@ import io
 from pathlib import Path
 
 import pytest
-from abs.v1.common_pb2 import Header
-from abs.v1.health_pb2 import Health
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.health_pb2 import Health
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.reader import make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
-from drivers.mcap_file import Compression, McapFile, McapFileError, file_descriptor_set
+from drivers.encoding.mcap_file import Compression, McapFile, McapFileError, file_descriptor_set
 
 HEALTH = Health(header=Header(rig="demo"), component="capture", message="all is well").SerializeToString()
 
@@ -23,8 +23,8 @@ def test_other_programs_read_the_file_without_our_schemas(tmp_path: Path, compre
     with path.open("wb") as stream:
         file = McapFile(stream, compression)
         file.attach("rig.toml", "text/toml", b"version = 1\n", 9)
-        file.write("/health/capture", "abs.v1.Health", HEALTH, 10, 1)
-        file.write("/health/capture", "abs.v1.Health", HEALTH, 20, 2**32 + 2)
+        file.write("/health/capture", "absmsg.v1.Health", HEALTH, 10, 1)
+        file.write("/health/capture", "absmsg.v1.Health", HEALTH, 20, 2**32 + 2)
         file.finish()
     with path.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
@@ -42,7 +42,7 @@ def test_other_programs_read_the_file_without_our_schemas(tmp_path: Path, compre
 def test_what_was_flushed_is_readable_without_finish() -> None:
     stream = io.BytesIO()
     file = McapFile(stream)
-    file.write("/health/capture", "abs.v1.Health", HEALTH, 10, 1)
+    file.write("/health/capture", "absmsg.v1.Health", HEALTH, 10, 1)
     size = stream.tell()
     file.flush()
     assert stream.tell() > size
@@ -51,16 +51,16 @@ def test_what_was_flushed_is_readable_without_finish() -> None:
 
 
 def test_descriptors_come_with_their_dependencies_first() -> None:
-    names = [file.name for file in FileDescriptorSet.FromString(file_descriptor_set("abs.v1.FrameInfo")).file]
-    assert names == ["google/protobuf/timestamp.proto", "abs/v1/common.proto", "abs/v1/frame_info.proto"]
+    names = [file.name for file in FileDescriptorSet.FromString(file_descriptor_set("absmsg.v1.FrameInfo")).file]
+    assert names == ["google/protobuf/timestamp.proto", "absmsg/v1/common.proto", "absmsg/v1/frame_info.proto"]
 
 
 def test_unknown_schema_and_second_schema_on_a_topic_are_refused() -> None:
     file = McapFile(io.BytesIO())
-    with pytest.raises(McapFileError, match=r"'abs\.v1\.Nonsense'"):
-        file.write("/a", "abs.v1.Nonsense", b"", 0, 0)
-    file.write("/a", "abs.v1.Health", b"", 0, 0)
-    with pytest.raises(McapFileError, match=r"/a carries abs\.v1\.Health, not foxglove\.RawImage"):
+    with pytest.raises(McapFileError, match=r"'absmsg\.v1\.Nonsense'"):
+        file.write("/a", "absmsg.v1.Nonsense", b"", 0, 0)
+    file.write("/a", "absmsg.v1.Health", b"", 0, 0)
+    with pytest.raises(McapFileError, match=r"/a carries absmsg\.v1\.Health, not foxglove\.RawImage"):
         file.write("/a", "foxglove.RawImage", b"", 0, 0)
 
 
@@ -81,7 +81,7 @@ def test_a_full_disk_spoils_the_file_for_good() -> None:
     disk = FullDisk(1 << 30)
     file = McapFile(disk)
     for i in range(5):
-        file.write("/health/capture", "abs.v1.Health", HEALTH, i, i)
+        file.write("/health/capture", "absmsg.v1.Health", HEALTH, i, i)
     disk.capacity = 0
     with pytest.raises(OSError, match="No space left"):
         file.flush()

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.footage import FootageError
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 from drivers.o3r.buffers import O3rBuffers, exposure
 from drivers.o3r.chunks import ChunkError, ChunkType, messages
 from tests.drivers import o3r_buffer

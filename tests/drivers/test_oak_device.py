@@ -12,9 +12,9 @@ from unittest.mock import MagicMock, create_autospec
 import numpy as np
 import pytest
 
-from drivers.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
-from drivers.discovery import Availability
-from drivers.frame import Kind
+from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
+from drivers.contract.discovery import Availability
+from drivers.contract.frame import Kind
 from drivers.oak import discover, eeprom, library, live, open_device, pipelines, playback
 from drivers.oak.address import parse
 from drivers.oak.controls import make

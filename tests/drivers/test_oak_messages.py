@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from calib import pose
-from drivers.footage import FootageError
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 from drivers.oak import eeprom
 from drivers.oak.eeprom import EepromError, Link, Poses
 from drivers.oak.heads import cameras

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.footage import FootageError
-from drivers.frame import Geometry, Kind
+from drivers.contract.frame import Geometry, Kind
+from drivers.encoding.foreign_recording import FootageError
 from drivers.realsense.bag import RealsenseBag, pixels
 from drivers.realsense.streams import StreamError
 

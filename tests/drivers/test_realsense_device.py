@@ -14,9 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controls import ControlKind
-from drivers.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
-from drivers.frame import Geometry, Kind
+from drivers.contract.controls import ControlKind
+from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
+from drivers.contract.frame import Geometry, Kind
 from drivers.realsense import library, open_device
 from drivers.realsense.address import parse
 from drivers.realsense.controls import make

@@ -4,13 +4,13 @@ import time
 from dataclasses import replace
 
 import pytest
-from abs.v1.common_pb2 import Header
+from absmsg.v1.common_pb2 import Header
 
-from abs_service import keys
-from drivers import codec
-from drivers.capabilities import StreamInfo
-from drivers.device import AddressError, DeviceError, DeviceState, FinalError
-from drivers.frame import Frame
+from abs_service.bus import keys
+from drivers.contract.capabilities import StreamInfo
+from drivers.contract.device import AddressError, DeviceError, DeviceState, FinalError
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
 from drivers.opening import open_device
 from drivers.remote.address import Address, parse
 from drivers.remote.device import RemoteDevice

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from drivers import codec
-from drivers.device import Truth
-from drivers.frame import Frame
-from drivers.mcap_file import McapFile
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording, RecordingError
 from tests.drivers.recordings import (
     BOOT_NS,
@@ -156,7 +156,7 @@ def impossible(path: Path) -> None:
         (lambda path: path.mkdir(), "Is a directory"),
         (lambda path: path.write_bytes(b""), r"this is no MCAP file \(0 bytes\)"),
         (lambda path: path.write_bytes(b"PK" * 100), r"this is no MCAP file \(200 bytes\)"),
-        (foreign, r"topic /camera/left/image holds images that no abs\.v1\.FrameInfo describes"),
+        (foreign, r"topic /camera/left/image holds images without absmsg\.v1\.FrameInfo"),
         (empty, r"there are no images in this file, its topics are \[\]"),
         (lying, r"/a/b/info at 0 ns: FrameInfo names no sensor"),
         (impossible, "the model of sensor 'tof' is no camera: fx and fy must be positive"),

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.device import AddressError, DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import AddressError, DeviceState, Truth
+from drivers.contract.frame import Frame
 from drivers.opening import open_device
 from drivers.replay import Recording, ReplayDevice
 from tests.drivers.recordings import (

@@ -6,11 +6,11 @@ from importlib import import_module
 
 import pytest
 
-from abs_service import capture
-from abs_service.capture import DeviceKeeper
-from abs_service.health import Health
-from abs_service.stamps import Speaker, WallClock
-from drivers.device import Device
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.capture import device_supervisor
+from abs_service.capture.device_supervisor import DeviceKeeper
+from drivers.contract.device import Device
 from tests.drivers import benches
 from tests.drivers.conformance import Bench, Ear, Fault, eventually
 from tests.service.loopback import LoopbackBus
@@ -24,7 +24,7 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 
 def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(capture, "FIRST_PAUSE_S", 0.1)
+    monkeypatch.setattr(device_supervisor, "FIRST_PAUSE_S", 0.1)
     opened: list[tuple[str, str]] = []
     faults = iter([Fault.UNPLUG])
 

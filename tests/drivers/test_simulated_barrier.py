@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
+from absmsg.v1.common_pb2 import Header
 
-from drivers import codec
-from drivers.frame import Frame, Kind
+from drivers.contract.frame import Frame, Kind
+from drivers.encoding import codec
 from drivers.simulated.address import parse
-from drivers.simulated.barrier import Barrier, BarrierNoise
-from drivers.simulated.scene import Moment
+from drivers.simulated.scene.scene import Moment
+from drivers.simulated.sensors.barrier import Barrier, BarrierNoise
 from drivers.simulated.simulation import Simulation
 
 

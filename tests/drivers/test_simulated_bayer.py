@@ -8,8 +8,8 @@ from scipy.ndimage import gaussian_filter
 
 from calib.camera import Camera
 from drivers.simulated.address import parse
-from drivers.simulated.bayer import ORDERS, Mosaic
-from drivers.simulated.color import Picture
+from drivers.simulated.sensors.bayer import ORDERS, Mosaic
+from drivers.simulated.sensors.color import Picture
 from drivers.simulated.simulation import Simulation
 
 

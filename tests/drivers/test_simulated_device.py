@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from drivers.device import DeviceError, DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import DeviceError, DeviceState, Truth
+from drivers.contract.frame import Frame
 from drivers.opening import available, open_device
 from drivers.simulated.address import Address, parse
 from drivers.simulated.device import SimulatedDevice

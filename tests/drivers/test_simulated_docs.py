@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from drivers.simulated.address import KEYS, Address
-from drivers.simulated.optics import BEAMS, OPTICS
-from drivers.simulated.scenes import SCENES
+from drivers.simulated.scene.scenes import SCENES
+from drivers.simulated.sensors.optics import BEAMS, OPTICS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulation.md").read_text(encoding="utf-8")
 TABLES = {

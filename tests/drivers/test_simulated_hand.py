@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calib.camera import Camera
-from drivers.frame import Geometry
+from drivers.contract.frame import Geometry
 from drivers.simulated.address import parse
-from drivers.simulated.capsules import cast_capsules, shadowed_by_capsules
-from drivers.simulated.hand import Hand
+from drivers.simulated.shapes.capsules import cast_capsules, shadowed_by_capsules
+from drivers.simulated.shapes.hand import Hand
 from drivers.simulated.simulation import Simulation
 
 RAYS = np.ascontiguousarray(Camera(32, 24, 32.0, 32.0, 15.5, 11.5).rays())

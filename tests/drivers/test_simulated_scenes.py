@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from drivers.device import DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import DeviceState, Truth
+from drivers.contract.frame import Frame
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 from drivers.simulated.simulation import Simulation

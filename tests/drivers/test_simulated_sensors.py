@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from drivers.device import Truth
-from drivers.frame import Frame, Geometry, Kind
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.address import parse
+from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL, TimeOfFlight, TimeOfFlightNoise
 from drivers.simulated.simulation import Simulation
-from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL, TimeOfFlight, TimeOfFlightNoise
 
 
 def build(query: str, name: str = "sheet") -> Simulation:

@@ -11,9 +11,9 @@ from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
 from drivers.simulated.address import parse
-from drivers.simulated.elastica import hang
+from drivers.simulated.shapes.elastica import hang
+from drivers.simulated.shapes.strip import GRAVITY, PlacedStrip, Strip
 from drivers.simulated.simulation import Simulation
-from drivers.simulated.strip import GRAVITY, PlacedStrip, Strip
 
 CAMERA = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
 RAYS = np.ascontiguousarray(CAMERA.rays())

@@ -5,12 +5,12 @@ import pytest
 from numpy.typing import NDArray
 
 from calib import pose
-from calib.board.detection import detect
-from drivers.device import AddressError
-from drivers.frame import Frame, Kind
+from calib.board.corners.detection import detect
+from drivers.contract.device import AddressError
+from drivers.contract.frame import Frame, Kind
 from drivers.simulated.address import parse
-from drivers.simulated.handling import MOVE_S
-from drivers.simulated.printed import TARGETS, board_pose
+from drivers.simulated.scene.handling import MOVE_S
+from drivers.simulated.shapes.printed import TARGETS, board_pose
 
 
 def simulation(board: str, *more: str):

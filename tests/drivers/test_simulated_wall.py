@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from drivers.device import AddressError
+from drivers.contract.device import AddressError
 from drivers.simulated.address import parse
-from drivers.simulated.time_of_flight import WIGGLE_M, TimeOfFlight
+from drivers.simulated.sensors.time_of_flight import WIGGLE_M, TimeOfFlight
 
 
 def build(query: str):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import ablations
-from abs_service.experiments.base import Context
-from abs_service.experiments.cold import Cold, Forgetful
 from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.optimizers.base import Budget, Optimizer
+from evaluation.experiments import ablations
+from evaluation.experiments.base import Context
+from evaluation.experiments.cold import Cold, Forgetful
 from tests.tracker.problems import linear
 
 TARGET = np.array([1.0, -2.0])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments.bayer import CODES, VARIANTS, Scene, chosen, compared
-from abs_service.readers import BAYER_ORDERS
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from evaluation.experiments.bayer import CODES, VARIANTS, Scene, chosen, compared
 
 #: What the rule of the experiment chooses for every order and variant; see docs/colour.md.
 SIGMA = 80.0

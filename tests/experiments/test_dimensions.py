@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import dimensions
-from abs_service.experiments.base import Context
-from abs_service.experiments.waves import Waves
+from evaluation.experiments import dimensions
+from evaluation.experiments.base import Context
+from evaluation.experiments.waves import Waves
 
 
 @pytest.mark.parametrize("t", [0.0, 2.0, 2.9])

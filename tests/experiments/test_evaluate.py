@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from abs_service import cli
-from abs_service.commands import evaluate
-from abs_service.exits import Exit
-from abs_service.experiments.base import Context, Findings, UnavailableError, at_least, at_most
 from abs_service.report.content import Column, Level, Section, Table
+from abs_service.supervision.exit_codes import Exit
+from evaluation import __main__
+from evaluation.experiments.base import Context, Findings, UnavailableError, at_least, at_most
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ def experiment(monkeypatch: pytest.MonkeyPatch) -> Callable[..., types.SimpleNam
     def add(name: str, run: Callable[[Settings, Context], Findings]) -> None:
         made[name] = types.SimpleNamespace(TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run)
 
-    monkeypatch.setattr(evaluate, "available", lambda: made)
+    monkeypatch.setattr(__main__, "available", lambda: made)
     return add  # type: ignore[return-value]
 
 
@@ -149,11 +149,11 @@ def test_folders_that_cannot_be_are_named(
 
 
 def test_every_experiment_of_the_program_is_complete() -> None:
-    for name, one in evaluate.available().items():
+    for name, one in __main__.available().items():
         assert isinstance(one.QUICK, one.Settings), name
         assert one.TITLE, name
         assert callable(one.run), name
-    assert "abs_service.experiments.base" in sys.modules
+    assert "evaluation.experiments.base" in sys.modules
 
 
 def test_a_goal_becomes_a_verdict_with_figure_bound_and_reason() -> None:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import checkerboard, stripe
-from abs_service.experiments.base import Context
-from abs_service.experiments.flat_boards import BLACK, WHITE, from_plane
-from abs_service.experiments.static_walls import learnt
 from calib import pose
+from evaluation.experiments import checkerboard, stripe
+from evaluation.experiments.base import Context
+from evaluation.experiments.flat_boards import BLACK, WHITE, from_plane
+from evaluation.experiments.static_walls import learnt
 
 
 def test_points_are_as_far_from_their_plane_as_they_were_put():

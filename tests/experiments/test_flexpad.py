@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import flexpad
-from abs_service.experiments.base import Context
-from abs_service.tracker.sheet import Sheet
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from calib import pose
+from evaluation.experiments import flexpad
+from evaluation.experiments.base import Context
 
 
 def test_the_pose_error_of_a_flat_grid_is_how_far_it_was_turned_and_moved():

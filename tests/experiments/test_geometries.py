@@ -6,17 +6,17 @@ import json
 import numpy as np
 import pytest
 
-from abs_service.experiments import geometries
-from abs_service.experiments.base import Context
-from abs_service.experiments.geometries import bound, measuring, sensor
-from abs_service.experiments.geometries.bound import Priors
-from abs_service.experiments.geometries.following import KnownSheet, Scene, printed
-from abs_service.experiments.scenes.geometries import GEOMETRIES, Motion, MovingSheet
-from abs_service.experiments.scenes.rendering import Renderer
-from abs_service.experiments.scenes.surfaces import SplineSurface, Wall
-from abs_service.experiments.scenes.time_of_flight import SR4000
-from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.detection.initial_detection import Sighting
 from calib.noise.base import pixels_where
+from evaluation.experiments import geometries
+from evaluation.experiments.base import Context
+from evaluation.experiments.geometries import bound, measuring, sensor
+from evaluation.experiments.geometries.bound import Priors
+from evaluation.experiments.geometries.following import KnownSheet, Scene, printed
+from evaluation.scenes.geometries import GEOMETRIES, Motion, MovingSheet
+from evaluation.scenes.rendering import Renderer
+from evaluation.scenes.surfaces import SplineSurface, Wall
+from evaluation.scenes.time_of_flight import SR4000
 
 MOTION = Motion()
 KNOWN = KnownSheet(MOTION.width, MOTION.distance)

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.health_pb2 import Health
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.health_pb2 import Health
 
 from abs_service.config import load
-from abs_service.experiments import live
-from abs_service.experiments.base import Context
-from abs_service.experiments.live import listener, losses, proc, recording
-from abs_service.experiments.live.rig import write_rig
-from abs_service.experiments.live.trend import least_within, trend
-from drivers.mcap_file import McapFile
+from drivers.encoding.mcap_file import McapFile
+from evaluation.experiments import live
+from evaluation.experiments.base import Context
+from evaluation.experiments.live import listener, losses, proc, recording
+from evaluation.experiments.live.rig import write_rig
+from evaluation.experiments.live.trend import least_within, trend
 
 MINUTES = np.arange(600.0) / 60
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from abs_service.experiments import offset
-from abs_service.experiments.base import Context
+from evaluation.experiments import offset
+from evaluation.experiments.base import Context
 
 
 @pytest.mark.slow

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import peers
-from abs_service.experiments.base import Context
-from abs_service.experiments.peers.gauss_newton import GaussNewton
-from abs_service.experiments.peers.measuring import Followed, follow, least, with_template
-from abs_service.experiments.peers.ours import SETUPS, Ours
-from abs_service.experiments.peers.rivals import KNOWN, Still, installed
-from abs_service.experiments.peers.scene import CAMERA, SIZE, Moment, Scene, film, places, spin, swing
+from evaluation.experiments import peers
+from evaluation.experiments.base import Context
+from evaluation.experiments.peers.gauss_newton import GaussNewton
+from evaluation.experiments.peers.measuring import Followed, follow, least, with_template
+from evaluation.experiments.peers.ours import SETUPS, Ours
+from evaluation.experiments.peers.rivals import KNOWN, Still, installed
+from evaluation.experiments.peers.scene import CAMERA, SIZE, Moment, Scene, film, places, spin, swing
 
 
 @pytest.mark.parametrize("degrees", [-120, -1, 0, 1e-6, 60, 120])

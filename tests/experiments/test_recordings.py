@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service.experiments import recordings
-from abs_service.experiments.base import Context, UnavailableError
-from abs_service.experiments.recordings import azure, dropouts, sigma_image, sigma_report, toy
-from abs_service.experiments.recordings.agreement import agreement
 from calib.camera import Camera
+from evaluation.experiments import recordings
+from evaluation.experiments.base import Context, UnavailableError
+from evaluation.experiments.recordings import azure, dropouts, sigma_image, sigma_report, toy
+from evaluation.experiments.recordings.agreement import agreement
 
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments import sensors
-from abs_service.experiments.base import Context
+from evaluation.experiments import sensors
+from evaluation.experiments.base import Context
 
 TOF = "color + tof"
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from abs_service.experiments import stiffness
-from abs_service.experiments.base import Context
+from evaluation.experiments import stiffness
+from evaluation.experiments.base import Context
 
 
 @pytest.mark.slow

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from abs_service.experiments import warping
-from abs_service.experiments.base import Context
-from abs_service.experiments.warping import comparison
+from evaluation.experiments import warping
+from evaluation.experiments.base import Context
+from evaluation.experiments.warping import comparison
 
 
 @pytest.mark.slow

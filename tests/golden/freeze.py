@@ -56,7 +56,7 @@ def breaks(old: FileDescriptorSet, new: FileDescriptorSet) -> list[str]:
 
 
 def _numbers(descriptors: FileDescriptorSet) -> Iterator[tuple[str, str]]:
-    """Pairs such as ("abs.v1.Header 3", "seq: uint64")."""
+    """Pairs such as ("absmsg.v1.Header 3", "seq: uint64")."""
     for path, message in _messages(descriptors):
         for field in message.field:
             kind = field.type_name or field.Type.Name(field.type).removeprefix("TYPE_").lower()

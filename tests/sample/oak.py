@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from calib.camera import Camera
-from drivers.frame import Frame, Kind
+from drivers.contract.frame import Frame, Kind
 from drivers.oak import library
 from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation

@@ -10,16 +10,17 @@ simulator or the tracker was meant to change, and say why in the commit.
 import json
 from pathlib import Path
 
-from abs_service import announcements, config, keys, plugins
-from abs_service.commands import plans
-from abs_service.config import ServiceConfig
-from abs_service.stamps import Speaker, WallClock
-from abs_service.synchroniser import Synchroniser
-from abs_service.tracking import Tracking, streams
-from drivers import codec
-from drivers.device import Truth
-from drivers.frame import Frame
-from drivers.mcap_file import Compression, McapFile
+from abs_service import config, wiring
+from abs_service.bus import keys
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.capture import sensor_metadata
+from abs_service.config import ServiceConfig, plugins
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracking.session import Tracking, streams
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.replay import Recording
 from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation
@@ -62,8 +63,8 @@ def track(path: Path) -> list[list[float]]:
     """Θ of every exposure of a recording."""
     recording = Recording(path)
     settings = config.loads(recording.config, str(path), path.parent)
-    tracker_rig = plans.rig(settings, "sheet", recording.cameras)
-    tracking = Tracking(tracker_rig, plans.plan(settings, "sheet"))
+    tracker_rig = wiring.rig(settings, "sheet", recording.cameras)
+    tracking = Tracking(tracker_rig, wiring.plan(settings, "sheet"))
     tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
     synchroniser = Synchroniser(settings.reference("sheet"), streams(tracker_rig.sensors.values()), tolerance_ns)
     sets = [found for frame in recording.frames() if isinstance(frame, Frame) for found in synchroniser.add(frame)]
@@ -74,14 +75,14 @@ def _write_announcements(file: McapFile, settings: ServiceConfig, simulation: Si
     header = speaker.header(0, 0)
     cameras = {name: head.camera for name, head in simulation.heads.items()}
     messages = {
-        keys.CONFIG: announcements.config(header, config.to_toml(settings)),
-        keys.TRANSFORMS: announcements.transforms(cameras, START_NS),
+        keys.CONFIG: sensor_metadata.config(header, config.to_toml(settings)),
+        keys.TRANSFORMS: sensor_metadata.transforms(cameras, START_NS),
     }
     for name, camera in cameras.items():
         noise = settings.sensors[name].noise
         assert noise is not None
-        messages[keys.model(name)] = announcements.sensor_model(header, name, camera, plugins.table(noise))
-        messages[keys.calibration(name)] = announcements.calibration(name, camera, START_NS)
+        messages[keys.model(name)] = sensor_metadata.sensor_model(header, name, camera, plugins.table(noise))
+        messages[keys.calibration(name)] = sensor_metadata.calibration(name, camera, START_NS)
     for topic, message in messages.items():
         payload = message.SerializeToString(deterministic=True)
         file.write(f"/{topic}", message.DESCRIPTOR.full_name, payload, START_NS, 0)

@@ -2,7 +2,7 @@
 
 
 class Idle:
-    """Keeps the promises of `abs_service.processes.Process`; notes its name in `ended` when it is asked to end."""
+    """A `Process` that does nothing; appends its name to `ended` when it is asked to end."""
 
     def __init__(self, component: str = "", ended: list[str] | None = None):
         self._component, self._ended = component, [] if ended is None else ended

@@ -12,7 +12,7 @@ PACKAGES = {
     "synthesis": "abs_service.tracker.synthesis",
     "optimizer": "abs_service.tracker.optimizers",
     "objective": "abs_service.tracker.objectives",
-    "region": "abs_service.tracker.regions",
+    "region": "abs_service.tracker.detection.regions",
     "depth": "calib.noise",
     "picture": "calib.noise",
 }

@@ -6,14 +6,14 @@ import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
-from abs_service.health import Health
-from abs_service.record import Recorder, RecorderSettings
-from abs_service.recording_file import open_for_writing
-from abs_service.stamps import Speaker, WallClock
-from drivers import codec
-from drivers.frame import Frame, Geometry, Kind
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recording_file import open_for_writing
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec
 from tests.service.loopback import LoopbackBus
 
 DEPTH = keys.image("tof", "depth")

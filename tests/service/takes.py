@@ -5,15 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
-from abs.v1.common_pb2 import Header
-from abs.v1.sensor_model_pb2 import SensorModel
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.sensor_model_pb2 import SensorModel
 
 from calib.camera import Camera
-from drivers import codec
-from drivers.device import Truth
-from drivers.frame import Frame
-from drivers.mcap_file import McapFile
-from drivers.simulated.exposure import Head
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import McapFile
+from drivers.simulated.sensors.exposure import Head
 
 #: Wall-clock time at which the simulation starts [ns].
 WALL_NS = 1_700_000_000_000_000_000
@@ -69,7 +69,7 @@ def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
     model.lens.extend(camera.lens.coefficients.tolist())
     model.lens_model = camera.lens.name
     model.T_rs.extend(camera.T_rs.ravel().tolist())
-    file.write(f"/{name}/model", "abs.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
+    file.write(f"/{name}/model", "absmsg.v1.SensorModel", model.SerializeToString(), WALL_NS, 0)
 
 
 def _write_truth(file: McapFile, truth: Truth) -> None:

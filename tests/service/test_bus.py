@@ -51,12 +51,12 @@ def test_a_message_arrives_as_it_was_sent(buses, qos):
 
 def test_an_announcement_is_heard_and_answers_with_the_last(buses):
     _, sender, receiver = buses
-    publisher = sender.announce("config", "abs.v1.Config")
+    publisher = sender.announce("config", "absmsg.v1.Config")
     assert receiver.ask("config", 1) == []
     arrived = listen(receiver, "config")
     publish_until_heard(publisher, arrived, b"old")
     publisher.put(b"new")
-    assert receiver.ask("**", 1) == [Sample("config", "abs.v1.Config", b"new")]
+    assert receiver.ask("**", 1) == [Sample("config", "absmsg.v1.Config", b"new")]
 
 
 def test_an_answer_is_made_when_asked(buses):
@@ -143,8 +143,8 @@ with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
 def test_everything_resumes_when_the_router_comes_back(buses, endpoint):
     router, sender, receiver = buses
     arrived = listen(receiver, "sheet/state")
-    publisher = sender.publisher("sheet/state", "abs.v1.DeformationState", STATE)
-    sender.announce("config", "abs.v1.Config").put(b"answer")
+    publisher = sender.publisher("sheet/state", "absmsg.v1.DeformationState", STATE)
+    sender.announce("config", "absmsg.v1.Config").put(b"answer")
     publish_until_heard(publisher, arrived, b"before")
     router.close()
     publisher.put(b"nobody hears this, and nothing blocks")
@@ -196,8 +196,8 @@ from abs_service.bus.zenoh_bus import ZenohBus
 with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
     bus.subscribe("**", print)
     bus.watch_alive(print)
-    bus.announce("config", "abs.v1.Config").put(b"x")
-    bus.publisher("sheet/state", "abs.v1.DeformationState", STATE).put(b"y")
+    bus.announce("config", "absmsg.v1.Config").put(b"x")
+    bus.publisher("sheet/state", "absmsg.v1.DeformationState", STATE).put(b"y")
 """
     subprocess.run([sys.executable, "-c", program], check=True, timeout=10, stdout=subprocess.DEVNULL)
 
@@ -213,7 +213,7 @@ def test_the_interpreter_waits_for_callbacks_that_a_daemon_declared(open_bus):
     before = set(threading.enumerate())
 
     def declare():
-        bus.announce("config", "abs.v1.Config")
+        bus.announce("config", "absmsg.v1.Config")
         bus.answer("schema", "bytes", bytes)
         bus.subscribe("**", lambda sample: None)
         bus.watch_alive(lambda component, alive: None)

@@ -6,32 +6,34 @@ import threading
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
-from abs.v1.health_pb2 import Health as Message
-from abs.v1.sensor_model_pb2 import Config, SensorModel
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.health_pb2 import Health as Message
+from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
 
-from abs_service import announcements, capture, config, keys, watch
-from abs_service.capture import DeviceKeeper
+from abs_service import config
+from abs_service.bus import keys
+from abs_service.bus.health import Health, Level
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.capture import device_supervisor, sensor_metadata, stall_detector
+from abs_service.capture.device_supervisor import DeviceKeeper
 from abs_service.commands import capture as command
 from abs_service.commands import rig_devices
 from abs_service.commands.capture import Crier
 from abs_service.commands.rig_devices import HeadError, SettingError
-from abs_service.envelope import MESSAGES
-from abs_service.health import Health, Level
-from abs_service.stamps import Speaker, WallClock
+from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from drivers.capabilities import Capabilities, StreamInfo
-from drivers.codec import CodecError
-from drivers.controls import Control, ControlInfo, ControlKind, Controls
-from drivers.device import AddressError, DeviceError, DeviceInfo, DeviceState
-from drivers.frame import Frame, Kind
-from drivers.sensor_model import decode_camera
+from drivers.contract.capabilities import Capabilities, StreamInfo
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
+from drivers.contract.device import AddressError, DeviceError, DeviceInfo, DeviceState
+from drivers.contract.frame import Frame, Kind
+from drivers.encoding.codec import CodecError
+from drivers.encoding.sensor_model import decode_camera
 from tests.service.loopback import LoopbackBus
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
@@ -91,7 +93,7 @@ def asked():
 @pytest.fixture
 def keep(monkeypatch, asked):
     """Starts a keeper on devices that are made one after the other; closed after the test."""
-    monkeypatch.setattr(capture, "FIRST_PAUSE_S", 0.1)
+    monkeypatch.setattr(device_supervisor, "FIRST_PAUSE_S", 0.1)
     keepers = []
 
     def keep(*make, on_open=lambda device: None):
@@ -178,8 +180,8 @@ def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
 
 
 def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monkeypatch):
-    monkeypatch.setattr(watch, "STALL_NS", 200_000_000)
-    monkeypatch.setattr(watch, "SILENCE_NS", 600_000_000)
+    monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
+    monkeypatch.setattr(stall_detector, "SILENCE_NS", 600_000_000)
     _, collector, health = keep(working, working)
     first = collector.frames.get(timeout=5)
     assert eventually(lambda: health._labels["device.sim"] == "stalled")
@@ -319,9 +321,9 @@ def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configura
 
 def test_viewers_are_told_of_a_fisheye_and_recordings_give_it_back():
     camera = dataclasses.replace(CAMERA, lens=KannalaBrandt(np.array([0.1, 0.02])))
-    told = announcements.calibration("tof", camera, 0)
+    told = sensor_metadata.calibration("tof", camera, 0)
     assert (told.distortion_model, list(told.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
-    model = announcements.sensor_model(Header(), "tof", camera, {})
+    model = sensor_metadata.sensor_model(Header(), "tof", camera, {})
     assert (
         decode_camera(SensorModel.FromString(model.SerializeToString())).calib_id == camera.calib_id == model.calib_id
     )
@@ -356,7 +358,7 @@ def test_a_step_of_the_wall_clock_is_said_once(crier):
 
 def test_the_schema_describes_every_message_on_the_wire():
     pool = DescriptorPool()
-    for file in FileDescriptorSet.FromString(announcements.schema()).file:
+    for file in FileDescriptorSet.FromString(sensor_metadata.schema()).file:
         pool.Add(file)
     for message in MESSAGES:
         assert pool.FindMessageTypeByName(message).full_name == message

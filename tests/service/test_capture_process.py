@@ -4,12 +4,12 @@ import queue
 import signal
 
 import pytest
-from abs.v1.health_pb2 import Health
+from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.frames import FrameSubscriber
+from abs_service.bus.health import Level
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.health import Level
 
 pytestmark = pytest.mark.slow  # each test starts an interpreter that imports and compiles everything
 

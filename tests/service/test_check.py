@@ -4,7 +4,7 @@ import pytest
 
 from abs_service import cli, config
 from abs_service.commands import check
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 
 RIG = """
 version = 1

@@ -7,8 +7,8 @@ import types
 import pytest
 
 from abs_service import cli
-from abs_service.exits import Exit
-from drivers.device import DeviceError
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.device import DeviceError
 
 
 @pytest.fixture

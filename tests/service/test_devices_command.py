@@ -9,11 +9,11 @@ import pytest
 
 from abs_service import cli
 from abs_service.commands import devices
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 from drivers import opening
-from drivers.controls import Control, ControlInfo, ControlKind, Controls
-from drivers.device import DeviceInfo
-from drivers.discovery import Availability, Found
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
+from drivers.contract.device import DeviceInfo
+from drivers.contract.discovery import Availability, Found
 from tests.service.test_capture import FakeDevice
 
 OAK = Found(DeviceInfo("oak://184430", "OAK-D ToF", "184430", "1.2.3", "USB 3, 5 Gbit/s"))
@@ -78,7 +78,7 @@ def test_who_comes_goes_and_changes():
 @pytest.mark.parametrize("options", [[], ["--json"]])
 def test_hot_plug_is_followed_until_told_to_stop(monkeypatch, capsys, options):
     looks = iter([[OAK], [], [KINECT]])
-    stop = devices.participant.stop_on_signals()
+    stop = devices.rig_process.stop_on_signals()
 
     def discover(timeout_s):
         found = next(looks)
@@ -87,7 +87,7 @@ def test_hot_plug_is_followed_until_told_to_stop(monkeypatch, capsys, options):
         return found
 
     monkeypatch.setattr(devices, "PERIOD_S", 0.0)
-    monkeypatch.setattr(devices.participant, "stop_on_signals", lambda: stop)
+    monkeypatch.setattr(devices.rig_process, "stop_on_signals", lambda: stop)
     monkeypatch.setattr(opening, "discover", discover)
     assert cli.main(["devices", "--watch", *options]) == Exit.OK
     lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith("Watching")]

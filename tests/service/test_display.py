@@ -3,17 +3,17 @@ import json
 from pathlib import Path
 
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.health_pb2 import Health
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.health_pb2 import Health
 from rich.console import Console
 from rich.spinner import Spinner
 
 from abs_service.display.lines import JsonDisplay, PlainDisplay, line
 from abs_service.display.table import TableDisplay, draw
-from abs_service.display.view import View, size
-from abs_service.live import Live
-from abs_service.supervisor import Child, State
-from abs_service.tracker_log import Report
+from abs_service.supervision.rig_state import Live
+from abs_service.supervision.rig_view import View, size
+from abs_service.supervision.supervisor import Child, State
+from abs_service.tracking.tracker_log import Report
 from tests.service.idle import Idle
 
 S = 1_000_000_000

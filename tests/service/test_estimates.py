@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from abs.v1.common_pb2 import Header
+from absmsg.v1.common_pb2 import Header
 
-from abs_service import estimates
-from abs_service.estimates import Effort, Identity
-from abs_service.observation import Source
+from abs_service.pairing.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.terms.base import SensorFit
+from abs_service.wire import estimate_messages
+from abs_service.wire.estimate_messages import Effort, Identity
 
 ESTIMATE = Estimate(
     seq=7,
@@ -40,7 +40,7 @@ MESH = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32), np.full((3, 3), n
 
 
 def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
-    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
     assert list(state.covariance) == pytest.approx([1.0, 0.1, 0.2, 2.0, 0.3, 3.0])
     assert state.covariance_valid
     assert state.log_likelihood == -12.5
@@ -49,19 +49,19 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
 @pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])
 def test_the_covariance_of_what_is_not_tracked_says_nothing(status):
     lost = replace(ESTIMATE, status=status)
-    assert not estimates.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {})).covariance_valid
-    assert estimates.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
+    assert not estimate_messages.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {})).covariance_valid
+    assert estimate_messages.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
 
 
 def test_the_covariance_of_every_vertex_travels_as_its_six_different_entries():
-    sent = estimates.mesh(Header(), ESTIMATE, IDENTITY)
+    sent = estimate_messages.mesh(Header(), ESTIMATE, IDENTITY)
     entries = np.frombuffer(sent.covariance_f32, "<f4").reshape(-1, 6)
     matrices = entries[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
     np.testing.assert_array_equal(matrices, ESTIMATE.vertex_covariance)
 
 
 def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
-    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 3, {"tof": 4, "color": 5}))
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 3, {"tof": 4, "color": 5}))
     tof, color = state.sensors
     assert (tof.sensor, tof.seq, tof.samples, tof.dropped, tof.missing) == ("tof", 42, 270, 4, False)
     assert (color.sensor, color.dropped, color.missing) == ("color", 5, True)
@@ -69,28 +69,28 @@ def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
 
 
 def test_what_the_search_took_and_was_allowed_is_told():
-    state = estimates.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
-    assert (state.searcher, state.stop) == ("cma_es", estimates.State.STOP_TIME)
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    assert (state.searcher, state.stop) == ("cma_es", estimate_messages.State.STOP_TIME)
     assert (state.generations, state.evaluations) == (3, 45)
     assert (state.budget_evaluations, state.budget_ms) == (1000, 24.0)
 
 
 @pytest.mark.parametrize("stop", Stop)
 def test_every_reason_to_stop_has_its_word(stop):
-    state = estimates.state(Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
-    word = estimates.State.Stop.Name(state.stop).removeprefix("STOP_").lower()
+    state = estimate_messages.state(Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    word = estimate_messages.State.Stop.Name(state.stop).removeprefix("STOP_").lower()
     assert word == ("unspecified" if stop == Stop.NOTHING else stop.value)
 
 
 def test_theta_of_another_mesh_or_model_has_another_id():
-    first = estimates.with_mesh(IDENTITY, MESH, 1)
-    moved = estimates.with_mesh(IDENTITY, replace(MESH, vertices=MESH.vertices + 1e-6), 2)
-    rigid = estimates.with_mesh(replace(IDENTITY, model="rigid"), MESH, 1)
+    first = estimate_messages.with_mesh(IDENTITY, MESH, 1)
+    moved = estimate_messages.with_mesh(IDENTITY, replace(MESH, vertices=MESH.vertices + 1e-6), 2)
+    rigid = estimate_messages.with_mesh(replace(IDENTITY, model="rigid"), MESH, 1)
     assert len({first.model_id, moved.model_id, rigid.model_id}) == 3
     assert moved.mesh_version == 2
 
 
 def test_colors_travel_only_if_a_sensor_saw_some():
-    assert estimates.topology(Header(), MESH, IDENTITY).colors_u8 == b""
+    assert estimate_messages.topology(Header(), MESH, IDENTITY).colors_u8 == b""
     seen = replace(MESH, colors=np.array([[1, 2, 3], [4, 5, 6], [np.nan] * 3], np.float32))
-    assert estimates.topology(Header(), seen, IDENTITY).colors_u8 == bytes([1, 2, 3, 4, 5, 6, 0, 0, 0])
+    assert estimate_messages.topology(Header(), seen, IDENTITY).colors_u8 == bytes([1, 2, 3, 4, 5, 6, 0, 0, 0])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.evaluation import KEPT, STRAIGHT_NS, TruthComparison, closest_points
+from abs_service.tracking.truth import KEPT, STRAIGHT_NS, TruthComparison, closest_points
 
 
 def grid(rows=21, columns=31, bend=0.0):

@@ -10,10 +10,10 @@ from pathlib import Path
 from shutil import which
 
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import MESH, STATE
 
 ROOT = Path(__file__).parents[2]

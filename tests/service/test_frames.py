@@ -6,15 +6,15 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from abs.v1 import frame_info_pb2
+from absmsg.v1 import frame_info_pb2
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import DEPTH, FramePublisher, FrameSubscriber
-from abs_service.stamps import Speaker, WallClock
-from drivers import codec
-from drivers.device import Truth
-from drivers.frame import Frame, Geometry, Kind
+from abs_service.bus.stamps import Speaker, WallClock
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec
 from tests.service.loopback import LoopbackBus
 
 
@@ -63,7 +63,7 @@ def test_frames_and_truths_arrive_as_they_were(speaker):
     assert arrived is not None
     assert same(arrived, frame(5))
     image, known = bus.sent
-    assert (known.topic, known.message) == ("sim/truth", "abs.v1.SurfaceTruth")
+    assert (known.topic, known.message) == ("sim/truth", "absmsg.v1.SurfaceTruth")
     assert np.array_equal(codec.decode_truth(known.payload).points_r, truth.points_r)
     header = frame_info_pb2.FrameInfo.FromString(image.attachment).header
     assert (header.rig, header.boot_id, header.t_host_ns) == ("demo", speaker.boot_id, 10**9 + 5)

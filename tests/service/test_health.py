@@ -1,7 +1,7 @@
-from abs.v1.health_pb2 import Health as Message
+from absmsg.v1.health_pb2 import Health as Message
 
-from abs_service.health import PERIOD_NS, Health, Level
-from abs_service.stamps import Speaker, WallClock
+from abs_service.bus.health import PERIOD_NS, Health, Level
+from abs_service.bus.stamps import Speaker, WallClock
 from tests.service.loopback import LoopbackBus
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.exits import Exit
-from drivers.frame import Frame, Geometry, Kind
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.replay import Recording
 from tests.drivers import o3r_buffer
 

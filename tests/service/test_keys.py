@@ -1,6 +1,6 @@
 import pytest
 
-from abs_service import keys
+from abs_service.bus import keys
 
 
 @pytest.mark.parametrize(

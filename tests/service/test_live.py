@@ -2,14 +2,14 @@ import math
 
 import numpy as np
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
-from abs.v1.health_pb2 import Health
-from abs.v1.surface_truth_pb2 import SurfaceTruth
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.health_pb2 import Health
+from absmsg.v1.surface_truth_pb2 import SurfaceTruth
 
 from abs_service.bus.contract import Sample
-from abs_service.live import Live
-from abs_service.tracker_log import Total
+from abs_service.supervision.rig_state import Live
+from abs_service.tracking.tracker_log import Total
 
 
 def sample(topic, message):

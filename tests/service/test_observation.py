@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from abs_service.images import ColorImage, DepthImage
-from abs_service.observation import ObservationError, Observer
+from abs_service.pairing.images import ColorImage, DepthImage
+from abs_service.pairing.observation import ObservationError, Observer
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -16,7 +16,7 @@ from calib.noise.measured import Measured
 from calib.noise.per_pixel import PerPixel
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
-from drivers.frame import Frame, FrameSet, Geometry, Kind
+from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 CAMERA = Camera(6, 4, 5.0, 5.0, 2.5, 1.5, Lens(np.array([-0.1])), pose.from_rotation_vector([0, 1, 0], [1, 2, 3]))
 RIG = Rig(

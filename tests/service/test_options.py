@@ -10,20 +10,20 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service import cli, config, plugins
-from abs_service.commands import plans
-from abs_service.exits import Exit
-from abs_service.warmup import warm_up
+from abs_service import cli, config, wiring
+from abs_service.config import plugins
+from abs_service.supervision.exit_codes import Exit
+from abs_service.tracking.warmup import warm_up
 from calib.noise.constant import Constant
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial, blocks
-from drivers.device import Truth
-from drivers.frame import Frame, Kind
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame, Kind
 from drivers.simulated.address import parse
-from drivers.simulated.exposure import Head
+from drivers.simulated.sensors.exposure import Head
+from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
 from drivers.simulated.simulation import Simulation
-from drivers.simulated.time_of_flight import SIGMA_POLYNOMIAL
 from tests.service.options import OPTIONS, PACKAGES
 from tests.service.takes import write_take
 
@@ -111,7 +111,7 @@ def test_a_part_is_prepared_and_tracks_what_was_recorded(part, folder, take, tmp
     rig_file.write_text(OPTIONS[part].toml, encoding="utf-8")
     rig = config.load(rig_file)
     assert OPTIONS[part].module in {type(settings).__module__ for settings in parts(rig)}
-    warm_up(plans.noises(rig, "object"), plans.plan(rig, "object"))
+    warm_up(wiring.noises(rig, "object"), wiring.plan(rig, "object"))
     recording = take(rig.devices["sim"].uri, tuple(rig.heads("sim").items()))
     arguments = ["replay", recording, "--config", rig_file, "--out", tmp_path / "out.mcap", "--json"]
     assert cli.main(list(map(str, arguments))) == Exit.OK

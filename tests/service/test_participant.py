@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from abs_service.bus.session import BusError
-from abs_service.commands import participant
+from abs_service.commands import rig_process
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def handlers():
 def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, number):
     forced = []
     monkeypatch.setattr(os, "_exit", forced.append)
-    stop = participant.stop_on_signals()
+    stop = rig_process.stop_on_signals()
     assert not stop.is_set()
     signal.raise_signal(number)
     assert stop.is_set()
@@ -33,22 +33,22 @@ def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, numb
 
 def parse(*arguments):
     parser = argparse.ArgumentParser()
-    participant.add_arguments(parser)
+    rig_process.add_arguments(parser)
     return parser.parse_args(arguments)
 
 
 def test_one_process_may_listen_and_others_connect_wherever_they_are_told(endpoint):
-    rig = participant.load_config(parse())
+    rig = rig_process.load_config(parse())
     with (
-        participant.open_bus(rig, parse("--listen", endpoint)),
-        participant.open_bus(rig, parse("--connect", endpoint)) as bus,
+        rig_process.open_bus(rig, parse("--listen", endpoint)),
+        rig_process.open_bus(rig, parse("--connect", endpoint)) as bus,
     ):
         assert bus.ask("**", 0.1) == []
 
 
 def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file():
     with pytest.raises(BusError, match='"nowhere": not an endpoint'):
-        participant.open_bus(participant.load_config(parse()), parse("--connect", "nowhere"))
+        rig_process.open_bus(rig_process.load_config(parse()), parse("--connect", "nowhere"))
 
 
 def test_a_process_cannot_both_listen_and_connect(endpoint, capsys):

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from abs_service import pauses
+from abs_service.supervision import gc_tuning
 
 
 @pytest.fixture
@@ -19,13 +19,13 @@ def as_it_was():
 @pytest.mark.usefixtures("as_it_was")
 def test_threads_take_short_turns():
     sys.setswitchinterval(0.005)
-    pauses.take_short_turns()
-    assert sys.getswitchinterval() == pytest.approx(pauses.SWITCH_S)
+    gc_tuning.take_short_turns()
+    assert sys.getswitchinterval() == pytest.approx(gc_tuning.SWITCH_S)
 
 
 @pytest.mark.usefixtures("as_it_was")
 def test_what_is_loaded_is_searched_for_garbage_no_more():
     frozen = gc.get_freeze_count()
-    pauses.keep_what_is_loaded()
+    gc_tuning.keep_what_is_loaded()
     assert gc.get_freeze_count() > frozen + 1000
     assert len(gc.get_objects()) < 1000

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service import config
-from abs_service.commands import plans
+from abs_service import config, wiring
 from calib.camera import Camera
 
 TOF = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
@@ -16,19 +15,19 @@ COLOR = Camera(320, 240, 340.0, 340.0, 159.5, 119.5)
 
 
 def test_a_tracker_that_does_not_exist_is_answered_with_those_that_do():
-    with pytest.raises(plans.PlanError, match=r'no tracker "sheeet".*sheet'):
-        plans.plan(config.load_default(), "sheeet")
+    with pytest.raises(wiring.PlanError, match=r'no tracker "sheeet".*sheet'):
+        wiring.plan(config.load_default(), "sheeet")
 
 
 def test_a_sensor_without_a_camera_is_named():
-    with pytest.raises(plans.PlanError, match=r'"color" of tracker "sheet" has no camera'):
-        plans.rig(config.load_default(), "sheet", {"tof": TOF})
+    with pytest.raises(wiring.PlanError, match=r'"color" of tracker "sheet" has no camera'):
+        wiring.rig(config.load_default(), "sheet", {"tof": TOF})
 
 
 def test_what_a_sensor_says_of_its_outliers_comes_with_its_noise():
     text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
     own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\n")
-    rig = plans.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})
+    rig = wiring.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})
     tof, color = rig.sensors["tof"], rig.sensors["color"]
     assert (tof.outlier_share, tof.range_m) == (0.2, 7.5)
     assert (color.outlier_share, color.range_m) == (None, None)
@@ -40,14 +39,14 @@ def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_p
     demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
     noise = '[sensors.tof.noise]\ntype = "pixel_polynomial"\nfile = "maps.npz"\n'
     toml = re.sub(r"\[sensors\.tof\.noise\].*?(?=\[sensors\.color\])", noise, demo, flags=re.DOTALL)
-    with pytest.raises(plans.PlanError, match=r"sensors.tof.noise.file.* 320 × 240 .* 176 × 144"):
-        plans.rig(config.loads(toml, "maps.toml", tmp_path), "sheet", {"tof": TOF, "color": COLOR})
+    with pytest.raises(wiring.PlanError, match=r"sensors.tof.noise.file.* 320 × 240 .* 176 × 144"):
+        wiring.rig(config.loads(toml, "maps.toml", tmp_path), "sheet", {"tof": TOF, "color": COLOR})
 
 
 def test_a_relief_that_is_to_be_learnt_needs_a_model_with_offsets():
     demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
     own = demo.rstrip() + "\n\n[trackers.sheet.relief]\ndrift = 1e-4\n"
-    assert plans.plan(config.loads(own, "own.toml", Path()), "sheet").relief.drift == 1e-4
+    assert wiring.plan(config.loads(own, "own.toml", Path()), "sheet").relief.drift == 1e-4
     stiff = own.replace('type = "nurbs"\ncontrol_points = [4, 4]\ndegree = 2\n', 'type = "rigid"\n')
-    with pytest.raises(plans.PlanError, match=r'relief\.drift = 0\.0001 needs .*"nurbs", not "rigid"'):
-        plans.plan(config.loads(stiff, "own.toml", Path()), "sheet")
+    with pytest.raises(wiring.PlanError, match=r'relief\.drift = 0\.0001 needs .*"nurbs", not "rigid"'):
+        wiring.plan(config.loads(stiff, "own.toml", Path()), "sheet")

@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
-from abs_service import plugins
-from abs_service.problems import ProblemsError
+from abs_service.config import plugins
+from abs_service.config.problems import ProblemsError
 
 BENDY = """
 from dataclasses import dataclass

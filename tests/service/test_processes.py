@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from abs_service.processes import ChildProcess
+from abs_service.supervision.child_process import ChildProcess
 
 PATH = os.pathsep.join(sys.path)
 
@@ -73,7 +73,7 @@ def test_killing_a_child_kills_what_it_started(child):
 
 SUPERVISOR = """
 import sys, time
-from abs_service.processes import ChildProcess
+from abs_service.supervision.child_process import ChildProcess
 code = '''
 import signal, time
 from abs_service import lifeline

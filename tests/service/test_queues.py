@@ -1,6 +1,6 @@
 import threading
 
-from abs_service.queues import BoundedQueue, LatestQueue
+from abs_service.bus.queues import BoundedQueue, LatestQueue
 
 
 def test_latest_keeps_the_newest_of_every_key_in_order_of_arrival():

@@ -4,12 +4,14 @@ import json
 import threading
 
 import pytest
-from abs.v1 import frame_info_pb2
+from absmsg.v1 import frame_info_pb2
 
-from abs_service import announcements, envelope, keys
+from abs_service.bus import keys
 from abs_service.bus.contract import Sample
+from abs_service.capture import sensor_metadata
+from abs_service.wire import message_header
 from calib.camera import Camera
-from drivers import codec
+from drivers.encoding import codec
 from tests.service.recording import DEPTH, Rig, depth, metadata, read, recordings
 
 
@@ -30,7 +32,8 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
         assert image.message.log_time == image.message.publish_time == info.message.log_time == stamp_ns
         assert image.message.sequence == info.message.sequence
     assert [m.message.sequence for m in images] == [(10**9 + seq) & 0xFFFFFFFF for seq in range(5)]
-    assert {m.schema and m.schema.name for m in messages} == {"foxglove.RawImage", "abs.v1.FrameInfo", "abs.v1.Health"}
+    schemas = {m.schema and m.schema.name for m in messages}
+    assert schemas == {"foxglove.RawImage", "absmsg.v1.FrameInfo", "absmsg.v1.Health"}
     assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
 
 
@@ -39,13 +42,15 @@ def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_ever
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
     header = rig.speaker.now(0)
     for topic, message in {
-        keys.CONFIG: announcements.config(header, "version = 1"),
-        keys.calibration("tof"): announcements.calibration("tof", camera, 1),
-        keys.model("tof"): announcements.sensor_model(header, "tof", camera, {"type": "x", "sigma": [[1, 2], [3, 4]]}),
-        keys.TRANSFORMS: announcements.transforms({"tof": camera}, 1),
+        keys.CONFIG: sensor_metadata.config(header, "version = 1"),
+        keys.calibration("tof"): sensor_metadata.calibration("tof", camera, 1),
+        keys.model("tof"): sensor_metadata.sensor_model(
+            header, "tof", camera, {"type": "x", "sigma": [[1, 2], [3, 4]]}
+        ),
+        keys.TRANSFORMS: sensor_metadata.transforms({"tof": camera}, 1),
     }.items():
         rig.bus.announce(topic, message.DESCRIPTOR.full_name).put(message.SerializeToString())
-    rig.bus.answer(keys.SCHEMA, announcements.SCHEMA_MESSAGE, announcements.schema)
+    rig.bus.answer(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
     rig.recorder.start()
     seq = 0
     while len(recordings(tmp_path)) < 2:
@@ -68,8 +73,8 @@ def test_what_is_no_message_of_ours_is_refused_and_does_not_end_the_recording(tm
     rig.publish_image(depth(1))
     rig.bus.deliver(Sample("x/y", "", b"1"))
     rig.bus.deliver(Sample("x/y", "their.Message", b"1"))
-    rig.bus.deliver(Sample("health/x", "abs.v1.Health", b"\xff\xff\xff"))
-    rig.bus.deliver(Sample(DEPTH, "abs.v1.Health", b""))
+    rig.bus.deliver(Sample("health/x", "absmsg.v1.Health", b"\xff\xff\xff"))
+    rig.bus.deliver(Sample(DEPTH, "absmsg.v1.Health", b""))
     rig.bus.deliver(Sample(DEPTH, codec.IMAGE_SCHEMA, b"", b"\xff\xff"))
     rig.publish_image(depth(2))
     rig.recorder.stop(5)
@@ -103,7 +108,7 @@ def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
 
 
 def test_messages_of_every_type_have_an_envelope():
-    for message in envelope.MESSAGES - {envelope.INFO}:
-        envelope.read(Sample("x", message, b"", b""))
-    with pytest.raises(envelope.EnvelopeError, match="is none of"):
-        envelope.read(Sample("x", "google.protobuf.Timestamp", b""))
+    for message in message_header.MESSAGES - {message_header.INFO}:
+        message_header.read(Sample("x", message, b"", b""))
+    with pytest.raises(message_header.EnvelopeError, match="is none of"):
+        message_header.read(Sample("x", "google.protobuf.Timestamp", b""))

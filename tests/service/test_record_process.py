@@ -9,17 +9,17 @@ import time
 
 import numpy as np
 import pytest
-from abs.v1.health_pb2 import Health
+from absmsg.v1.health_pb2 import Health
 from mcap.reader import make_reader
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.session import Role
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.recovery import recover
-from abs_service.stamps import Speaker, WallClock
-from drivers import codec
-from drivers.frame import Frame, Geometry, Kind
+from abs_service.recording.recovery import recover
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec
 
 pytestmark = pytest.mark.slow  # each test starts at least one interpreter that imports everything
 

@@ -12,12 +12,12 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.commands import recover as command
-from abs_service.recovery import RecoveryError, leftovers, recover
-from abs_service.stamps import Speaker, WallClock
-from drivers import codec
-from drivers.frame import Frame, Geometry, Kind
-from drivers.mcap_file import Compression, McapFile
+from abs_service.recording.recovery import RecoveryError, leftovers, recover
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import Compression, McapFile
 
 HEADER = Speaker("demo", WallClock(), "boot").header(0, 0)
 CHUNK_HEAD = 9 + 32 + len("lz4") + 8  # bytes of a chunk record before its compressed data

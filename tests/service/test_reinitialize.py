@@ -1,12 +1,12 @@
 """`abs-service reinitialize` tells a tracker, and says what came of it."""
 
 import pytest
-from abs.v1 import common_pb2, deformation_state_pb2
+from absmsg.v1 import common_pb2, deformation_state_pb2
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import STATE
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.commands import reinitialize
-from abs_service.stamps import Speaker, WallClock
 from tests.service.loopback import LoopbackBus
 
 STATES = deformation_state_pb2.DeformationState.DESCRIPTOR.full_name

@@ -9,8 +9,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import cli, config
-from abs_service.exits import Exit
-from abs_service.replay import free_path
+from abs_service.supervision.exit_codes import Exit
+from abs_service.tracking.replay import free_path
 from drivers.simulated.address import parse
 from tests.service.takes import WALL_NS, write_take
 
@@ -64,9 +64,9 @@ def test_every_topic_can_be_decoded_by_its_schema(replayed):
         assert content.DESCRIPTOR.full_name == schema.name
         topics.setdefault(channel.topic, []).append((schema.name, message, content))
     assert {topic: (entries[0][0], len(entries)) for topic, entries in topics.items()} == {
-        "/sheet/state": ("abs.v1.DeformationState", COUNT),
-        "/sheet/mesh": ("abs.v1.DeformedMesh", COUNT),
-        "/sheet/topology": ("abs.v1.MeshTopology", 1),
+        "/sheet/state": ("absmsg.v1.DeformationState", COUNT),
+        "/sheet/mesh": ("absmsg.v1.DeformedMesh", COUNT),
+        "/sheet/topology": ("absmsg.v1.MeshTopology", 1),
     }
     replayed_with = config.loads(attachments["rig.toml"].decode(), "rig.toml", Path("/"))
     assert replayed_with.trackers["sheet"].optimizer.steps == 2

@@ -4,15 +4,15 @@ import dataclasses
 
 import numpy as np
 import pytest
-from abs.v1.health_pb2 import Health as Message
+from absmsg.v1.health_pb2 import Health as Message
 
-from abs_service.health import Health
-from abs_service.residuals import EXPLAINED, LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
-from abs_service.stamps import Speaker, WallClock
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.base import SensorFit
-from abs_service.tracking import Tracking
+from abs_service.tracking.noise_monitor import EXPLAINED, LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
+from abs_service.tracking.session import Tracking
 from tests.service.loopback import LoopbackBus
 from tests.service.test_estimates import ESTIMATE
 from tests.tracker.driving import default_plan, drive, rig_of, simulate

@@ -6,19 +6,21 @@ import time
 from pathlib import Path
 
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.deformed_mesh_pb2 import MeshTopology
-from abs.v1.health_pb2 import Health
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import MeshTopology
+from absmsg.v1.health_pb2 import Health
 
-from abs_service import config, estimates, keys
+from abs_service import config
+from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS
+from abs_service.bus.keys import KeyNameError
+from abs_service.bus.stamps import WallClock
 from abs_service.commands import run
 from abs_service.display.lines import PlainDisplay
-from abs_service.exits import Exit
-from abs_service.keys import KeyNameError
-from abs_service.session import Session
-from abs_service.stamps import WallClock
-from abs_service.supervisor import Child, Limits, Supervisor
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.run_session import Session
+from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.wire import estimate_messages
 from tests.service.idle import Idle
 from tests.service.loopback import LoopbackBus
 
@@ -150,9 +152,9 @@ def test_a_topology_that_the_network_lost_is_asked_for():
         asked.append(bench.session.elapsed_s)
         return MeshTopology(mesh_version=3).SerializeToString()
 
-    bench.bus.answer(keys.topology("sheet"), estimates.TOPOLOGY, topology)
+    bench.bus.answer(keys.topology("sheet"), estimate_messages.TOPOLOGY, topology)
     state = DeformationState(tracker="sheet", mesh_version=3).SerializeToString()
-    bench.bus.publisher(keys.state("sheet"), estimates.STATE, EVENTS).put(state)
+    bench.bus.publisher(keys.state("sheet"), estimate_messages.STATE, EVENTS).put(state)
     bench.session.go_on_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
     assert len(asked) == 1
     assert bench.session.view().live.without_topology() == []

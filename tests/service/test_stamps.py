@@ -1,4 +1,4 @@
-from abs_service.stamps import STEP_NS, Speaker, WallClock
+from abs_service.bus.stamps import STEP_NS, Speaker, WallClock
 
 
 class Clocks:

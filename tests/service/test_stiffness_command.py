@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 from drivers.simulated.address import parse
 from tests.service.takes import write_take
 

@@ -1,7 +1,7 @@
 import pytest
 
-from abs_service.exits import Exit
-from abs_service.supervisor import Child, Limits, State, Supervisor
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 
 S = 1_000_000_000
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.synchroniser import DEPTH, Synchroniser
-from drivers.frame import Frame, FrameSet, Geometry, Kind
+from abs_service.pairing.synchroniser import DEPTH, Synchroniser
+from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 MS = 1_000_000
 TOF, COLOR, AMPLITUDE = ("tof", "depth"), ("color", "color"), ("tof", "amplitude")

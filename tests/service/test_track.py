@@ -4,22 +4,22 @@ import dataclasses
 
 import numpy as np
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
-from abs.v1.health_pb2 import Health as Message
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.health_pb2 import Health as Message
 
-from abs_service import keys
+from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
-from abs_service.health import Health
-from abs_service.residuals import ResidualWatch
-from abs_service.stamps import Speaker, WallClock
-from abs_service.synchroniser import Synchroniser
-from abs_service.track import EstimatePublisher, LiveTracker, WaitingSets
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.optimizers import cma
-from abs_service.tracking import Tracking, streams
-from drivers import codec
-from drivers.frame import Kind
+from abs_service.tracking.live_tracker import EstimatePublisher, LiveTracker, WaitingSets
+from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.session import Tracking, streams
+from drivers.contract.frame import Kind
+from drivers.encoding import codec
 from tests.service.loopback import LoopbackBus
 from tests.tracker.driving import default_plan, rig_of, simulate
 

@@ -7,9 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from abs_service import config
-from abs_service.commands import plans
-from abs_service.warmup import warm_up
+from abs_service import config, wiring
+from abs_service.tracking.warmup import warm_up
 from calib.noise.pixel_polynomial import PixelPolynomial
 
 #: Tracks real frames after the warm-up and tells which kernels had how many forms before and afterwards.
@@ -19,9 +18,9 @@ from numba.core.dispatcher import Dispatcher
 from pathlib import Path
 from abs_service import config, plugins
 from abs_service.commands import plans
-from abs_service.tracking import Tracking, streams
-from abs_service.synchroniser import Synchroniser
-from abs_service.warmup import warm_up
+from abs_service.tracking.session import Tracking, streams
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracking.warmup import warm_up
 from drivers.simulated import address
 
 settings = config.load_default()
@@ -77,7 +76,7 @@ def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(parts):
 
 def test_a_map_of_noise_that_is_smaller_than_the_nominal_image_does_no_harm():
     settings = config.load_default()
-    plan = plans.plan(settings, "sheet")
+    plan = wiring.plan(settings, "sheet")
     small = np.full((1, 1, 2, 2), 0.01)
     tof = PixelPolynomial(small, np.zeros_like(small), np.array([0.0, 9.0]), np.array([0.0, 1.0]))
-    warm_up(plans.noises(settings, "sheet") | {"tof": tof}, plan)
+    warm_up(wiring.noises(settings, "sheet") | {"tof": tof}, plan)

@@ -11,13 +11,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from abs.v1.deformation_state_pb2 import DeformationState
-from abs.v1.frame_info_pb2 import FrameInfo
-from abs.v1.health_pb2 import Health
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus.contract import Sample
-from abs_service.experiments.live.listener import connect
+from evaluation.experiments.live.listener import connect
 
 #: The first start on a machine compiles the kernels.
 START_S = 150.0

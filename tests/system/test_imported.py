@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from abs_service.exits import Exit
+from abs_service.supervision.exit_codes import Exit
 from tests.sample.sample import GOLDEN
 from tests.system.running import abs_service
 

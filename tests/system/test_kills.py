@@ -4,10 +4,10 @@ import time
 from collections.abc import Sequence
 
 import pytest
-from abs.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.frame_info_pb2 import FrameInfo
 from mcap.reader import make_reader
 
-from abs_service.experiments.live.proc import children
+from evaluation.experiments.live.proc import children
 from tests.system.running import is_running, kill, wait_until
 
 pytestmark = pytest.mark.slow

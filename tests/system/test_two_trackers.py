@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from abs.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformation_state_pb2 import DeformationState
 
-from abs_service import keys
+from abs_service.bus import keys
 from tests.system.running import START_S, TRACKING, Ear, wait_until
 
 pytestmark = pytest.mark.slow

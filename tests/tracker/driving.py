@@ -6,17 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service import config
-from abs_service.commands import plans
-from abs_service.evaluation import Errors
-from abs_service.experiments.tracked import Judge, with_noise
+from abs_service import config, wiring
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracking import Plan, Tracking
+from abs_service.tracking.session import Plan, Tracking
+from abs_service.tracking.truth import Errors
 from calib.noise.color import GaussianColor
 from calib.rig import Rig
-from drivers.frame import Frame, FrameSet
+from drivers.contract.frame import Frame, FrameSet
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
+from evaluation.experiments.tracked import Judge, with_noise
 
 CONFIG = config.load_default()
 TRACKER = next(iter(CONFIG.trackers))
@@ -24,12 +23,12 @@ TRACKER = next(iter(CONFIG.trackers))
 
 def default_plan(**changes: object) -> Plan:
     """The default rig's plan with some parts exchanged."""
-    return dataclasses.replace(plans.plan(CONFIG, TRACKER), **changes)
+    return dataclasses.replace(wiring.plan(CONFIG, TRACKER), **changes)
 
 
 def rig_of(simulation: Simulation) -> Rig:
     """The default rig around a simulation's cameras."""
-    return plans.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
+    return wiring.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
 
 
 def with_color_deviation(rig: Rig, sigma: float) -> Rig:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
-from abs_service.tracker.curvature import Quadratic
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.posterior.curvature import Quadratic
 
 #: Step of the central differences.
 STEP = 1e-5

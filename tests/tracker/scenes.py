@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from abs_service.images import DepthImage, Image
-from abs_service.observation import Observation, Source
+from abs_service.pairing.images import DepthImage, Image
+from abs_service.pairing.observation import Observation, Source
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis

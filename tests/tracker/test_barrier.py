@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.images import BeamReading
+from abs_service.pairing.images import BeamReading
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage, Image
-from abs_service.observation import Observation
-from abs_service.readers import BAYER_ORDERS
-from abs_service.tracker import chain
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage, ColorImage, Image
+from abs_service.pairing.observation import Observation
+from abs_service.tracker import fused_cost
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models import flexpad, nurbs, posed, rigid
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.posterior import Posterior
-from abs_service.tracker.priors import MotionPrior, Settings, ShapePrior
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracker.posterior.priors import MotionPrior, Settings, ShapePrior
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis import dense, sparse
 from calib import pose
 from calib.camera import Camera
@@ -134,12 +134,14 @@ def test_parts_that_are_no_steps_are_asked_for_the_whole_population() -> None:
 
 
 def test_what_has_nothing_to_say_costs_nothing() -> None:
-    one = chain.Step(chain.cost)
-    assert chain.both(one, chain.NOTHING) is one
-    silent = chain.available([(True, one), (False, one)])
-    empty = chain.Chain(chain.Step(chain.deform, (0,)), chain.NOTHING, chain.NOTHING, chain.NOTHING, silent)
+    one = fused_cost.Step(fused_cost.cost)
+    assert fused_cost.both(one, fused_cost.NOTHING) is one
+    silent = fused_cost.available([(True, one), (False, one)])
+    empty = fused_cost.Chain(
+        fused_cost.Step(fused_cost.deform, (0,)), fused_cost.NOTHING, fused_cost.NOTHING, fused_cost.NOTHING, silent
+    )
     np.testing.assert_array_equal(empty.cost(np.ones((3, 2))), np.zeros(3))
 
 
 def test_what_cannot_tell_of_itself_is_no_step() -> None:
-    assert chain.step_of(PLANE) is None
+    assert fused_cost.step_of(PLANE) is None

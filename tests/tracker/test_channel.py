@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS, ONE_CHANNEL
+from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.channel_cost import copy, fill
-from abs_service.tracker.terms.illumination import Active, Passive, lambert
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.channel_cost import copy, fill
+from abs_service.tracker.terms.photometric.illumination import Active, Passive, lambert
 from calib.noise.bayer import GaussianBayer
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.curvature import Quadratic, gauss_newton, newton_step, posterior_covariance, search_metric
+from abs_service.tracker.posterior.curvature import (
+    Quadratic,
+    gauss_newton,
+    newton_step,
+    posterior_covariance,
+    search_metric,
+)
 from abs_service.tracker.terms.linearization import Linearization
 
 

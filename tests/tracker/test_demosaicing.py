@@ -4,10 +4,10 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.images import ChannelImage
-from abs_service.readers import BAYER_ORDERS
-from abs_service.tracker.demosaicing import demosaiced
-from drivers.simulated.bayer import Mosaic
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage
+from abs_service.tracker.terms.photometric.demosaicing import demosaiced
+from drivers.simulated.sensors.bayer import Mosaic
 
 COLUMNS, ROWS = np.meshgrid(np.arange(40.0), np.arange(30.0))
 RAMPS = np.stack([3 * COLUMNS, 4 * ROWS, 200 - 2 * COLUMNS - 3 * ROWS], axis=-1).astype(np.float32)

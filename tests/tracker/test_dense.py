@@ -11,9 +11,9 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.dense import DenseView
 from abs_service.tracker.synthesis.projection import Projection, in_sight
+from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
+from abs_service.tracker.synthesis.rasterization.zbuffer import Samples, interpolate, render
 from abs_service.tracker.synthesis.sparse import SparseView
-from abs_service.tracker.synthesis.texturing import lattice, paint
-from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from abs_service.tracker.curvature import Quadratic
 from abs_service.tracker.optimizers.base import Budget, Stop
-from abs_service.tracker.optimizers.levenberg_marquardt import descend
+from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
+from abs_service.tracker.posterior.curvature import Quadratic
 from tests.tracker.problems import Known, linear, rosenbrock
 
 TARGET = np.array([0.3, -2.0, 1.0])

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.edge_runs import EdgeRuns
-from abs_service.tracker.grid import triangles
+from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Settings as Nurbs
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.edge_runs import EdgeRuns
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from tests import reference
 from tests.tracker.scenes import as_surface, sheet
 from tests.tracker.test_kernels import few, seeds

@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
-from abs_service.tracker.models import bends
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad, Settings
+from abs_service.tracker.models.parts import bends
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracking import Tracking
+from abs_service.tracking.session import Tracking
 from calib import pose
-from drivers.simulated.motion import Placement
-from drivers.simulated.rectangle import PlacedRectangle
+from drivers.simulated.scene.motion import Placement
+from drivers.simulated.scene.surface import surface_points
+from drivers.simulated.shapes.rectangle import PlacedRectangle
 from drivers.simulated.simulation import Simulation
-from drivers.simulated.surface import surface_points
 from tests import reference
 from tests.tracker.driving import default_plan, drive, frame_set, mean_errors, rig_of, simulate
 

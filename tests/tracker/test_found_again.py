@@ -4,7 +4,7 @@ import pytest
 
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import flexpad, nurbs, posed, rigid
-from abs_service.tracking import Tracking
+from abs_service.tracking.session import Tracking
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 
 

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.search.cma_update import Constants, absorb, normal_quantiles, propose, update
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=25, deadline=None)

@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.observation import Observer
+from abs_service.pairing.observation import Observer
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.estimate import Status
-from abs_service.tracker.initialization import sight
 from abs_service.tracker.models import gravity, posed
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracker.sighting import Sighting, SightingError
-from abs_service.tracker.strip import Strip, find_strip
-from abs_service.tracking import Tracking
+from abs_service.tracking.session import Tracking
 from calib import pose
 from calib.camera import Camera
-from drivers.simulated.strip import PlacedStrip
+from drivers.simulated.shapes.strip import PlacedStrip
 from tests import reference
 from tests.tracker.driving import default_plan, drive, frame_set, mean_errors, rig_of, simulate
 

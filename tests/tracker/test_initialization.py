@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.images import ColorImage
-from abs_service.tracker.grid import LEAST_VERTICES, grid_mesh
-from abs_service.tracker.initialization import sight
-from abs_service.tracker.regions import nearest
-from abs_service.tracker.sighting import Sighting, SightingError
+from abs_service.pairing.images import ColorImage
+from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.regions import nearest
 from calib import pose
 from calib.camera import Camera
 from calib.noise.color import GaussianColor

@@ -5,16 +5,16 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.strip_detection import Strip
 from abs_service.tracker.models import nurbs
-from abs_service.tracker.models.arc import SMALL, arc
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracker.models.nurbs import Nurbs
+from abs_service.tracker.models.parts.arc import SMALL, arc
 from abs_service.tracker.models.posed import Posed
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.strip import Strip
 from calib import pose
 from tests import reference
 from tests.tracker.differences import central_differences, change

@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ColorImage
+from abs_service.pairing.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.depth_cost import FREE_SCALE_M, write_constants
+from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, write_constants
+from abs_service.tracker.terms.photometric.color import ColorTerm
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

@@ -5,23 +5,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models.base import Moves
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.priors import MotionPrior
-from abs_service.tracker.priors import Settings as PriorSettings
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.priors import MotionPrior
+from abs_service.tracker.posterior.priors import Settings as PriorSettings
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
+from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.illumination import Passive
 from abs_service.tracker.terms.linearization import Linearization, PointLinearization, stack
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.illumination import Passive
 from calib.camera import Camera
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor

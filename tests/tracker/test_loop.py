@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.chain import Step
+from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.optimizers.base import Budget
 from abs_service.tracker.optimizers.cma_es import AT_ONCE, CmaEs
-from abs_service.tracker.optimizers.course import PATIENCE, Course
+from abs_service.tracker.optimizers.search.convergence import PATIENCE, Course
 from calib.jit import kernel
 from tests.tracker.problems import Known
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.loss import LossWatch, Settings
-from abs_service.tracking import Tracking
-from drivers.frame import Frame, Kind
+from abs_service.tracking.loss_monitor import LossWatch, Settings
+from abs_service.tracking.session import Tracking
+from drivers.contract.frame import Frame, Kind
 from tests.tracker.driving import default_plan, drive, rig_of, simulate
 from tests.tracker.scenes import sheet
 

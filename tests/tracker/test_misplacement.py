@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models import rigid
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis import dense
 from abs_service.tracker.synthesis.base import View
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.illumination import Passive
-from abs_service.tracker.terms.misplacement import NO_WIDENING, Misplacement, Widening
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.illumination import Passive
+from abs_service.tracker.terms.photometric.texture_registration_noise import NO_WIDENING, Misplacement, Widening
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor

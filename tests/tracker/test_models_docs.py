@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from abs_service import plugins
-from abs_service.tracker.models import bends
-from abs_service.tracker.rectangle import LARGEST_BOW_M, LEAST_OVERLAP
+from abs_service.config import plugins
+from abs_service.tracker.detection.rectangle_fit import LARGEST_BOW_M, LEAST_OVERLAP
+from abs_service.tracker.models.parts import bends
 
 PACKAGE = "abs_service.tracker.models"
 PAGE = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")

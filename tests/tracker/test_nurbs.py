@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
-from abs_service.tracker.models.binding import bind
 from abs_service.tracker.models.nurbs import Nurbs, Settings
+from abs_service.tracker.models.parts.binding import bind
 from calib import pose
 from tests import reference
 from tests.tracker.scenes import flat, sheet, wave

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.evaluation.occlusion import occlusion
+from evaluation.studies.occlusion import occlusion
 
 
 @pytest.mark.slow

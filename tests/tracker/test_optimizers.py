@@ -5,7 +5,7 @@ import pytest
 
 from abs_service.tracker.optimizers.cma import Cma
 from abs_service.tracker.optimizers.cma_es import FORGOTTEN, CmaEs
-from abs_service.tracker.optimizers.evolution import Strategy, usual_population
+from abs_service.tracker.optimizers.search.evolution import Strategy, usual_population
 
 
 @pytest.fixture(params=[Cma, CmaEs], ids=["cma", "cma_es"])

@@ -13,10 +13,10 @@ from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.making import make_term
-from abs_service.tracker.terms.outline import RimOutline, inwards
-from abs_service.tracker.terms.rim import Rim, look_up
-from abs_service.tracker.visibility import classify
+from abs_service.tracker.terms.depth.outline import RimOutline, inwards
+from abs_service.tracker.terms.depth.rim import Rim, look_up
+from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.factory import make_term
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from calib.rig import Sensor

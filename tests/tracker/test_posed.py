@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service import config
-from abs_service.commands import plans
-from abs_service.tracker.curvature import gauss_newton, search_metric
+from abs_service import config, wiring
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
@@ -21,14 +20,14 @@ from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
-from abs_service.tracker.priors import MotionPrior
-from abs_service.tracker.priors import Settings as PriorSettings
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
+from abs_service.tracker.posterior.priors import MotionPrior
+from abs_service.tracker.posterior.priors import Settings as PriorSettings
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization, stack
-from abs_service.tracking import Tracking
+from abs_service.tracking.session import Tracking
 from calib import pose
-from drivers.simulated.rectangle import Rectangle
+from drivers.simulated.shapes.rectangle import Rectangle
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 from tests.tracker.scenes import sheet
 
@@ -181,7 +180,7 @@ def test_a_configuration_nests_the_shape():
     assert rig.trackers["sheet"].model == posed.Settings(nurbs.Settings(control_points=(5, 3)))
     assert loads('type = "posed"\nshape = { type = "nurbs", control_points = [5, 3] }') == rig
     assert config.loads(config.to_toml(rig), "again", Path("/elsewhere")) == rig
-    assert plans.model_name(rig, "sheet") == "posed"
+    assert wiring.model_name(rig, "sheet") == "posed"
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from abs_service.tracker.curvature import search_metric
-from abs_service.tracker.posterior import NEAR
+from abs_service.tracker.posterior.curvature import search_metric
+from abs_service.tracker.posterior.posterior import NEAR
 from abs_service.tracker.terms.linearization import stack
 from tests.tracker.test_tracking import SHEET, drive, tracking
 

@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import Moves
-from abs_service.tracker.priors import (
+from abs_service.tracker.posterior.priors import (
     FIRST_INTERVAL_S,
     LONGEST_INTERVAL_S,
     MotionPrior,
     Settings,
     ShapePrior,
 )
-from abs_service.tracker.stretch import StretchPrior
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from tests.tracker.scenes import as_surface, flat, sheet
 

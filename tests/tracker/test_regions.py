@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.tracker.regions import box, mask, nearest
-from abs_service.tracker.sighting import SightingError
+from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.regions import box, mask, nearest
 
 SHAPE = (48, 64)
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import DepthImage
+from abs_service.pairing.images import DepthImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.relief import FixedRelief, LearntRelief, Settings
+from abs_service.tracking.vertex_offsets import FixedRelief, LearntRelief, Settings
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from calib.rig import Sensor
@@ -87,7 +87,7 @@ def test_without_drift_or_offsets_nothing_is_learnt():
 
 @pytest.mark.slow
 def test_a_simulated_sheet_s_surface_is_known_better():
-    from abs_service.tracking import Tracking
+    from abs_service.tracking.session import Tracking
     from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 
     simulation = simulate("simulated://sheet?seed=1")

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.relocation import laid_over
-from abs_service.tracker.sheet import Sheet
+from abs_service.tracker.posterior.relocation import laid_over
 from calib import pose
 from tests.tracker.scenes import flat, sheet
 

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.rectangle_fit import LEAST_PIXELS, find_sheet
+from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models.flexpad import Settings
-from abs_service.tracker.rectangle import LEAST_PIXELS, find_sheet
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.sighting import Sighting, SightingError
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

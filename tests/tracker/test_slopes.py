@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.slopes import Relief, half_pixel, surroundings
+from abs_service.tracker.synthesis.attribute_gradients import Relief, half_pixel, surroundings
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera

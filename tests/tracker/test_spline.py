@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.models import spline
+from abs_service.tracker.models.parts import spline
 from tests import reference
 
 sizes = st.tuples(st.integers(1, 4), st.integers(0, 8)).map(lambda pair: (pair[0], max(3, pair[0] + 1) + pair[1] % 8))

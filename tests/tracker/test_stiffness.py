@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from abs_service.tracker.detection.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracker.stiffness import (
+from abs_service.tracking.stiffness import (
     LEAST_FRAMES,
     Hanging,
     StiffnessError,
@@ -14,8 +15,7 @@ from abs_service.tracker.stiffness import (
     hanging,
     predicted_tip,
 )
-from abs_service.tracker.strip import Strip
-from drivers.simulated.elastica import hang
+from drivers.simulated.shapes.elastica import hang
 
 SIGMA = 0.02
 DOWN = np.array([0.0, 1.0, 0.0])

@@ -9,7 +9,7 @@ from scipy.stats import mannwhitneyu
 
 from abs_service.tracker.optimizers.cma import Cma
 from abs_service.tracker.optimizers.cma_es import CmaEs
-from abs_service.tracker.optimizers.evolution import Strategy, usual_population
+from abs_service.tracker.optimizers.search.evolution import Strategy, usual_population
 
 DIMENSION = 8
 RUNS = 24

@@ -5,19 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.illumination import Active, Passive
-from abs_service.tracking import Tracking
+from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.illumination import Active, Passive
+from abs_service.tracking.session import Tracking
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -26,7 +26,7 @@ from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
-from drivers.simulated.optics import OPTICS
+from drivers.simulated.sensors.optics import OPTICS
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 from tests.tracker.scenes import as_surface, depth_image, flat, observation, plane_distance, sheet
 

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS, ONE_CHANNEL
+from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.illumination import Passive
+from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.illumination import Passive
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

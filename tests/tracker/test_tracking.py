@@ -9,10 +9,10 @@ from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracking import Tracking, streams
-from abs_service.warmup import warm_up
-from drivers.frame import Frame, Kind
-from drivers.simulated.view import View
+from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.warmup import warm_up
+from drivers.contract.frame import Frame, Kind
+from drivers.simulated.sensors.view import View
 from tests.tracker.driving import CONFIG, Step, default_plan, drive, mean_errors, rig_of, simulate
 
 SHEET = simulate("simulated://sheet?seed=1")

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker import uncertainty
-from abs_service.tracker.curvature import gauss_newton, posterior_covariance
-from abs_service.tracker.grid import grid_mesh
+from abs_service.tracker.detection.grid_mesh import grid_mesh
+from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import Moves
-from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.posterior.covariance import propagated, remaining, sandwich
+from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
-from tests.evaluation.posterior import coverage
+from evaluation.studies.posterior import coverage
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
 from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
 
@@ -26,7 +26,7 @@ def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
     rows = generator.standard_normal((12, 4))
     covariance = posterior_covariance(gauss_newton([Linearization(np.zeros(12), rows)], 4))
     jacobian = generator.standard_normal((5, 3, 4))
-    found = uncertainty.propagated(Moves.full(jacobian), covariance)
+    found = propagated(Moves.full(jacobian), covariance)
     solutions = jacobian @ np.linalg.pinv(rows)  # what unit noise of every measurement does to a vertex
     np.testing.assert_allclose(found, solutions @ solutions.transpose(0, 2, 1), rtol=1e-6, atol=1e-9 * found.max())
 
@@ -37,7 +37,7 @@ def test_what_remains_of_the_meshs_own_errors_is_that_of_the_definition(seed):
     jacobian, response = generator.standard_normal((7, 3, 6)), generator.standard_normal((6, 7))
     normals, deviation = generator.standard_normal((7, 3)), generator.uniform(0.1, 1, 7)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    found = uncertainty.remaining(normals, deviation, jacobian, response)
+    found = remaining(normals, deviation, jacobian, response)
     for v in range(7):
         expected = 0.0
         for w in range(7):
@@ -54,7 +54,7 @@ def test_least_squares_corrects_the_projection_of_the_meshs_own_errors_and_leave
     jacobian = np.zeros((9, 3, 4))
     jacobian[:, 2] = heights
     response = -np.linalg.inv(heights.T @ heights) @ heights.T * 0.5
-    found = uncertainty.remaining(np.tile([0.0, 0.0, 1.0], (9, 1)), np.full(9, 0.5), jacobian, response)
+    found = remaining(np.tile([0.0, 0.0, 1.0], (9, 1)), np.full(9, 0.5), jacobian, response)
     projection = heights @ np.linalg.pinv(heights)
     np.testing.assert_allclose(found, 0.25 * (1 - np.diag(projection)), rtol=1e-6, atol=1e-9)
 
@@ -67,7 +67,7 @@ def test_the_sandwich_is_that_of_the_definition(seed):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows + prior), np.float64)
     leverage = np.diag(rows @ inverse @ rows.T)
     expected = inverse @ (rows.T @ np.diag(residual**2 / (1 - leverage)) @ rows + prior) @ inverse
-    found = uncertainty.sandwich(inverse, [Linearization(residual, rows)])
+    found = sandwich(inverse, [Linearization(residual, rows)])
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
     assert np.linalg.eigvalsh(found).min() > 0
 
@@ -80,7 +80,7 @@ def test_the_sandwich_learns_the_noise_that_the_residuals_show(factor):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     fit = np.eye(200) - rows @ inverse @ rows.T
     draws = [fit @ (factor * generator.standard_normal(200)) for _ in range(100)]
-    mean = np.mean([uncertainty.sandwich(inverse, [Linearization(residual, rows)]) for residual in draws], axis=0)
+    mean = np.mean([sandwich(inverse, [Linearization(residual, rows)]) for residual in draws], axis=0)
     np.testing.assert_allclose(mean, factor**2 * inverse, atol=0.05 * factor**2 * np.diag(inverse).max())
 
 

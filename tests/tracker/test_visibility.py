@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from abs_service.images import ColorImage
+from abs_service.pairing.images import ColorImage
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.synthesis.raster import Raster
+from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import FREE_SCALE_M, DepthTerm
-from abs_service.tracker.terms.shadow import Shadow
-from abs_service.tracker.visibility import classify
+from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
+from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

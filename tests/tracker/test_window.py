@@ -5,20 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.images import ChannelImage, ColorImage
-from abs_service.readers import BAYER_ORDERS
+from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.priors import MotionPrior, Settings
+from abs_service.tracker.posterior.priors import MotionPrior, Settings
 from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.raster import Raster
+from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, around, placed
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.channel import ChannelTerm
-from abs_service.tracker.terms.color import ColorTerm
-from abs_service.tracker.terms.depth import DepthTerm
-from abs_service.tracker.terms.illumination import Passive
-from abs_service.tracker.terms.outline import RimOutline
-from abs_service.tracker.terms.rim import Rim
+from abs_service.tracker.terms.depth.depth import DepthTerm
+from abs_service.tracker.terms.depth.outline import RimOutline
+from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.photometric.channel import ChannelTerm
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.illumination import Passive
 from calib.camera import Camera
 from calib.noise.base import write_texture
 from calib.noise.bayer import GaussianBayer

@@ -25,16 +25,16 @@ import cv2
 from rich.console import Console
 
 from abs_service import config
-from abs_service.calibration import target_file
-from abs_service.calibration.collecting import Collector
-from abs_service.calibration.guide import Guide, LineGuide, LiveGuide, coverage_map
-from abs_service.calibration.live_shots import LiveShots, Wired
-from abs_service.calibration.seeing import see
-from abs_service.calibration.shot_recording import ShotFileError, ShotRecording
-from abs_service.calibration.shots import SOUGHT, Shot
-from abs_service.commands import participant, rig_devices
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.calibration.files import target_file
+from abs_service.calibration.shots.collection import Collector
+from abs_service.calibration.shots.corner_extraction import see
+from abs_service.calibration.shots.guide import Guide, LineGuide, LiveGuide, coverage_map
+from abs_service.calibration.shots.live_shots import LiveShots, Wired
+from abs_service.calibration.shots.shot_recording import ShotFileError, ShotRecording
+from abs_service.calibration.shots.shots import SOUGHT, Shot
+from abs_service.commands import rig_devices, rig_process
 from abs_service.report.content import Level
-from abs_service.stamps import Speaker, WallClock
 from calib.board.target import Target
 from calib.camera import Camera
 from drivers.opening import open_device
@@ -54,9 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Collects views until there are enough."""
-    rig = participant.load_config(arguments)
+    rig = rig_process.load_config(arguments)
     target = target_file.read(arguments.target)
-    stop = participant.stop_on_signals()
+    stop = rig_process.stop_on_signals()
     end_ns = time.monotonic_ns() + arguments.limit_s * 1e9
     console = Console(stderr=True)
     with opened(rig, arguments.config) as (devices, cameras):

@@ -19,12 +19,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from abs_service import keys
-from abs_service.calibration import exchange, rig_file
+from abs_service.bus import keys
+from abs_service.calibration.files import exchange, rig_file
 from abs_service.commands import calibrations
-from abs_service.exits import Exit
-from abs_service.problems import none_of
+from abs_service.config.problems import none_of
 from abs_service.report import provenance
+from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized

@@ -17,8 +17,8 @@ from dataclasses import replace
 
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.solving import Material, SolveOptionError
-from abs_service.problems import none_of
-from calib.solve.tasks import Task
+from abs_service.config.problems import none_of
+from calib.solve.bundle.tasks import Task
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

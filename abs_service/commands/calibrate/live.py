@@ -6,8 +6,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from abs_service import config
-from abs_service.calibration.live_shots import LiveShots
-from abs_service.calibration.seeing import Seen
+from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.live_shots import LiveShots
 from abs_service.commands.calibrate.capture import opened
 from calib.board import coverage
 from calib.camera import Camera

@@ -33,16 +33,18 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from abs_service import plugins
-from abs_service.calibration import claims, noise, noise_report, placing, sequences, target_file, toml_text
+from abs_service.calibration.files import target_file, toml_text
+from abs_service.calibration.noise import board_poses, measurement, report, sigma_consistency
+from abs_service.calibration.shots import sequences
 from abs_service.commands import calibrations, camera_file
-from abs_service.exits import Exit
+from abs_service.config import plugins
 from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
+from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.placed import Placed
-from drivers.frame import Geometry
+from drivers.contract.frame import Geometry
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 
@@ -89,7 +91,7 @@ def run(arguments: argparse.Namespace) -> int:
     worst = Exit.OK
     for number, (setting, group) in enumerate(groups.items()):
         with console.status("learning") as status:
-            found = noise.calibrate(
+            found = measurement.calibrate(
                 [one for one, _ in group],
                 [where for _, where in group],
                 _region(arguments, group[0][0].lengths.shape[1:]),
@@ -98,7 +100,9 @@ def run(arguments: argparse.Namespace) -> int:
             )
         sensor = group[0][0].sensor
         out = _out(arguments.out, sensor, number)
-        made = noise_report.report(sensor, found, tuple(c for one, _ in group for c in claims.of_sequence(one)), trace)
+        made = report.report(
+            sensor, found, tuple(c for one, _ in group for c in sigma_consistency.of_sequence(one)), trace
+        )
         written = [*_write_model(found, sensor, out), *page.write(made, out)]
         _say(made, setting if len(groups) > 1 else "", written, arguments.json)
         worst = max(worst, int(made.level))
@@ -116,7 +120,7 @@ def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Seq
     for source, depth in zip(arguments.sources, depths):
         for one in _read(source, arguments):
             seen = sequences.with_cameras(one, cameras)
-            where = depth if target is None else placing.placed(target, seen)
+            where = depth if target is None else board_poses.placed(target, seen)
             groups.setdefault(seen.exposure, []).append((seen, where))
     return groups
 
@@ -169,7 +173,7 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
     return region
 
 
-def _write_model(found: noise.Found, sensor: str, out: Path) -> list[Path]:
+def _write_model(found: measurement.Found, sensor: str, out: Path) -> list[Path]:
     """The table for the rig file, and the maps that it names."""
     toml, written, model = out.with_suffix(".toml"), [], found.model
     try:

@@ -20,8 +20,8 @@ from collections.abc import Iterable
 
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.solving import Material, SolveOptionError
-from abs_service.problems import none_of
-from calib.solve.tasks import Task
+from abs_service.config.problems import none_of
+from calib.solve.bundle.tasks import Task
 
 #: What `--depth-terms` may say.
 TERMS = {"offset": ("depth_offset",), "scale": ("depth_scale",), "both": ("depth_offset", "depth_scale")}

@@ -11,22 +11,24 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from abs_service.calibration import rig_file, seeing, solve_report, target_file
-from abs_service.calibration.rig_file import SensorCalibration
-from abs_service.calibration.seeing import Seen
-from abs_service.calibration.shot_sources import FolderShots, RecordingShots
-from abs_service.calibration.shots import Shot
+from abs_service.calibration.cameras import report
+from abs_service.calibration.files import rig_file, target_file
+from abs_service.calibration.files.rig_file import SensorCalibration
+from abs_service.calibration.shots import corner_extraction
+from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
+from abs_service.calibration.shots.shots import Shot
 from abs_service.commands import calibrations
 from abs_service.commands.calibrate import live
-from abs_service.exits import Exit
-from abs_service.problems import none_of
+from abs_service.config.problems import none_of
 from abs_service.report import page, provenance
+from abs_service.supervision.exit_codes import Exit
 from calib.board import coverage
 from calib.camera import Camera
+from calib.solve.bundle.lens_parameters import KINDS, kind_of
+from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
-from calib.solve.lenses import KINDS, kind_of
-from calib.solve.tasks import SensorTask, Task
-from calib.solve.verdict import assess
+from calib.solve.validation.verdict import assess
 from calib.solve.weights import shared
 from drivers.replay.recording import Recording
 
@@ -99,7 +101,7 @@ def material(arguments: argparse.Namespace) -> Material:
         is_live = live.is_live(arguments.source)
         seen = Seen()
         for shot in shots:
-            new = seeing.see(target, shot, cameras)
+            new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
                 continue
             seen += new
@@ -153,9 +155,9 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     data = [path for path in (*found.data, arguments.target) if path.exists()]
     origin = provenance.trace(sys.argv[1:], data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
-    made = solve_report.calibration(name, origin, solution, assessment.trusted, found.known)
+    made = report.calibration(name, origin, solution, assessment.trusted, found.known)
     notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.refused.items()]
-    result = solve_report.report(title, origin, solution, assessment, notes)
+    result = report.report(title, origin, solution, assessment, notes)
     written = [*rig_file.write(made, arguments.out), *page.write(result, arguments.out)]
     if arguments.json:
         files = [str(path) for path in written]
@@ -169,7 +171,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
 
 def _usual(reference: str, solution) -> float:
     """The distance in the middle of where the boards were, from the reference."""
-    from calib.solve.projection import reach  # noqa: PLC0415
+    from calib.solve.validation.projection_uncertainty import reach  # noqa: PLC0415
 
     return round(math.fsum(reach(solution, reference)) / 2, 2)
 

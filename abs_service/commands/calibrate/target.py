@@ -19,8 +19,8 @@ import json
 from dataclasses import fields, replace
 from pathlib import Path
 
-from abs_service.calibration import sheet, target_file
-from abs_service.exits import Exit
+from abs_service.calibration.files import board_sheet, target_file
+from abs_service.supervision.exit_codes import Exit
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError, outline
 
 #: Papers by name: width and height, upright [m].
@@ -80,10 +80,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise TargetOptionError(f"--out = {arguments.out}: must end in .pdf or .svg")
     target = _target(arguments)
     width, height = sorted(arguments.paper, reverse=_is_wide(target))
-    page = sheet.lay_out(target, width, height, _words(target))
+    page = board_sheet.lay_out(target, width, height, _words(target))
     description = arguments.out.with_suffix(".toml")
     target_file.write(target, description)
-    sheet.write(page, arguments.out)
+    board_sheet.write(page, arguments.out)
     if arguments.json:
         written = {"page": str(arguments.out), "description": str(description), "target": target_file.to_table(target)}
         print(json.dumps(written))

@@ -18,12 +18,13 @@ import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from abs_service.calibration import target_file, verification
-from abs_service.calibration.rig_file import RigCalibration
-from abs_service.calibration.seeing import Seen, see
-from abs_service.calibration.shot_sources import FolderShots, RecordingShots
-from abs_service.calibration.shots import Shot
-from abs_service.commands import calibrations, participant
+from abs_service.calibration.cameras import verification
+from abs_service.calibration.files import target_file
+from abs_service.calibration.files.rig_file import RigCalibration
+from abs_service.calibration.shots.corner_extraction import Seen, see
+from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
+from abs_service.calibration.shots.shots import Shot
+from abs_service.commands import calibrations, rig_process
 from abs_service.commands.calibrate import live
 from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
@@ -102,7 +103,7 @@ def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[st
     """What shots of running devices show that differ, until there are enough of them or a signal says to stop."""
     if arguments.shots < 1:
         raise VerifyOptionError(f"--shots {arguments.shots}: must be 1 at least")
-    stop = participant.stop_on_signals()
+    stop = rig_process.stop_on_signals()
     seen = Seen()
     with live.streaming(arguments.source, cameras, stop.is_set) as (shots, there):
         if not set(there) & set(cameras):

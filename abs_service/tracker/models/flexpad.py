@@ -7,15 +7,15 @@ import numpy as np
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step, deforming
-from abs_service.tracker.models import bends
+from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.rectangle_fit import find_sheet
+from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.fused_cost import Step, deforming
 from abs_service.tracker.models.base import BOARD, Moves, Surface
-from abs_service.tracker.models.bends import bend, roll, slopes
-from abs_service.tracker.models.placing import place
-from abs_service.tracker.models.tiles import LANES, TILE, write
-from abs_service.tracker.rectangle import find_sheet
-from abs_service.tracker.sheet import Sheet
-from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.models.parts import bends
+from abs_service.tracker.models.parts.bends import bend, roll, slopes
+from abs_service.tracker.models.parts.rigid_transform import place
+from abs_service.tracker.models.parts.tile_buffer import LANES, TILE, write
 from calib import pose
 from calib.jit import composed, kernel, prange
 

@@ -8,10 +8,10 @@ import scipy  # its parts are imported when they are first used
 from annotated_types import Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.arc import arc
+from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.models.base import Moves, Surface
-from abs_service.tracker.sighting import Sighting
-from abs_service.tracker.strip import Strip, find_strip
+from abs_service.tracker.models.parts.arc import arc
 from calib import pose
 from calib.jit import kernel, prange
 from calib.pose import Pose

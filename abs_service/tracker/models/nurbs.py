@@ -7,13 +7,13 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
-from abs_service.tracker.grid import grid_mesh
+from abs_service.tracker.detection.grid_mesh import grid_mesh
+from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models import binding, spline
 from abs_service.tracker.models.base import BOARD, ModelError, Moves, Surface
-from abs_service.tracker.models.patches import Patches
-from abs_service.tracker.sighting import Sighting
+from abs_service.tracker.models.parts import binding, spline
+from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]

@@ -7,8 +7,8 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.models.base import DeformationModel, Moves, Surface
-from abs_service.tracker.sighting import Sighting
 from calib import pose
 from calib.jit import kernel, prange
 

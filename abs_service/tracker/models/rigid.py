@@ -6,10 +6,10 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.grid import grid_mesh
+from abs_service.tracker.detection.grid_mesh import grid_mesh
+from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, Moves, Surface
-from abs_service.tracker.sighting import Sighting
 from calib import pose
 
 

@@ -6,8 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import Observation
-from abs_service.tracker.chain import Step, available, step_of
+from abs_service.pairing.observation import Observation
+from abs_service.tracker.fused_cost import Step, available, step_of
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import SensorFit, Term

@@ -11,7 +11,7 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
-from abs_service.tracker.terms.making import make_term
+from abs_service.tracker.terms.factory import make_term
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier

@@ -10,8 +10,8 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.making import make_term
-from abs_service.tracker.terms.misplacement import Misplacement
+from abs_service.tracker.terms.factory import make_term
+from abs_service.tracker.terms.photometric.texture_registration_noise import Misplacement
 from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
 

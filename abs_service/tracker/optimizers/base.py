@@ -8,8 +8,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
-from abs_service.tracker.curvature import Quadratic
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.posterior.curvature import Quadratic
 
 
 class Problem(Protocol):

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.optimizers.base import Budget, Problem
-from abs_service.tracker.optimizers.course import Course
-from abs_service.tracker.optimizers.evolution import (
+from abs_service.tracker.optimizers.search.convergence import Course
+from abs_service.tracker.optimizers.search.evolution import (
     Evolution,
     EvolutionSettings,
     Schedule,

@@ -7,18 +7,18 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.chain import Step
+from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.optimizers.base import Budget, Problem
-from abs_service.tracker.optimizers.course import Course
-from abs_service.tracker.optimizers.evolution import (
+from abs_service.tracker.optimizers.search.cma_update import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.search.convergence import Course
+from abs_service.tracker.optimizers.search.evolution import (
     Evolution,
     EvolutionSettings,
     Schedule,
     advance_by_one,
     usual_population,
 )
-from abs_service.tracker.optimizers.generation import Constants, absorb, normal_quantiles, propose, update
-from abs_service.tracker.optimizers.loop import Distribution, generations
+from abs_service.tracker.optimizers.search.generation_loop import Distribution, generations
 from calib.jit import composed
 
 

@@ -8,11 +8,18 @@ import numpy as np
 from annotated_types import Ge, Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.curvature import search_metric
 from abs_service.tracker.optimizers.base import Budget, Outcome, Problem
 from abs_service.tracker.optimizers.cma_es import CmaEs
-from abs_service.tracker.optimizers.evolution import SIGNIFICANT, Make, Schedule, evolve, explore, usual_population
-from abs_service.tracker.optimizers.levenberg_marquardt import descend
+from abs_service.tracker.optimizers.search.evolution import (
+    SIGNIFICANT,
+    Make,
+    Schedule,
+    evolve,
+    explore,
+    usual_population,
+)
+from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
+from abs_service.tracker.posterior.curvature import search_metric
 
 #: Step size with which CMA-ES goes on in the next frame, at least, as a share of the first one.
 LEAST_STEP = 0.5

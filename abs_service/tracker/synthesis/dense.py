@@ -7,15 +7,15 @@ import numpy as np
 from annotated_types import Interval
 from numpy.typing import NDArray
 
-from abs_service.observation import Observation
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
-from abs_service.tracker.synthesis.raster import Raster
-from abs_service.tracker.synthesis.texturing import lattice, paint
+from abs_service.tracker.synthesis.rasterization.raster import Raster
+from abs_service.tracker.synthesis.rasterization.texturing import lattice, paint
+from abs_service.tracker.synthesis.rasterization.zbuffer import Samples, interpolate, render
 from abs_service.tracker.synthesis.window import Window, around
-from abs_service.tracker.synthesis.zbuffer import Samples, interpolate, render
 from calib.camera import Camera
 from calib.rig import Rig
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.observation import Observation
-from abs_service.tracker.chain import Step
+from abs_service.pairing.observation import Observation
+from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.attribute_gradients import LEVEL, Relief, Slopes, half_pixel, surroundings
 from abs_service.tracker.synthesis.base import Sight, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
-from abs_service.tracker.synthesis.raster import Raster
+from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.sampling import lens_kind, sampler, see
-from abs_service.tracker.synthesis.slopes import LEVEL, Relief, Slopes, half_pixel, surroundings
 from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
 from calib.rig import Rig

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.images import DepthImage
-from abs_service.observation import Observation
+from abs_service.pairing.images import DepthImage
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError, Moves, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View

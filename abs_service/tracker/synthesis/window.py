@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.projection import Projection
-from abs_service.tracker.synthesis.zbuffer import extent
+from abs_service.tracker.synthesis.rasterization.zbuffer import extent
 from calib.camera import Camera
 from calib.jit import kernel
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.images import BeamReading, Image
+from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.base import Bounds, SensorFit
 from abs_service.tracker.terms.linearization import PointLinearization

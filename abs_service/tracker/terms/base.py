@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.images import Image
+from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import Moves, Surface
 from abs_service.tracker.terms.linearization import Linear
-from calib.noise.truncation import deviation_within
+from calib.noise.fit.truncation import deviation_within
 
 #: Residuals up to this many deviations count as explained by the sensor's noise.
 INLIER_DEVIATIONS = 3.0

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from drivers.device import Device
+from drivers.contract.device import Device
 from tests.drivers.conformance import BEFORE, Fault
 from tests.drivers.kinect1.emulator import FORMS, EmulatedKinect, noise
 from tests.drivers.kinect1.film import Film, begin

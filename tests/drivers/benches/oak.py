@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.device import Device
-from drivers.errors import SdkMissingError
+from drivers.contract.device import Device
+from drivers.contract.errors import SdkMissingError
 from drivers.oak import library, playback
 from drivers.oak.address import parse
 from drivers.oak.connection import Connection

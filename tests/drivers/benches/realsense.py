@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from drivers.device import Device
-from drivers.errors import SdkMissingError
+from drivers.contract.device import Device
+from drivers.contract.errors import SdkMissingError
 from drivers.realsense import library
 from drivers.realsense.opening import about, of_device
 from tests.drivers.conformance import BEFORE, Fault

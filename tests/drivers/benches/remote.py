@@ -9,15 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service import announcements, keys
+from abs_service.bus import keys
 from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.session import Role
+from abs_service.bus.stamps import Speaker, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.envelope import CONFIG, MODEL
-from abs_service.stamps import Speaker, WallClock
-from drivers.device import Device
-from drivers.frame import Frame, Kind
+from abs_service.capture import sensor_metadata
+from abs_service.wire.message_header import CONFIG, MODEL
+from drivers.contract.device import Device
+from drivers.contract.frame import Frame, Kind
 from drivers.opening import open_device
 from tests.drivers.conformance import Fault
 from tests.drivers.recordings import CAMERAS, SIMULATION
@@ -35,9 +36,9 @@ class Peer:
         self.bus = ZenohBus.open(rig, endpoint, role, shared_memory=False)
         speaker = Speaker(rig, WallClock())
         self.publisher = FramePublisher(self.bus, speaker, "sim")
-        model = announcements.sensor_model(speaker.now(0), "tof", CAMERAS["tof"], {})
+        model = sensor_metadata.sensor_model(speaker.now(0), "tof", CAMERAS["tof"], {})
         self.bus.announce(keys.model("tof"), MODEL).put(model.SerializeToString())
-        toml = announcements.config(speaker.now(0), '[sensors.tof]\ndevice = "sim"\n')
+        toml = sensor_metadata.config(speaker.now(0), '[sensors.tof]\ndevice = "sim"\n')
         self.bus.announce(keys.CONFIG, CONFIG).put(toml.SerializeToString())
         self.alive: Subscription = self.bus.show_alive("capture")
         self.frames = [frame for frame in SIMULATION.frames(0) if frame.sensor == "tof"]

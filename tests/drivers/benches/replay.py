@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.device import Device, Truth
-from drivers.frame import Frame
+from drivers.contract.device import Device, Truth
+from drivers.contract.frame import Frame
 from drivers.opening import open_device
 from tests.drivers import recordings
 from tests.drivers.conformance import BEFORE, Fault

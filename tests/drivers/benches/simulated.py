@@ -4,7 +4,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from drivers.device import Device
+from drivers.contract.device import Device
 from drivers.opening import open_device
 from tests.drivers.conformance import BEFORE, Fault
 

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from drivers.kinect1.packets import COLOR, DEPTH, INFRARED, PacketFormat
+from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PacketFormat
 from tests.drivers.kinect1.film import Film
 from tests.drivers.kinect1.packing import pack
 

@@ -10,8 +10,8 @@ import zlib
 from collections import Counter, defaultdict
 from dataclasses import asdict, dataclass
 
-from drivers.device import Device, DeviceState, Truth
-from drivers.frame import Frame
+from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.frame import Frame
 from drivers.kinect1 import open_device
 from drivers.kinect1.reference_plane import ReferencePlane
 from tests.drivers.kinect1.emulator import EmulatedKinect, noise

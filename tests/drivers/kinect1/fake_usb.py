@@ -11,7 +11,7 @@ import numpy as np
 import usb.backend
 import usb.core
 
-from drivers.kinect1.transfer import MICROFRAME_NS, GoneError, Transfer
+from drivers.kinect1.transport.transfer import MICROFRAME_NS, GoneError, Transfer
 from tests.drivers.kinect1 import descriptors
 from tests.drivers.kinect1.emulator import EmulatedKinect
 

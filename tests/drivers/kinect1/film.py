@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from drivers.kinect1.packets import HEADER_BYTES, PACKET_BYTES, PacketFormat
+from drivers.kinect1.transport.packets import HEADER_BYTES, PACKET_BYTES, PacketFormat
 
 #: Microframes per second, and images per second of all formats that are emulated.
 MICROFRAMES_HZ, RATE_HZ = 8000, 30

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from drivers.device import Device, DeviceError, DeviceState
-from drivers.discovery import Availability
-from drivers.frame import Frame
+from drivers.contract.device import Device, DeviceError, DeviceState
+from drivers.contract.discovery import Availability
+from drivers.contract.frame import Frame
 from drivers.kinect1 import discover, open_device, unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
 from tests.drivers.conformance import eventually, resources

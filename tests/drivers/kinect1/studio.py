@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from calib.pose import Pose
 from drivers.kinect1.reference_plane import NO_RETURN, ReferencePlane
-from drivers.simulated.bayer import Bayer
-from drivers.simulated.color import Picture
-from drivers.simulated.exposure import Exposure
-from drivers.simulated.scene import Scene
-from drivers.simulated.structured_light import StructuredLight, StructuredLightNoise
+from drivers.simulated.scene.scene import Scene
+from drivers.simulated.sensors.bayer import Bayer
+from drivers.simulated.sensors.color import Picture
+from drivers.simulated.sensors.exposure import Exposure
+from drivers.simulated.sensors.structured_light import StructuredLight, StructuredLightNoise
 from tests.drivers.kinect1.packing import pack
 
 PLANE = ReferencePlane()

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from drivers.kinect1.assembly import CAUSES, Assembler
-from drivers.kinect1.packets import COLOR, DEPTH, INFRARED, PACKET_BYTES, PacketFormat
+from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PACKET_BYTES, PacketFormat
 from tests.drivers.kinect1.film import Film, begin
 
 #: Images of 4 packets, so that an example of a few packets tells something.

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.device import DeviceError
+from drivers.contract.device import DeviceError
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
-from drivers.kinect1.commands import ANSWER_BYTES, TIMEOUT_S, Commands, ProtocolError
 from drivers.kinect1.reference_plane import ReferencePlane
+from drivers.kinect1.transport.commands import ANSWER_BYTES, TIMEOUT_S, Commands, ProtocolError
 from tests.drivers.kinect1.emulator import EmulatedKinect
 
 

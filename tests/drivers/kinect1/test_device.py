@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.device import AddressError, ControlError, DeviceError, DeviceState
-from drivers.discovery import Availability
-from drivers.frame import Geometry, Kind
+from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState
+from drivers.contract.discovery import Availability
+from drivers.contract.frame import Geometry, Kind
 from drivers.kinect1 import udev
 from drivers.kinect1.address import Address, parse
 from drivers.kinect1.camera import Stream

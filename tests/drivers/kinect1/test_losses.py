@@ -1,6 +1,6 @@
 """People are told of losses that matter, once a window, and when they are over."""
 
-from drivers.kinect1.losses import CONDITION, WINDOW_NS, LossWatch
+from drivers.kinect1.transport.losses import CONDITION, WINDOW_NS, LossWatch
 
 
 def test_losses_that_matter_are_told_and_taken_back() -> None:

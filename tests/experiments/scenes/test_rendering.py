@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from abs_service.experiments.scenes.rendering import Renderer
-from abs_service.experiments.scenes.surfaces import NO_WALL, Sheet, SplineSurface, Wall, knots
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
+from evaluation.scenes.rendering import Renderer
+from evaluation.scenes.surfaces import NO_WALL, Sheet, SplineSurface, Wall, knots
 
 CAMERA = Camera(48, 36, 60.0, 60.0, 23.5, 17.5)
 

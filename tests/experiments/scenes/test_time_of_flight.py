@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from abs_service.experiments.scenes.rendering import View
-from abs_service.experiments.scenes.time_of_flight import LEVELS, RANGE_M, TimeOfFlight, frame_set
-from drivers.frame import Kind
+from drivers.contract.frame import Kind
+from evaluation.scenes.rendering import View
+from evaluation.scenes.time_of_flight import LEVELS, RANGE_M, TimeOfFlight, frame_set
 
 SHAPE = (60, 80)
 

@@ -1,0 +1,126 @@
+"""How a component is: what it counted and measured, and whether it needs help; once a second and at every change."""
+
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from enum import IntEnum
+
+from absmsg.v1 import health_pb2
+
+from abs_service.bus import keys
+from abs_service.bus.contract import EVENTS, Bus
+from abs_service.bus.stamps import Speaker
+
+PERIOD_NS = 1_000_000_000
+
+
+class Level(IntEnum):
+    """How much attention a condition needs."""
+
+    OK = 1
+    WARNING = 2
+    ERROR = 3
+
+
+_WIRE = {
+    Level.OK: health_pb2.Health.LEVEL_OK,
+    Level.WARNING: health_pb2.Health.LEVEL_WARNING,
+    Level.ERROR: health_pb2.Health.LEVEL_ERROR,
+}
+
+
+class Health:
+    """The health of one component.
+
+    Numbers may be entered from any thread. The component's own loop calls `tick`, so that a component that hangs falls
+    silent. A component has several conditions (one per device, say); the worst is its level.
+
+    Args:
+        bus: where to publish.
+        component: capture, record, run or track/<tracker>.
+        speaker: writes the headers; its clock decides when a second is over.
+    """
+
+    def __init__(self, bus: Bus, component: str, speaker: Speaker) -> None:
+        self._publisher = bus.publisher(keys.health(component), health_pb2.Health.DESCRIPTOR.full_name, EVENTS)
+        self._component = component
+        self._speaker = speaker
+        self._counters: Counter[str] = Counter()
+        self._gauges: dict[str, float] = {}
+        self._labels: dict[str, str] = {}
+        self._conditions: dict[str, tuple[Level, str]] = {}
+        self._seq = 0
+        self._next_ns = speaker.clock.monotonic()
+        self._rated: dict[str, tuple[int, int]] = {}
+        # Reentrant because a change of level publishes while it is held: two threads may not overtake each other.
+        self._lock = threading.RLock()
+
+    def count(self, name: str, number: int = 1) -> None:
+        """Adds to a counter."""
+        with self._lock:
+            self._counters[name] += number
+
+    def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
+        """Sets counters to totals that somebody else counts; a total that fell (a new epoch, say) is ignored."""
+        with self._lock:
+            for name, total in totals.items():
+                self._counters[prefix + name] = max(self._counters[prefix + name], total)
+
+    def gauge(self, name: str, value: float) -> None:
+        """Sets a current value; the name ends in its unit."""
+        with self._lock:
+            self._gauges[name] = value
+
+    def rate(self, name: str, total: int) -> None:
+        """Sets the gauge `name` to the rate [Hz] at which `total` grew since the last call."""
+        now_ns = self._speaker.clock.monotonic()
+        with self._lock:
+            then_ns, before = self._rated.get(name, (now_ns, total))
+            self._rated[name] = (now_ns, total)
+            self._gauges[name] = (total - before) * 1e9 / (now_ns - then_ns) if now_ns > then_ns else 0.0
+
+    def label(self, name: str, value: str) -> None:
+        """Sets a name: the file being written, a device's state."""
+        with self._lock:
+            self._labels[name] = value
+
+    def report(self, condition: str, level: Level, message: str = "") -> None:
+        """Says how one condition is, in plain words; a change of level is published at once, all else with `tick`."""
+        with self._lock:
+            before, _ = self._conditions.get(condition, (Level.OK, ""))
+            self._conditions[condition] = (level, message)
+            if level != before:
+                self.publish()
+
+    @property
+    def level(self) -> Level:
+        """The worst condition's level."""
+        with self._lock:
+            return max((level for level, _ in self._conditions.values()), default=Level.OK)
+
+    def due(self) -> bool:
+        """Whether a second is over since `tick` last published: the moment to enter gauges."""
+        return self._speaker.clock.monotonic() >= self._next_ns
+
+    def tick(self) -> None:
+        """Publishes if a second is over."""
+        if self.due():
+            # From second to second, not from call to call, unless whole seconds were missed.
+            self._next_ns = max(self._next_ns + PERIOD_NS, self._speaker.clock.monotonic())
+            self.publish()
+
+    def publish(self) -> None:
+        """Publishes now."""
+        with self._lock:
+            level = self.level
+            message = health_pb2.Health(
+                header=self._speaker.now(self._seq),
+                component=self._component,
+                level=_WIRE[level],
+                message="; ".join(text for rank, text in self._conditions.values() if rank == level and text),
+                counters=self._counters,
+                gauges=self._gauges,
+                labels=self._labels,
+            )
+            self._seq += 1
+            self._publisher.put(message.SerializeToString())

@@ -1,0 +1,110 @@
+"""Names on the wire: a zenoh key is `abs/<rig>/<topic>`, the topic of a recording is `/<topic>`."""
+
+import re
+
+ROOT = "abs"
+CONFIG = "config"
+SCHEMA = "schema"
+TRANSFORMS = "tf"
+
+#: Coordinate frame that all poses and vertices refer to.
+RIG_FRAME = "rig"
+
+#: First parts of topics that no sensor, device or tracker may be called.
+RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "health", "live"})
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+
+
+class KeyNameError(ValueError):
+    """A name that cannot be part of a key."""
+
+
+def check_name(name: str) -> str:
+    """Returns `name` if a rig, sensor, stream, device or tracker may be called so.
+
+    Raises:
+        KeyNameError: it is empty, reserved, or holds a character that means something in a key.
+    """
+    if not _NAME.fullmatch(name):
+        raise KeyNameError(f"{name!r} is no name: letters, digits, - and _, beginning with a letter or digit")
+    if name in RESERVED:
+        raise KeyNameError(f"{name!r} is reserved, like {sorted(RESERVED - {name})}; choose another name")
+    return name
+
+
+def image(sensor: str, stream: str) -> str:
+    """Topic of a stream's images."""
+    return f"{sensor}/{stream}/image"
+
+
+def info(image_topic: str) -> str:
+    """Topic of a recording that holds what the attachments of `image_topic` said."""
+    return image_topic.removesuffix("image") + "info"
+
+
+def calibration(sensor: str) -> str:
+    """Topic of a sensor's foxglove.CameraCalibration."""
+    return f"{sensor}/calibration"
+
+
+def model(sensor: str) -> str:
+    """Topic of a sensor's absmsg.v1.SensorModel."""
+    return f"{sensor}/model"
+
+
+def truth(device: str) -> str:
+    """Topic of what a simulated device knows."""
+    return f"{device}/truth"
+
+
+def state(tracker: str) -> str:
+    """Topic of a tracker's estimates."""
+    return f"{tracker}/state"
+
+
+def mesh(tracker: str) -> str:
+    """Topic of a tracker's deformed vertices."""
+    return f"{tracker}/mesh"
+
+
+def topology(tracker: str) -> str:
+    """Topic of what does not change of a tracker's mesh."""
+    return f"{tracker}/topology"
+
+
+def reinitialize(tracker: str) -> str:
+    """Topic on which a tracker is told to look for its object anew: an absmsg.v1.Header of whoever says so."""
+    return f"{tracker}/reinitialize"
+
+
+def health(component: str) -> str:
+    """Topic of a component's health: capture, record, run, track/<tracker>."""
+    return f"health/{component}"
+
+
+def live(component: str) -> str:
+    """Topic of a component's liveliness token."""
+    return f"live/{component}"
+
+
+def is_image(topic: str) -> bool:
+    """Whether a topic carries images, whose attachments describe them."""
+    return topic.count("/") == 2 and topic.endswith("/image")
+
+
+def key(rig: str, topic: str) -> str:
+    """The zenoh key of a topic of `rig`; `topic` may be an expression such as `**`."""
+    return f"{ROOT}/{rig}/{topic}"
+
+
+def topic(rig: str, key: str) -> str:
+    """The topic of a key of `rig`; inverse of `key`.
+
+    Raises:
+        KeyNameError: the key is none of this rig's.
+    """
+    prefix = f"{ROOT}/{rig}/"
+    if not key.startswith(prefix) or len(key) == len(prefix):
+        raise KeyNameError(f"{key!r} is no key of rig {rig!r}, those begin with {prefix!r}")
+    return key[len(prefix) :]

@@ -1,0 +1,75 @@
+"""From the monotonic clock, with which everything is measured, to the wall clock, which people and files read."""
+
+import time
+import uuid
+from collections.abc import Callable
+
+from absmsg.v1 import common_pb2
+
+#: A change of the offset that no slewing explains within a second [ns].
+STEP_NS = 50_000_000
+
+
+class WallClock:
+    """Maps monotonic to wall-clock time by an offset that is measured, not assumed.
+
+    The stamps of one process are therefore as smooth as its monotonic clock between two calls of `measure`, and a step
+    of the wall clock shows once, as a step.
+
+    Args:
+        monotonic: CLOCK_MONOTONIC [ns].
+        wall: CLOCK_REALTIME [ns].
+    """
+
+    def __init__(
+        self, monotonic: Callable[[], int] = time.monotonic_ns, wall: Callable[[], int] = time.time_ns
+    ) -> None:
+        self.monotonic = monotonic
+        self._wall = wall
+        self._offset_ns = self._read_offset()
+        self.steps = 0
+
+    def wall(self, t_host_ns: int) -> int:
+        """Wall-clock time [ns since the epoch] of a moment on the monotonic clock [ns]."""
+        return t_host_ns + self._offset_ns
+
+    def measure(self) -> int:
+        """Measures the offset anew and returns by how much it changed [ns]; counts a change beyond `STEP_NS`."""
+        offset_ns = self._read_offset()
+        change_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
+        self.steps += abs(change_ns) > STEP_NS
+        return change_ns
+
+    def _read_offset(self) -> int:
+        # Of a few readings, the one that the scheduler disturbed least.
+        best_ns, offset_ns = None, 0
+        for _ in range(5):
+            before, wall, after = self.monotonic(), self._wall(), self.monotonic()
+            if best_ns is None or after - before < best_ns:
+                best_ns, offset_ns = after - before, wall - (before + after) // 2
+        return offset_ns
+
+
+class Speaker:
+    """Writes the header of every message that one process sends.
+
+    Args:
+        rig: name of the rig.
+        clock: gives the stamps.
+        boot_id: tells this process from its predecessor; new with each `Speaker` unless given.
+    """
+
+    def __init__(self, rig: str, clock: WallClock, boot_id: str | None = None) -> None:
+        self.rig = rig
+        self.clock = clock
+        self.boot_id = boot_id or uuid.uuid4().hex
+
+    def header(self, t_host_ns: int, seq: int, frame_id: str = "") -> common_pb2.Header:
+        """The header of a message about the moment `t_host_ns` (CLOCK_MONOTONIC) [ns]."""
+        header = common_pb2.Header(t_host_ns=t_host_ns, seq=seq, rig=self.rig, frame_id=frame_id, boot_id=self.boot_id)
+        header.stamp.FromNanoseconds(self.clock.wall(t_host_ns))
+        return header
+
+    def now(self, seq: int, frame_id: str = "") -> common_pb2.Header:
+        """The header of a message about this very moment."""
+        return self.header(self.clock.monotonic(), seq, frame_id)

@@ -1,0 +1,1 @@
+"""Reports and verification of solved cameras."""

@@ -1,0 +1,156 @@
+"""What `calibrate intrinsics` and `calibrate rig` found out, as a report and as a calibration file."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from abs_service.calibration.cameras import figures as solve_figures
+from abs_service.calibration.files.rig_file import Covariance, Residuals, RigCalibration, SensorCalibration
+from abs_service.report import figures
+from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
+from abs_service.report.provenance import Provenance
+from calib.solve.solution import Solution, ViewFit
+from calib.solve.validation.support import coverage
+from calib.solve.validation.verdict import Assessment
+
+
+def report(title: str, origin: Provenance, solution: Solution, found: Assessment, notes: Sequence[str]) -> Report:
+    """The report of a solved calibration.
+
+    Args:
+        title: of the page.
+        origin: where the result comes from.
+        solution, found: the result and what is to be thought of it.
+        notes: what else the user should know, such as images that were not used.
+    """
+    verdicts = [Verdict(Level.GOOD if found.trusted else Level.DOUBTFUL, found.verdict)]
+    verdicts += [Verdict(Level.DOUBTFUL, reason) for reason in found.reasons[1:]]
+    sections = [_cross_validation(found), *(_sensor(name, solution, found) for name in solution.task.sensors)]
+    sections += [Section("Images that were not used", tuple(notes))] if notes else []
+    values = {
+        "trusted": found.trusted,
+        "distance_m": found.distance,
+        "parameters": {each.name: {"value": each.value, "sigma": each.sigma} for each in solution.parameters},
+        "deviations": dict(solution.deviations),
+        "halves": {
+            each.of: {"difference_px": each.difference_px, "predicted_px": each.predicted_px}
+            for each in found.agreements
+        },
+        "projection_sigma_px": {of: field.typical for of, field in {**found.images, **found.pairs}.items()},
+        "views": [
+            {"sensor": v.sensor, "shot": v.shot, "of": v.of, "rms": v.rms, "outliers": int(v.outliers.sum())}
+            for v in solution.views
+        ],
+    }
+    return Report(title, origin, tuple(verdicts), tuple(sections), values)
+
+
+def calibration(
+    name: str, origin: Provenance, solution: Solution, trusted: bool, kept: Mapping[str, SensorCalibration]
+) -> RigCalibration:
+    """The calibration file's content; of sensors known before, what is not of cameras stays.
+
+    Args:
+        name: of the rig.
+        origin: where the result comes from.
+        solution: the result.
+        trusted: the verdict.
+        kept: what was known before, by sensor.
+    """
+    sensors = {}
+    for sensor, state in solution.state.sensors.items():
+        before = kept.get(sensor, SensorCalibration(state.camera))
+        task = solution.task.sensors[sensor]
+        sensors[sensor] = SensorCalibration(
+            state.camera,
+            state.depth_offset,
+            state.depth_scale,
+            state.time_offset,
+            before.noise,
+            before.texture,
+            before.factory or next(iter(task.factory), None),
+            _residuals([view for view in solution.views if view.sensor == sensor]),
+        )
+    count = solution.adjustment.layout.board_start
+    names = tuple(solution.adjustment.layout.names[:count])
+    covariance = Covariance(names, solution.covariance[:count, :count])
+    return RigCalibration(name, {**kept, **sensors}, origin, "good" if trusted else "doubtful", covariance)
+
+
+def _residuals(views: Sequence[ViewFit]) -> Residuals:
+    parts: dict[str, float | None] = {}
+    for of in ("corners", "distances"):
+        squares = [view.residuals.reshape(len(view.pixels), -1) for view in views if view.of == of]
+        parts[of] = float(np.sqrt(np.mean(np.sum(np.concatenate(squares) ** 2, axis=1)))) if squares else None
+    shots = {view.shot for view in views}
+    return Residuals(parts["corners"], parts["distances"], len(shots))
+
+
+def _cross_validation(found: Assessment) -> Section:
+    rows = tuple((each.of, each.difference_px, each.predicted_px, each.ratio) for each in found.agreements)
+    columns = (Column("projection"), Column("halves differ by", "px"), Column("predicted", "px"), Column("ratio"))
+    known = tuple((of, field.typical, 2.45 * field.typical) for of, field in {**found.images, **found.pairs}.items())
+    text = (
+        "The odd and the even shots were calibrated apart. If the halves differ by more than twice what their own "
+        "deviations say, something is wrong that residuals do not show. All numbers are root mean squares over the "
+        f"part of the image in which boards were seen, at {found.distance:g} m. From one sensor to another nothing is "
+        "compensated; within one image, a small motion of the camera is."
+    )
+    return Section(
+        "Can it be trusted?",
+        (
+            text,
+            Table("Halves of the shots", columns, rows),
+            Table(
+                "How well projections are known by all shots",
+                (Column("projection"), Column("deviation", "px"), Column("95 %", "px")),
+                known,
+            ),
+            *(
+                drawing(solve_figures.halves(each), f"Halves, {each.of}", f"Differences of the halves of {each.of}")
+                for each in found.agreements
+            ),
+        ),
+    )
+
+
+def _sensor(name: str, solution: Solution, found: Assessment) -> Section:
+    rows = tuple(
+        (each.name.partition(".")[2], each.value, each.sigma)
+        for each in solution.parameters
+        if each.name.startswith(f"{name}.")
+    )
+    columns = (Column("parameter"), Column("value", "px, rad, m, s", ".7g"), Column("deviation", "", ".2g"))
+    share = coverage(solution, name)
+    text = f"Boards were seen in {share:.0%} of the image. The file keeps what was not free as it was."
+    blocks: list[str | Table | Picture] = [text, Table(f"What was determined of {name}", columns, rows)]
+    return Section(name, (*blocks, *_pictures(name, solution, found)))
+
+
+def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Picture]:
+    camera = solution.cameras[name]
+    corners = [view for view in solution.views if (view.sensor, view.of) == (name, "corners")]
+    planes = [view for view in solution.views if (view.sensor, view.of) == (name, "distances")]
+    if corners:
+        pixels = [view.pixels for view in corners]
+        drawn = figures.coverage_map(pixels, camera.width, camera.height)
+        yield drawing(drawn, "Where corners were seen", f"Coverage of the image of {name}")
+        # Shared pictures show measured less predicted.
+        residuals = -np.concatenate([view.residuals for view in corners])
+        drawn = figures.residual_field(np.concatenate(pixels), residuals, camera.width, camera.height)
+        yield drawing(drawn, "Residuals of corners", f"Residuals of corners over the image of {name}")
+        yield drawing(solve_figures.view_errors(corners, "px", 1), "Views", f"Residuals of every view of {name}")
+    fields = {of: field for of, field in found.pairs.items() if of.startswith(f"{name} → ")}
+    if solution.adjustment.layout.freedoms[name].intrinsics:
+        fields = {name: found.images[name], **fields}
+    for of, field in fields.items():
+        label = f"deviation of a projection at {found.distance:g} m [px]"
+        caption = f"How well projections are known: {of} (hatched: no boards seen)"
+        yield drawing(solve_figures.uncertainty_map(field, label), caption, f"Projection uncertainty of {of}")
+    if planes:
+        distances = {
+            shot: float(np.linalg.norm(camera.T_sr[:3] @ T_rb[:, 3])) for shot, T_rb in solution.boards.items()
+        }
+        drawn = solve_figures.distance_errors(planes, distances)
+        yield drawing(drawn, "Residuals of distances on boards", f"Residuals of the distances of {name}")
+        yield drawing(solve_figures.view_errors(planes, "mm", 1e3), "Views", f"Residuals of the planes of {name}")

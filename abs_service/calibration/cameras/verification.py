@@ -1,0 +1,211 @@
+"""What new views of a board say about a stored calibration, as a report in plain words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from abs_service.calibration.cameras import verification_tables as tables
+from abs_service.calibration.files.rig_file import RigCalibration
+from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.report.content import Level, Report, Verdict
+from abs_service.report.provenance import Provenance
+from calib.calibration_check.changes import PairChange, pair_changes
+from calib.calibration_check.hypotheses import (
+    DistanceBias,
+    Explanation,
+    OwnFit,
+    distance_bias,
+    explained,
+    own_fit,
+    suspects,
+)
+from calib.calibration_check.stored import Stored, Views, usable
+from calib.solve.bundle.state import SensorState
+from calib.views import PlaneView
+
+#: More shots say hardly more, and take longer.
+MOST_SHOTS = 40
+
+#: Distances of one view that are used: neighbours err alike, so that more of them say hardly more.
+MOST_DISTANCES = 300
+
+#: Corners miss by so much where a calibration does not say what was usual [px].
+USUAL_PX = 0.5
+
+#: How many times the usual miss is doubtful and bad.
+DOUBTFUL_RATIO, BAD_RATIO = 1.5, 3.0
+
+#: Shifts of pictures that nobody notices, and that spoil a projection [px].
+UNNOTICED_PX, SPOILT_PX = 0.3, 1.0
+
+#: A shift of so many pixels that passes for chance: too little was seen.
+BLIND_PX = 2.0
+
+#: Distances that are off by less are as good as any depth camera's, by more are wrong [m].
+UNNOTICED_M, WRONG_M = 0.002, 0.01
+
+
+@dataclass(frozen=True)
+class Found:
+    """Everything that was computed.
+
+    Attributes:
+        fits: of sensors that see corners, by sensor.
+        usual_px: their miss when they were calibrated.
+        biases: of sensors that see corners and measure distances.
+        changes: of all pairs.
+        explanations: what setting one sensor free explains; empty if nothing moved.
+        unseen: sensors without any view.
+    """
+
+    fits: Mapping[str, OwnFit]
+    usual_px: Mapping[str, float]
+    biases: Mapping[str, DistanceBias]
+    changes: tuple[PairChange, ...]
+    explanations: Mapping[str, Explanation]
+    unseen: tuple[str, ...]
+
+
+def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
+    """The report on a calibration.
+
+    Args:
+        known: the calibration.
+        seen: what its sensors saw of a board.
+        provenance: where the report comes from.
+
+    Raises:
+        RecheckError: no view can be used.
+        NotSolvedError, UndeterminedError: the views do not place the board.
+    """
+    found = _found(known, seen)
+    sections = [
+        tables.sensors(found.fits, found.usual_px, found.biases),
+        *tables.pairs(found.changes, found.explanations),
+    ]
+    sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
+    values = tables.values(found.fits, found.biases, found.changes, found.explanations)
+    return Report(f"Verification of {known.name}", provenance, tuple(verdicts(found)), tuple(sections), values)
+
+
+def verdicts(found: Found) -> list[Verdict]:
+    """The judgements, the worst first."""
+    said = [_moved(found)] if found.explanations else []
+    said += [_of_fit(name, fit, found.usual_px[name]) for name, fit in found.fits.items()]
+    said += [_of_bias(name, bias) for name, bias in found.biases.items()]
+    said += [_of_pair(change) for change in found.changes]
+    said += [
+        Verdict(Level.DOUBTFUL, "did not see the board, so nothing can be said of it.", "Show it the board too.", name)
+        for name in found.unseen
+    ]
+    if len(found.fits) + len(found.unseen) > 1 and not found.changes:
+        text = "No two sensors saw the board together often enough to be compared; three shots are needed, better ten."
+        said.append(Verdict(Level.DOUBTFUL, text, "Show the board to several sensors at once."))
+    return sorted(said, key=lambda verdict: -verdict.level)
+
+
+def _found(known: RigCalibration, seen: Seen) -> Found:
+    sensors = {
+        name: SensorState(one.camera, one.depth_offset, one.depth_scale, one.time_offset)
+        for name, one in known.sensors.items()
+    }
+    covariance = known.covariance
+    stored = Stored(sensors, covariance.names, covariance.matrix if covariance.names else None)
+    views = _thinned(usable(stored, _ours(seen, sensors)))
+    seeing = dict.fromkeys(view.sensor for view in views.corners)
+    biases = {name: distance_bias(stored, views, name) for name in seeing}
+    changes = tuple(pair_changes(stored, views))
+    is_alarming = any(_level(change) > Level.GOOD and change.is_significant for change in changes)
+    usual = {name: known.sensors[name].residuals.corners_px for name in seeing}
+    return Found(
+        {name: own_fit(stored, views, name) for name in seeing},
+        {name: USUAL_PX if px is None else px for name, px in usual.items()},
+        {name: bias for name, bias in biases.items() if bias is not None},
+        changes,
+        explained(stored, views) if is_alarming else {},
+        tuple(name for name in sensors if name not in views.shots),
+    )
+
+
+def _ours(seen: Seen, sensors: Mapping[str, SensorState]) -> Views:
+    return Views(
+        [view for view in seen.corners if view.sensor in sensors],
+        [view for view in seen.planes if view.sensor in sensors],
+    )
+
+
+def _thinned(views: Views) -> Views:
+    """Evenly spread shots, if there are very many."""
+    shots = sorted({view.shot for view in views.corners})
+    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
+    fewer = views.of(views.shots, kept)
+    return Views(fewer.corners, [_sparse(view) for view in fewer.planes])
+
+
+def _sparse(view: PlaneView) -> PlaneView:
+    every = max(1, len(view.pixels) // MOST_DISTANCES)
+    parts = {part: getattr(view, part)[::every] for part in ("pixels", "distances", "sigmas")}
+    return replace(view, **parts)
+
+
+def _of_fit(name: str, fit: OwnFit, usual: float) -> Verdict:
+    said = f"corners miss by {fit.rms:.2f} px; {usual:.2f} px are usual for it."
+    if fit.rms <= DOUBTFUL_RATIO * usual or fit.rms < UNNOTICED_PX:
+        return Verdict(Level.GOOD, f"still projects as it was calibrated: {said}", about=name)
+    level = Level.BAD if fit.rms > BAD_RATIO * usual else Level.DOUBTFUL
+    advice = "Was it refocused, zoomed or set to another mode? If so, calibrate its intrinsics again."
+    return Verdict(level, f"no longer projects as it was calibrated: {said}", advice, name)
+
+
+def _of_bias(name: str, bias: DistanceBias) -> Verdict:
+    said = f"distances exceed those that its corners say by {bias.mean * 1e3:+.1f} ± {bias.sigma * 1e3:.1f} mm."
+    if abs(bias.mean) < max(UNNOTICED_M, 3 * bias.sigma):
+        return Verdict(Level.GOOD, f"still measures as it was calibrated: {said}", about=name)
+    level = Level.BAD if abs(bias.mean) > WRONG_M else Level.DOUBTFUL
+    advice = "Let it warm up for half an hour and look again; if it stays, calibrate its depth terms."
+    return Verdict(level, f"measures otherwise than it was calibrated: {said}", advice, name)
+
+
+def _level(change: PairChange) -> Level:
+    if not change.is_significant:
+        return Level.DOUBTFUL if change.sigma_px > BLIND_PX else Level.GOOD
+    if change.shift_px < UNNOTICED_PX:
+        return Level.GOOD
+    return Level.BAD if change.shift_px > SPOILT_PX else Level.DOUBTFUL
+
+
+def _of_pair(change: PairChange) -> Verdict:
+    about, level = f"{change.first} and {change.second}", _level(change)
+    said = (
+        f"{_how_far(change)}, which shifts pictures by {change.shift_px:.2f} px; {change.sigma_px:.2f} px are chance."
+    )
+    if not change.is_significant and level == Level.DOUBTFUL:
+        advice = "Show the board to both at once, nearer, tilted and in more places."
+        return Verdict(level, f"could not be compared well enough: {said}", advice, about)
+    if level == Level.GOOD:
+        return Verdict(level, f"stand as they were calibrated: {said}", about=about)
+    return Verdict(level, f"no longer stand as they were calibrated: {said}", "Calibrate the rig again.", about)
+
+
+def _how_far(change: PairChange) -> str:
+    return f"{np.linalg.norm(change.move) * 1e3:.1f} mm and {np.rad2deg(np.linalg.norm(change.turn)):.2f}°"
+
+
+def _moved(found: Found) -> Verdict:
+    """Which sensor it was."""
+    worst = max(found.changes, key=lambda change: _level(change) * change.is_significant)
+    level = _level(worst)
+    able = suspects(found.explanations)
+    if len(able) == 1:
+        (name,) = able
+        mine = max((one for one in found.changes if name in {one.first, one.second}), key=lambda one: one.squared)
+        share = found.explanations[name].share
+        text = f"has moved, by {_how_far(mine)}: that alone explains {share:.0%} of what no longer fits."
+        return Verdict(level, text, "Put it back and fix it, or calibrate the rig again.", name)
+    if len(able) > 1:
+        text = f"One of {', '.join(able)} has moved; these views cannot tell which, since each would explain them."
+        advice = "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
+        return Verdict(level, text, advice)
+    text = "More than one sensor has moved, or a camera has changed: no single one explains what no longer fits."
+    return Verdict(level, text, "Calibrate the rig again.")

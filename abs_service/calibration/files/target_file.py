@@ -1,0 +1,129 @@
+"""A board as a TOML file: `kind = "charuco"`, counts, and lengths in metres, or in millimetres as `square_mm`."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from abs_service.config.problems import ABSENT, Problem, none_of
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError
+
+#: The values of `kind`.
+KINDS: Mapping[str, type[Target]] = {
+    "chessboard": Chessboard,
+    "charuco": Charuco,
+    "circles": Circles,
+    "asymmetric_circles": AsymmetricCircles,
+}
+
+#: The lengths among the keys; each may end in `_mm`.
+_LENGTHS = ("square", "marker", "spacing", "diameter")
+
+
+class TargetFileError(ValueError):
+    """A file that describes no board; the message names file, key, value and what is allowed."""
+
+
+def read(path: Path) -> Target:
+    """Reads the description of a board.
+
+    Raises:
+        TargetFileError: the file cannot be read, or what it says is no board.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TargetFileError(f"{path}: cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise TargetFileError(f"{path}: is not TOML: {error}") from error
+    return from_table(table, str(path))
+
+
+def from_table(table: Mapping[str, Any], path: str) -> Target:
+    """The board that a TOML table describes; `path` is for the message.
+
+    Raises:
+        TargetFileError: what the table says is no board.
+    """
+    kind = table.get("kind", ABSENT)
+    if kind not in KINDS:
+        raise _error(path, Problem(("kind",), f"the kind of board, {none_of(str(kind), KINDS)}", kind))
+    Kind = KINDS[kind]
+    values = {}
+    for key, value in table.items():
+        name, in_mm = _name(key)
+        if key == "kind":
+            continue
+        if name not in {field.name for field in fields(Kind)}:
+            allowed = ["kind", *to_table(_EXAMPLES[kind]), *(n for n in _LENGTHS if n in Kind.__dataclass_fields__)]
+            raise _error(path, Problem((key,), f"unknown key of a {kind}, {none_of(key, set(allowed))}", value))
+        if name in values:
+            raise _error(path, Problem((key,), f"{name} is given twice, in m and in mm", value))
+        checked = _checked(path, key, name, value)
+        values[name] = 1e-3 * checked if in_mm else checked
+    for field in fields(Kind):
+        if field.name not in values and field.name != "dictionary":
+            shown = f"{field.name}_mm" if field.name in _LENGTHS else field.name
+            raise _error(path, Problem((shown,), f"missing, but a {kind} needs it"))
+    try:
+        return Kind(**values)
+    except TargetError as error:
+        name, _, message = str(error).partition(": ")
+        key = next((key for key in table if _name(key)[0] == name), name)
+        raise _error(path, Problem((key,), message, table.get(key, ABSENT))) from error
+
+
+def to_table(target: Target) -> dict[str, Any]:
+    """The TOML table that `from_table` makes the same board from, lengths in millimetres."""
+    kind = next(name for name, Kind in KINDS.items() if type(target) is Kind)
+    shown = {
+        f"{k}_mm" if k in _LENGTHS else k: round(1e3 * v, 6) if k in _LENGTHS else v for k, v in asdict(target).items()
+    }
+    return {"kind": kind, **shown}
+
+
+def write(target: Target, path: Path) -> None:
+    """Writes the description of a board.
+
+    Raises:
+        TargetFileError: the file cannot be written.
+    """
+    try:
+        path.write_text(tomli_w.dumps(to_table(target)), encoding="utf-8")
+    except OSError as error:
+        raise TargetFileError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+_EXAMPLES: Mapping[str, Target] = {
+    "chessboard": Chessboard(9, 6, 0.025),
+    "charuco": Charuco(9, 6, 0.03, 0.022),
+    "circles": Circles(7, 5, 0.03, 0.015),
+    "asymmetric_circles": AsymmetricCircles(4, 11, 0.02, 0.015),
+}
+
+
+def _name(key: str) -> tuple[str, bool]:
+    """The attribute that a key is about, and whether its value is in millimetres."""
+    name = key.removesuffix("_mm")
+    return (name, True) if name != key and name in _LENGTHS else (key, False)
+
+
+def _checked(path: str, key: str, name: str, value: Any) -> Any:
+    if name == "dictionary":
+        if isinstance(value, str):
+            return value
+        raise _error(path, Problem((key,), 'must be a name such as "5x5_250"', value))
+    if name in _LENGTHS:
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            return value
+        raise _error(path, Problem((key,), "must be a number", value))
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
+    raise _error(path, Problem((key,), "must be a whole number", value))
+
+
+def _error(path: str, problem: Problem) -> TargetFileError:
+    return TargetFileError(f"{path}: {problem}")

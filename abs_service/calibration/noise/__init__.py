@@ -1,0 +1,1 @@
+"""Measurement, selection and report of noise models."""

@@ -1,0 +1,28 @@
+"""Where the board stands in front of a depth sensor during a sequence, by its own image or another sensor's."""
+
+from abs_service.calibration.shots.corner_extraction import see
+from abs_service.calibration.shots.sequences import Sequence, SequenceError
+from abs_service.calibration.shots.shots import Shot
+from calib.board.target import Target
+from calib.sequences.placed import Placed, place
+
+
+def placed(target: Target, sequence: Sequence) -> Placed:
+    """The board at rest of a sequence, as the depth sensor's own image shows it, or else the one that shows most of it.
+
+    Raises:
+        SequenceError: no sensor shows the board, or not well; says why each does not.
+        NoiseError: what is seen is no board in front of the depth sensor.
+    """
+    looks = {sensor: look for sensor, look in sequence.looks.items() if sensor in sequence.cameras}
+    if not looks:
+        raise SequenceError(
+            f"{sequence.name}: there is no image of a sensor with a known camera in which the board could be seen"
+        )
+    seen = see(target, Shot(0, looks), sequence.cameras)
+    views = {view.sensor: view for view in seen.corners}
+    if not views:
+        reasons = "; ".join(f"{sensor}: {error}" for (_, sensor), error in seen.refused.items())
+        raise SequenceError(f"{sequence.name}: {reasons}")
+    best = max(views.values(), key=lambda view: (view.sensor == sequence.sensor, len(view.points_b)))
+    return place(best, sequence.cameras[best.sensor], sequence.camera)

@@ -1,0 +1,187 @@
+"""What a calibration of noise says in plain words: what to use, how far to trust it, what could not be determined."""
+
+import math
+
+import numpy as np
+
+from abs_service.calibration.noise.measurement import Found
+from abs_service.report.content import Level, Verdict
+from calib.sequences.candidates import Level as Places
+from calib.sequences.reference import Kind
+from calib.sequences.selection import NOTHING, Trial, extremes
+
+#: How far coverage and variance of held-out residuals may be from 68.3 %, 95 % and 1.
+_COVERAGE, _VARIANCE = 0.03, (0.8, 1.25)
+
+#: The farthest distance over the nearest below which a model knows one distance only, and so for amplitudes.
+_SPREAD = 1.3
+
+#: Share of the image that may move before somebody should look at it.
+_MOVING = 0.3
+
+#: Real distances that are known worse than this tell no offset that is worth having [m].
+_WELL_KNOWN = 2e-3
+
+#: How far outside the domain a model is checked, as a factor on either end.
+_OUTSIDE = 10.0
+
+
+def verdicts(found: Found) -> tuple[Verdict, ...]:
+    """All that there is to say, the most important first."""
+    return (
+        _use(found),
+        _agreement(found),
+        *_boards(found),
+        *_undetermined(found),
+        _places(found),
+        _outside(found),
+        *_steps(found),
+        *_motion(found),
+    )
+
+
+def _use(found: Found) -> Verdict:
+    near, far = found.distances
+    amplitudes = f" and amplitudes {found.amplitudes[0]:.0f} to {found.amplitudes[1]:.0f}"
+    domain = f"{near:.2f} to {far:.2f} m" + (amplitudes if math.isfinite(found.amplitudes[0]) else "")
+    low, high, _ = extremes(found.model, found.distances, _amplitudes(found))
+    return Verdict(
+        Level.GOOD,
+        f"Use {found.chosen.candidate.name}: σ is {low * 1e3:.2g} to {high * 1e3:.2g} mm for {domain}. "
+        f"{len(found.trials)} models were compared by the likelihood of what they were not fitted to.",
+    )
+
+
+def _agreement(found: Found) -> Verdict:
+    quality = found.chosen.quality
+    text = (
+        f"{quality.within_one:.1%} of what was held out lies within σ (68.3 % if the model is right), "
+        f"{quality.within_95:.1%} within 1.96 σ (95 %); variance of the residuals {quality.variance:.2f}."
+    )
+    near = abs(quality.within_one - 0.683) < _COVERAGE and abs(quality.within_95 - 0.95) < _COVERAGE
+    if near and _VARIANCE[0] < quality.variance < _VARIANCE[1]:
+        return Verdict(Level.GOOD, text)
+    return Verdict(
+        Level.DOUBTFUL, text, "Measure at more distances and on more materials, and check that targets are flat."
+    )
+
+
+def _boards(found: Found) -> list[Verdict]:
+    """How well the real distances are known that the poses of boards tell."""
+    if found.kind is not Kind.BOARD:
+        return []
+    worst = max(board.uncertainty for board in found.boards)
+    seers = sorted({board.seen_by for board in found.boards})
+    near, far = found.distances
+    share = f"{near:.1f} to {far:.1f} mm" if f"{near:.1f}" != f"{far:.1f}" else f"{far:.1f} mm"
+    text = (
+        f"The reference is known to {worst * 1e3:.2g} mm: the real distances are those of the board, whose pose its "
+        f"corners tell in the images of {' and '.join(seers)}. The offset cannot be known better, and "
+        f"errors of the cameras, of their poses in the rig and of the squares' size come on top: 0.1 % of focal length "
+        f"or size is {share}."
+    )
+    if worst < _WELL_KNOWN:
+        return [Verdict(Level.GOOD, text)]
+    return [Verdict(Level.DOUBTFUL, text, "Take a larger board, tilt it by 20° or so, or come closer.")]
+
+
+def _undetermined(found: Found) -> list[Verdict]:
+    """What the sequences cannot tell."""
+    said = []
+    if found.kind is Kind.MEAN:
+        said.append(
+            Verdict(
+                Level.DOUBTFUL,
+                "Only the temporal part of the noise is determined: no distance was given and no flat target fills the "
+                "image. The mean offset and the fixed pattern are unknown, and taken as zero.",
+                "Record a flat target at known distances, and give them with --distance-m, or a board, with --target.",
+            )
+        )
+    if found.kind is Kind.PLANE:
+        said.append(
+            Verdict(
+                Level.DOUBTFUL,
+                "The mean offset is not determined, and taken as zero: no distance was given, so planes were fitted "
+                "where the sensor sees them. σ contains what pixels differ from these planes by.",
+                "Measure the target's distance along the optical axis, and give it with --distance-m, or record a "
+                "calibration board, and describe it with --target.",
+            )
+        )
+    near, far = found.distances
+    if far < _SPREAD * near:
+        text = f"How noise changes with distance is not determined: all distances lie in {near:.2f} to {far:.2f} m."
+        said.append(Verdict(Level.DOUBTFUL, text, "Record at five distances over the range that you use."))
+    if found.amplitudes[1] < 2 * found.amplitudes[0]:
+        text = "How the noise changes with the amplitude is not determined: all amplitudes are of one size."
+        said.append(Verdict(Level.DOUBTFUL, text, "Record three materials: white, grey and dark."))
+    if not found.by_sequence:
+        number = len(found.statics)
+        text = (
+            f"{number} sequence{'s are' if number > 1 else ' is'} too few to hold out a whole one: models were "
+            "compared on other frames of the same sequences, which share their targets' flaws."
+        )
+        said.append(Verdict(Level.DOUBTFUL, text, "Record at least three sequences."))
+    return said
+
+
+def _places(found: Found) -> Verdict:
+    """What maps of regions and of pixels gain."""
+    parts = []
+    for trial in found.trials:
+        if trial.candidate.level is Places.IMAGE or not trial.scores:
+            continue
+        name = f"maps of {trial.candidate.level}s"
+        parts.append(f"{name} {_gain(found.law, trial)}")
+    return Verdict(Level.GOOD, f"Beside one law for the whole image, {' and '.join(parts)}.") if parts else _none()
+
+
+def _gain(law: Trial, trial: Trial) -> str:
+    gain, deviation = law.behind(trial)
+    if gain <= NOTHING:
+        return f"say no more than noise here (log-likelihood {gain:+.3f} ± {deviation:.3f} per measurement)"
+    return f"gain {gain:.3f} ± {deviation:.3f} log-likelihood per measurement"
+
+
+def _none() -> Verdict:
+    return Verdict(Level.DOUBTFUL, "Maps of regions and pixels could not be fitted.")
+
+
+def _outside(found: Found) -> Verdict:
+    """Whether the model stays sensible where nothing was measured."""
+    near, far = found.distances
+    _, high, _ = extremes(found.model, found.distances, _amplitudes(found))
+    beyond = extremes(found.model, (near / _OUTSIDE, far * _OUTSIDE), (0.0, 65535.0))
+    text = (
+        f"Outside what was measured σ stays between {beyond[0] * 1e3:.2g} and {beyond[1] * 1e3:.2g} mm, and μ within "
+        f"{beyond[2] * 1e3:.2g} mm, up to {far * _OUTSIDE:.0f} m and at any amplitude."
+    )
+    sound = all(map(math.isfinite, beyond)) and beyond[0] > 0
+    grows = beyond[1] > 1.001 * high
+    known = " It grows with the distance there, as the sensor's steps do." if grows else ""
+    return Verdict(Level.GOOD if sound else Level.BAD, text + known)
+
+
+def _amplitudes(found: Found) -> tuple[float, float]:
+    return found.amplitudes if math.isfinite(found.amplitudes[0]) else (0.0, 1.0)
+
+
+def _steps(found: Found) -> list[Verdict]:
+    far = found.distances[1]
+    step = float(found.steps.at(np.array(far)))
+    if found.steps.growth > 0:
+        text = (
+            f"Distances come in steps of {found.steps.growth:.3g} x² (a disparity), {step * 1e3:.2g} mm at {far:.2f} m;"
+            " σ contains their share, step²/12."
+        )
+        return [Verdict(Level.GOOD, text)]
+    text = f"Distances come in steps of {found.steps.digit * 1e3:.2g} mm; σ contains their share."
+    return [Verdict(Level.GOOD, text)] if found.steps.digit > 0 else []
+
+
+def _motion(found: Found) -> list[Verdict]:
+    said = []
+    for static in found.statics:
+        if static.moving > _MOVING:
+            text = f"{static.moving:.0%} of the pixels moved and were left out."
+            said.append(Verdict(Level.DOUBTFUL, text, "Look at the map of what was taken as static.", static.name))
+    return said

@@ -1,0 +1,1 @@
+"""Board images from files, recordings and live devices."""

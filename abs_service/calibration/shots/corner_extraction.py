@@ -1,0 +1,115 @@
+"""From shots and a board to what a calibration starts from: corners, planes, and why an image was not used."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from abs_service.calibration.shots.shots import Look, Shot
+from calib.board import plane
+from calib.board.corners import detection, quality, refusal, stillness
+from calib.board.corners.detection import Detection
+from calib.board.corners.refusal import BoardError
+from calib.board.corners.to_8bit import grey
+from calib.board.target import Target
+from calib.camera import Camera
+from calib.views import CornerView, PlaneView
+
+#: How far a board that another sensor saw may be from where prior cameras put it in a sensor without image [px].
+_SLACK_PX = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What is known of a board after some shots.
+
+    Attributes:
+        corners: views of its points.
+        planes: distances on it.
+        refused: why a sensor's image of a shot was not used, by (shot, sensor).
+        sizes: width and height of each sensor's images [px], by sensor name.
+    """
+
+    corners: tuple[CornerView, ...] = ()
+    planes: tuple[PlaneView, ...] = ()
+    refused: Mapping[tuple[int, str], BoardError] = field(default_factory=dict)
+    sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    def __add__(self, other: "Seen") -> "Seen":
+        return Seen(
+            self.corners + other.corners,
+            self.planes + other.planes,
+            {**self.refused, **other.refused},
+            {**self.sizes, **other.sizes},
+        )
+
+
+def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
+    """What all shots show of a board; see `see`."""
+    seen = Seen()
+    for shot in shots:
+        seen += see(target, shot, cameras)
+    return seen
+
+
+def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> Seen:
+    """What one shot shows of a board.
+
+    A sensor that makes images is asked for the board's points in them, and one that measures distances for those
+    within. Where a sensor measures distances only, the pose of the board as another sensor sees it, and the `cameras`
+    known so far, say where; without them such a sensor is left out.
+    """
+    corners: list[CornerView] = []
+    planes: list[PlaneView] = []
+    refused: dict[tuple[int, str], BoardError] = {}
+    sizes: dict[str, tuple[int, int]] = {}
+    for sensor, look in shot.looks.items():
+        if not look.image.size:
+            continue
+        sizes[sensor] = (look.image.shape[1], look.image.shape[0])
+        try:
+            found = _find(target, look)
+        except BoardError as error:
+            refused[shot.number, sensor] = error
+            continue
+        view = found.view(target, sensor, shot.number, look.t_ns * 1e-9)
+        corners.append(view)
+        planes += _plane(view, look)
+    for sensor, look in shot.looks.items():
+        if not look.image.size and look.distance.size:
+            sizes[sensor] = (look.distance.shape[1], look.distance.shape[0])
+            planes += _hidden_plane(target, sensor, shot, corners, cameras)
+    return Seen(tuple(corners), tuple(planes), refused, sizes)
+
+
+def _find(target: Target, look: Look) -> Detection:
+    largest = detection.LARGEST_SATURATED_ACTIVE if look.own_light else detection.LARGEST_SATURATED
+    found = detection.detect(target, look.image, largest)
+    if look.before is not look.image and look.before.shape == look.image.shape:
+        change = stillness.changed(grey(look.before), grey(look.image), found.pixels)
+        if change > stillness.LARGEST_CHANGE:
+            raise refusal.MovedError("the board moved since the image before. Hold it still for a moment")
+    return found
+
+
+def _plane(view: CornerView, look: Look) -> list[PlaneView]:
+    if look.distance.shape != look.image.shape[:2]:
+        return []
+    inside = plane.bright(look.image, plane.region(view.pixels, look.distance.shape))
+    inside = inside & ~quality.is_saturated(look.image)
+    found = plane.plane_view(view.sensor, view.shot, view.t_s, inside, look.distance, look.sigma)
+    return [] if found is None else [found]
+
+
+def _hidden_plane(
+    target: Target, sensor: str, shot: Shot, corners: list[CornerView], cameras: Mapping[str, Camera]
+) -> list[PlaneView]:
+    seeing = [view for view in corners if view.sensor in cameras]
+    if sensor not in cameras or not seeing:
+        return []
+    best = max(seeing, key=lambda view: len(view.points_b))
+    T_rb = plane.board_pose(best, cameras[best.sensor])
+    if T_rb is None:
+        return []
+    look = shot.looks[sensor]
+    inside = plane.projected_region(target, T_rb, cameras[sensor], _SLACK_PX)
+    found = plane.plane_view(sensor, shot.number, look.t_ns * 1e-9, inside, look.distance, look.sigma)
+    return [] if found is None else [found]

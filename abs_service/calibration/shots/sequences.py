@@ -1,0 +1,231 @@
+"""Depth sequences out of recordings, folders of images and live devices, one for each exposure setting."""
+
+import threading
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.calibration.shots.frame_averaging import MeanLooks
+from abs_service.calibration.shots.shots import Look
+from calib.camera import Camera
+from drivers.contract.device import Device, DeviceState, Truth
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.opening import open_device
+from drivers.replay import Recording
+
+#: How long a live device may take until its first frame, and then between two [s].
+PATIENCE_S = 20.0
+
+
+class SequenceError(Exception):
+    """A source without a sequence that a sensor's noise could be learnt from; says why."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sequence:
+    """Frames of one depth sensor with one exposure setting.
+
+    Attributes:
+        name: of the source, for people.
+        sensor: that took them.
+        camera: its camera.
+        lengths: what it delivered (n, height, width) [m], z or radial; NaN without return.
+        amplitude: (n, height, width); NaN without.
+        claimed: deviation that the sensor itself claims (height, width) [m], on average; NaN without.
+        radial: whether the lengths are radial.
+        digit: smallest difference that they can have [m]; 0 if they are no whole numbers.
+        exposure: the setting, for people; "" if the frames do not tell.
+        filters: that the device says it applied.
+        looks: what this and other sensors saw on average, by sensor, if they make images that can show a board.
+        cameras: of all sensors, by name.
+    """
+
+    name: str
+    sensor: str
+    camera: Camera
+    lengths: NDArray[np.float32]
+    amplitude: NDArray[np.float32]
+    claimed: NDArray[np.float32]
+    radial: bool
+    digit: float
+    exposure: str
+    filters: tuple[str, ...]
+    looks: Mapping[str, Look]
+    cameras: Mapping[str, Camera]
+
+    @property
+    def along(self) -> NDArray[np.float64]:
+        """Radial distance per unit of the lengths (height, width)."""
+        return np.ones(self.lengths.shape[1:]) if self.radial else 1 / self.camera.rays()[..., 2]
+
+
+def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
+    """The same with other cameras of some sensors; those of sensors that it does not have do not count.
+
+    Raises:
+        SequenceError: the depth sensor's new camera has images of another size.
+    """
+    known = {name: cameras.get(name, camera) for name, camera in sequence.cameras.items()}
+    camera = known[sequence.sensor]
+    if (camera.height, camera.width) != sequence.lengths.shape[1:]:
+        height, width = sequence.lengths.shape[1:]
+        raise SequenceError(
+            f"{sequence.name}: {sequence.sensor} has images of {width} × {height} pixels, but was calibrated with "
+            f"{camera.width} × {camera.height}"
+        )
+    return replace(sequence, camera=camera, cameras=known)
+
+
+def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
+    """The sequences of one sensor in a recording of abs-service.
+
+    Args:
+        path: of the file.
+        sensor: name; "" for the only depth sensor.
+        most: frames to read at most; the first ones.
+
+    Raises:
+        SequenceError: there is no such sensor, or none or several without a name.
+        RecordingError: the file is damaged or no recording.
+    """
+    recording = Recording(path)
+    frames = (item for item in recording.frames() if isinstance(item, Frame))
+    return of_frames(path.name, frames, recording.cameras, sensor, most)
+
+
+def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> list[Sequence]:
+    """The sequences of one sensor of a live device; arguments and errors as of `of_recording`.
+
+    Raises:
+        DeviceError: the device cannot be opened.
+        SequenceError: it does not stream.
+    """
+    device = open_device(uri, clock)
+    try:
+        collected = _Collected(most * max(1, len(device.capabilities.streams)))
+        device.start(collected)
+        collected.wait()
+        device.stop()
+    finally:
+        device.close()
+    if not collected.frames:
+        raise SequenceError(f"{uri}: no frame came within {PATIENCE_S:g} s: {collected.reason or 'it gave no reason'}")
+    return of_frames(_short(device), collected.frames, device.cameras, sensor, most)
+
+
+def of_frames(
+    name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, most: int
+) -> list[Sequence]:
+    """Sorts frames into sequences, one for every exposure setting; arguments and errors as of `of_recording`."""
+    gathered: dict[str, _Gathered] = {}
+    others = MeanLooks()
+    chosen = sensor
+    for frame in frames:
+        if frame.kind is Kind.DEPTH and not chosen:
+            chosen = frame.sensor
+        if frame.kind is Kind.DEPTH and not sensor and frame.sensor != chosen:
+            raise SequenceError(f"{name}: there are several depth sensors, {chosen} and {frame.sensor}; choose one")
+        if frame.sensor == chosen or not chosen:
+            gathered.setdefault(_setting(frame), _Gathered()).add(frame)
+        else:
+            others.add(frame)
+        if sum(len(one.depth) for one in gathered.values()) > most:
+            break
+    gathered = {setting: one for setting, one in gathered.items() if one.depth}
+    if not gathered:
+        raise SequenceError(f"{name}: there is no depth image" + (f" of a sensor {sensor!r}" if sensor else ""))
+    if chosen not in cameras:
+        raise SequenceError(f"{name}: nothing says which camera sensor {chosen!r} has")
+    seen = others.looks()
+    return [one.sequence(name, setting, cameras, seen, most) for setting, one in gathered.items()]
+
+
+@dataclass(eq=False)
+class _Gathered:
+    """Frames of one exposure setting, by number of the exposure."""
+
+    depth: dict[tuple[int, int], Frame] = field(default_factory=dict)
+    amplitude: dict[tuple[int, int], Frame] = field(default_factory=dict)
+    claimed: dict[tuple[int, int], Frame] = field(default_factory=dict)
+    looks: MeanLooks = field(default_factory=MeanLooks)
+
+    def add(self, frame: Frame) -> None:
+        """Takes a frame, whatever it is of."""
+        places = {Kind.DEPTH: self.depth, Kind.AMPLITUDE: self.amplitude, Kind.DEVIATION: self.claimed}
+        places.get(frame.kind, {})[frame.epoch, frame.seq] = frame
+        self.looks.add(frame)
+
+    def sequence(
+        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, Look], most: int
+    ) -> Sequence:
+        """The sequence of the first so many depth images; without amplitudes if one of them has none."""
+        numbers = list(self.depth)[:most]
+        first = self.depth[numbers[0]]
+        lengths = np.stack([self.depth[number].si() for number in numbers])
+        nothing = np.full((1, *lengths.shape[1:]), np.nan, np.float32)
+        amplitude = self._images(self.amplitude, numbers, np.broadcast_to(nothing, lengths.shape))
+        claimed = self._images(self.claimed, numbers, nothing)
+        return Sequence(
+            f"{name} ({setting})" if setting else name,
+            first.sensor,
+            cameras[first.sensor],
+            lengths,
+            amplitude,
+            claimed.mean(axis=0),
+            first.geometry == Geometry.RADIAL,
+            first.scale if first.data.dtype.kind in "ui" else 0.0,
+            setting,
+            first.filters,
+            {**others, **self.looks.looks()},
+            cameras,
+        )
+
+    @staticmethod
+    def _images(
+        frames: Mapping[tuple[int, int], Frame], numbers: list[tuple[int, int]], otherwise: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        return np.stack([frames[n].si() for n in numbers]) if all(n in frames for n in numbers) else otherwise
+
+
+class _Collected:
+    """A sink that keeps so many frames."""
+
+    def __init__(self, most: int) -> None:
+        self.frames: list[Frame] = []
+        self.reason = ""
+        self._most = most
+        self._more = threading.Semaphore(0)
+
+    def on_frame(self, frame: Frame) -> None:
+        self.frames.append(frame)
+        self._more.release()
+
+    def on_truth(self, truth: Truth) -> None:
+        pass
+
+    def on_state(self, state: DeviceState, reason: str) -> None:
+        self.reason = reason
+
+    def on_warning(self, condition: str, message: str) -> None:
+        pass
+
+    def wait(self) -> None:
+        """Until there are enough frames, or no more come."""
+        for _ in range(self._most):
+            if not self._more.acquire(timeout=PATIENCE_S):
+                return
+
+
+def _setting(frame: Frame) -> str:
+    """Exposure settings that amplitudes can be compared within."""
+    exposure = f"{frame.exposure_s * 1e3:.3g} ms" if np.isfinite(frame.exposure_s) else ""
+    gain = f"gain {frame.gain:.3g}" if np.isfinite(frame.gain) else ""
+    return ", ".join(part for part in (exposure, gain, frame.modulation) if part)
+
+
+def _short(device: Device) -> str:
+    uri = device.info.uri
+    return uri if len(uri) <= 60 else f"{uri[:57]}…"

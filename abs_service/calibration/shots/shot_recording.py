@@ -1,0 +1,86 @@
+"""Writes shots as a recording, which all commands that read recordings read."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from abs_service.bus import keys
+from abs_service.bus.stamps import Speaker
+from abs_service.calibration.shots.shots import Shot
+from abs_service.capture import sensor_metadata
+from calib.camera import Camera
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import McapFile
+
+
+class ShotFileError(Exception):
+    """A recording of shots that cannot be written; names the file."""
+
+
+class ShotRecording:
+    """A recording that grows by the frames of one shot after another, and of the set before each.
+
+    Args:
+        path: file to write; must not exist.
+        speaker: writes the headers.
+        cameras: of all sensors, by name.
+        rig_toml: configuration to attach.
+
+    Raises:
+        ShotFileError: the file exists, or cannot be written.
+    """
+
+    def __init__(self, path: Path, speaker: Speaker, cameras: Mapping[str, Camera], rig_toml: str) -> None:
+        self._path = path
+        self._speaker = speaker
+        try:
+            self._stream = path.open("xb")
+        except FileExistsError:
+            raise ShotFileError(f"{path}: exists already; remove it or choose another name") from None
+        except OSError as error:
+            raise ShotFileError(f"{path}: cannot be written: {error.strerror}") from error
+        self._file = McapFile(self._stream)
+        now_ns = speaker.clock.wall(speaker.clock.monotonic())
+        self._file.attach("rig.toml", "text/toml", rig_toml.encode(), now_ns)
+        self._write_cameras(cameras, now_ns)
+
+    def write(self, shot: Shot) -> None:
+        """Adds a shot, and makes sure that it is on disk.
+
+        Raises:
+            ShotFileError: the disk is full, or gone.
+        """
+        try:
+            for frame in sorted(shot.frames, key=lambda frame: frame.t_host_ns):
+                self._write_frame(frame)
+            self._file.flush()
+        except OSError as error:
+            raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
+
+    def finish(self) -> None:
+        """Closes the file.
+
+        Raises:
+            ShotFileError: the disk is full, or gone.
+        """
+        try:
+            self._file.finish()
+        except OSError as error:
+            raise ShotFileError(f"{self._path}: cannot be written: {error.strerror}") from error
+        finally:
+            self._stream.close()
+
+    def _write_cameras(self, cameras: Mapping[str, Camera], wall_ns: int) -> None:
+        for sensor, camera in cameras.items():
+            model = sensor_metadata.sensor_model(self._speaker.now(0), sensor, camera, {})
+            calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
+            for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
+                self._file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
+        poses = sensor_metadata.transforms(cameras, wall_ns)
+        self._file.write(f"/{keys.TRANSFORMS}", poses.DESCRIPTOR.full_name, poses.SerializeToString(), wall_ns, 0)
+
+    def _write_frame(self, frame: Frame) -> None:
+        topic, wall_ns = keys.image(frame.sensor, frame.stream), self._speaker.clock.wall(frame.t_host_ns)
+        info = codec.encode_info(frame, self._speaker.header(frame.t_host_ns, frame.seq))
+        self._file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+        self._file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)

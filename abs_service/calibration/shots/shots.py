@@ -1,0 +1,174 @@
+"""Shots: what the sensors of a rig saw at one moment, wherever the images come from."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import chain, pairwise
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from drivers.contract.frame import ENCODINGS, Frame, FrameSet, Geometry, Kind
+
+Array = NDArray[np.integer | np.floating]
+
+#: Which image of a sensor corners are sought in, the best first.
+SOUGHT = (Kind.COLOR, Kind.BAYER, Kind.AMPLITUDE, Kind.IR, Kind.INTENSITY)
+#: What a shot is made of besides.
+USED = frozenset({*SOUGHT, Kind.DEPTH, Kind.DEVIATION})
+
+#: Images of the sensor's own light: where it is saturated, distances are wrong.
+OWN_LIGHT = frozenset({Kind.AMPLITUDE, Kind.IR})
+
+#: What changed within this time moved; what changed in a longer time may have been moved and held still again [ns].
+_CLOSE_NS = 250_000_000
+
+_GREY_OF_BAYER = {
+    "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
+    "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
+    "bayer_gbrg8": cv2.COLOR_BayerGBRG2GRAY,
+    "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
+}
+
+#: Stands for an image that a sensor does not make.
+NO_IMAGE: Array = np.zeros((0, 0), np.uint8)
+NO_DISTANCE: NDArray[np.float32] = np.zeros((0, 0), np.float32)
+
+
+class ShotsError(Exception):
+    """Images that a calibration cannot use; the message names where they come from."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Look:
+    """What one sensor saw at one moment.
+
+    Attributes:
+        t_ns: time of its exposure [ns]; of a rig all count from the same moment.
+        image: in which corners are sought, (height, width) or (height, width, 3); `NO_IMAGE` if there is none.
+        before: the image before it, the same one if there was none; tells whether anything moves.
+        own_light: whether the image is of the sensor's own light.
+        distance: radial distances (height, width) [m], NaN without return; `NO_DISTANCE` if it measures none.
+        sigma: what the sensor says that they scatter by (height, width) [m], NaN where it does not.
+    """
+
+    t_ns: int
+    image: Array
+    before: Array
+    own_light: bool = False
+    distance: NDArray[np.float32] = field(default_factory=lambda: NO_DISTANCE)
+    sigma: NDArray[np.float32] = field(default_factory=lambda: NO_DISTANCE)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """One moment.
+
+    Attributes:
+        number: of the moment.
+        looks: what each sensor saw, by sensor name; a sensor that saw nothing is missing.
+        frames: what it was made of, with those shortly before that tell what moved; empty if it was made of files.
+    """
+
+    number: int
+    looks: Mapping[str, Look]
+    frames: tuple[Frame, ...] = ()
+
+    @property
+    def t_ns(self) -> int:
+        """Time of the earliest exposure [ns]."""
+        return min((look.t_ns for look in self.looks.values()), default=0)
+
+
+class Assembler:
+    """Makes shots of sets of frames.
+
+    Args:
+        cameras: the camera that each sensor's frames are said to come from; turns z into radial distances.
+    """
+
+    def __init__(self, cameras: Mapping[str, Camera]) -> None:
+        self._cameras = cameras
+        self._stretch: dict[str, NDArray[np.float32]] = {}
+
+    def shot(self, number: int, frames: FrameSet, before: FrameSet) -> Shot:
+        """The shot of a set of frames.
+
+        Raises:
+            ShotsError: a depth image does not fit its sensor's camera.
+        """
+        sensors = dict.fromkeys(sensor for sensor, _ in frames.frames)
+        looks = {sensor: self._look(sensor, frames, before) for sensor in sensors}
+        both = {
+            (frame.key, frame.t_host_ns): frame for frames_ in (before, frames) for frame in frames_.frames.values()
+        }
+        return Shot(number, looks, tuple(both.values()))
+
+    def _look(self, sensor: str, frames: FrameSet, before: FrameSet) -> Look:
+        now, earlier = _by_kind(sensor, frames), _by_kind(sensor, before)
+        sought = next((kind for kind in SOUGHT if kind in now), None)
+        depth = now.get(Kind.DEPTH)
+        distance = NO_DISTANCE if depth is None else self._radial(depth)
+        deviation = now.get(Kind.DEVIATION)
+        sigma = np.full_like(distance, np.nan) if deviation is None else deviation.si()
+        if sought is None:
+            first = depth if depth is not None else next(iter(now.values()))
+            return Look(first.t_host_ns, NO_IMAGE, NO_IMAGE, distance=distance, sigma=sigma)
+        image = pixels(now[sought])
+        former = pixels(earlier.get(sought, now[sought]))
+        return Look(now[sought].t_host_ns, image, former, sought in OWN_LIGHT, distance, sigma)
+
+    def _radial(self, depth: Frame) -> NDArray[np.float32]:
+        distance = depth.si()
+        if depth.geometry != Geometry.Z:
+            return distance
+        camera = self._cameras.get(depth.sensor)
+        if camera is None or (camera.height, camera.width) != distance.shape:
+            raise ShotsError(
+                f"{depth.sensor}/{depth.stream}: distances along z need the camera model of {depth.sensor} for "
+                f"{distance.shape[1]} × {distance.shape[0]} pixels"
+            )
+        if depth.sensor not in self._stretch:
+            self._stretch[depth.sensor] = (1 / camera.rays()[..., 2]).astype(np.float32)
+        return distance * self._stretch[depth.sensor]
+
+
+def thinned(sets: Iterable[FrameSet], assembler: Assembler, every_s: float) -> Iterator[Shot]:
+    """Shots of sets of frames, at least `every_s` apart; the set before each tells what moved.
+
+    A set that has none shortly before it is left out if it has one shortly after it: that one will tell. A set on its
+    own is taken for still.
+
+    Raises:
+        ShotsError: as `Assembler.shot`.
+    """
+    last_ns: int | None = None
+    before: FrameSet | None = None
+    number = 0
+    waiting: Iterator[FrameSet | None] = chain(sets, [None])
+    for frames, after in pairwise(waiting):
+        if frames is None:
+            return
+        compared = before if before is not None and _is_close(before, frames) else frames
+        is_due = last_ns is None or frames.stamp_ns - last_ns >= every_s * 1e9
+        if is_due and (compared is not frames or not _is_close(frames, after)):
+            last_ns = frames.stamp_ns
+            yield assembler.shot(number, frames, compared)
+            number += 1
+        before = frames
+
+
+def _is_close(first: FrameSet | None, second: FrameSet | None) -> bool:
+    return first is not None and second is not None and second.stamp_ns - first.stamp_ns <= _CLOSE_NS
+
+
+def _by_kind(sensor: str, frames: FrameSet) -> dict[Kind, Frame]:
+    return {frame.kind: frame for (name, _), frame in frames.frames.items() if name == sensor}
+
+
+def pixels(frame: Frame) -> Array:
+    """The image of a frame as numbers that a board is sought in; a mosaic of colours becomes grey."""
+    if frame.kind == Kind.BAYER:
+        return cv2.cvtColor(np.ascontiguousarray(frame.data, np.uint8), _GREY_OF_BAYER[frame.encoding])
+    return frame.data.view(ENCODINGS[frame.encoding][0].type)

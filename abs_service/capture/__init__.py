@@ -1,0 +1,1 @@
+"""From a device to frames on the bus."""

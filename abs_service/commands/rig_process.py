@@ -1,0 +1,63 @@
+"""What every process of a rig has in common: its arguments, its session and how it is told to stop."""
+
+import argparse
+import os
+import signal
+import threading
+from pathlib import Path
+from types import FrameType
+
+from abs_service import config
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.supervision import gc_tuning
+
+
+def add_config(parser: argparse.ArgumentParser) -> None:
+    """Adds CONFIG."""
+    parser.add_argument(
+        "config", metavar="CONFIG", nargs="?", type=Path, help="TOML file of the rig (default: the simulated demo rig)"
+    )
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds CONFIG, --connect and --listen."""
+    add_config(parser)
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--connect", metavar="ENDPOINT", help="connect to this endpoint instead of bus.endpoint")
+    where.add_argument("--listen", metavar="ENDPOINT", help="let the others connect here, instead of connecting")
+
+
+def load_config(arguments: argparse.Namespace) -> config.ServiceConfig:
+    """The configuration that the arguments name.
+
+    Raises:
+        ConfigError: it cannot be used.
+    """
+    return config.load(arguments.config) if arguments.config else config.load_default()
+
+
+def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> ZenohBus:
+    """The bus that the configuration and the arguments describe; close it before the process ends.
+
+    Raises:
+        BusError: it cannot be opened.
+    """
+    gc_tuning.take_short_turns()
+    role = Role.ROUTER if arguments.listen else Role.CLIENT
+    endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
+    return ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory)
+
+
+def stop_on_signals() -> threading.Event:
+    """An event that SIGTERM and SIGINT set. A second signal ends the process on the spot."""
+    stop = threading.Event()
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        if stop.is_set():
+            os._exit(128 + number)
+        stop.set()
+
+    signal.signal(signal.SIGTERM, on_signal)
+    signal.signal(signal.SIGINT, on_signal)
+    return stop

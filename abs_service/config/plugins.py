@@ -1,0 +1,95 @@
+"""Exchangeable parts: `type = "nurbs"` names the module whose dataclass `Settings` takes the rest of the table."""
+
+import json
+import pkgutil
+from dataclasses import fields, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from abs_service.config.problems import Problem, ProblemsError, from_pydantic, none_of, unknown_key
+
+
+def available(package: str) -> list[str]:
+    """The values of `type` that name a module with `Settings` in a package; imports all of its modules."""
+    return sorted(name for name in _modules(package) if _is_part(package, name))
+
+
+def load(package: str, table: Any, base: Path) -> Any:
+    """The `Settings` of the module that a table's `type` names, from the other keys of the table.
+
+    Args:
+        package: dotted name of the package with the modules, such as `abs_service.tracker.models`.
+        table: what the TOML file holds.
+        base: folder that relative paths among the settings start from.
+
+    Raises:
+        ProblemsError: no such module, unknown keys, or values out of range; all of them.
+    """
+    if not isinstance(table, dict) or not isinstance(table.get("type"), str):
+        example = f'{{ type = "{available(package)[0]}", … }}'
+        raise ProblemsError(
+            [Problem((), f"must be a table such as {example}; types: {', '.join(available(package))}", table)]
+        )
+    name = table["type"]
+    if name not in _modules(package) or not _is_part(package, name):
+        raise ProblemsError([Problem(("type",), f"no such type, {none_of(name, available(package))}", name)])
+    return settings(f"{package}.{name}", {key: value for key, value in table.items() if key != "type"}, base)
+
+
+def settings(module: str, table: Any, base: Path) -> Any:
+    """The `Settings` of one module from a table without `type`.
+
+    A field with the metadata `parts = PACKAGE` is a table with a `type` of its own, the `Settings` of a module there.
+
+    Raises:
+        ProblemsError: unknown keys or values out of range; all of them.
+    """
+    Settings = import_module(module).Settings
+    if not isinstance(table, dict):
+        raise ProblemsError([Problem((), "must be a table", table)])
+    allowed = [field.name for field in fields(Settings)]
+    # pydantic ignores unknown keys of standard dataclasses, so a misspelt optional key would pass in silence.
+    problems = [unknown_key((key,), allowed) for key in table if key not in allowed]
+    nested: dict[str, Any] = {}
+    for key, package in _nested(Settings).items():
+        try:
+            nested |= {key: load(package, table[key], base)} if key in table else {}
+        except ProblemsError as error:
+            problems += [problem.under((key,)) for problem in error.problems]
+    try:
+        # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.
+        made = TypeAdapter(Settings).validate_json(json.dumps(table, default=str), strict=True)
+    except ValidationError as error:
+        raise ProblemsError(problems + from_pydantic(error, lambda _: allowed)) from None
+    if problems:
+        raise ProblemsError(problems)
+    values = {field.name: getattr(made, field.name) for field in fields(Settings)}
+    paths = {name: base / value for name, value in values.items() if isinstance(value, Path)}
+    return replace(made, **paths, **nested)
+
+
+def _nested(Settings: Any) -> dict[str, str]:
+    """The fields that are tables with a `type` of their own, and the packages that the types are modules of."""
+    return {field.name: field.metadata["parts"] for field in fields(Settings) if "parts" in field.metadata}
+
+
+def _modules(package: str) -> set[str]:
+    return {module.name for module in pkgutil.iter_modules(import_module(package).__path__)}
+
+
+def _is_part(package: str, name: str) -> bool:
+    return hasattr(import_module(f"{package}.{name}"), "Settings")
+
+
+def table(made: Any) -> dict[str, Any]:
+    """The TOML table that `load` makes the same settings from."""
+    return {"type": type(made).__module__.rpartition(".")[2], **plain(made)}
+
+
+def plain(made: Any) -> dict[str, Any]:
+    """The TOML table that `settings` makes the same settings from."""
+    values = TypeAdapter(type(made)).dump_python(made, mode="json", exclude_none=True)
+    return values | {name: table(getattr(made, name)) for name in _nested(made)}

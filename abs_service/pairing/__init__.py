@@ -1,0 +1,1 @@
+"""From frames to frame sets to observations in SI units."""

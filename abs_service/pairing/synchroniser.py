@@ -1,0 +1,199 @@
+"""Groups frames of several streams that show one moment. No thread, no clock: equal frames, equal sets."""
+
+from bisect import insort
+from collections import Counter, deque
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+from drivers.contract.frame import Frame, FrameSet
+
+Key = tuple[str, str]
+
+#: Frames per stream that may wait for others; a stream that is so far ahead waits in vain.
+DEPTH = 32
+#: Exposures per stream whose numbers are remembered, to recognise a frame that arrives twice.
+MEMORY = 256
+
+_NEVER_NS = -(1 << 63)
+
+
+class Synchroniser:
+    """Forms one `FrameSet` per frame of the reference stream.
+
+    A set is formed as soon as every other stream has a frame within the tolerance; the nearest is taken. It is formed
+    without the missing ones as soon as they cannot come any more: their stream is already past the tolerance, the
+    deadline is over, or too many reference frames wait. Sets leave in order of time, no frame is in two of them, and
+    within a stream later sets hold later frames.
+
+    Frames are compared on `t_host_ns`. A stream's size and encoding are those of the first frame of its epoch.
+
+    Args:
+        reference: stream whose frames give the sets their time.
+        members: all streams of a set; the reference may be among them.
+        tolerance_ns: largest difference between a member's and the reference's `t_host_ns` [ns].
+        deadline_ns: how long after its arrival a reference frame waits for others, see `poll` [ns].
+        offsets_ns: what has to be added to `t_host_ns` of the frames of some sensors, as a calibration found [ns].
+    """
+
+    def __init__(
+        self,
+        reference: Key,
+        members: Iterable[Key],
+        tolerance_ns: int,
+        deadline_ns: int = 100_000_000,
+        offsets_ns: Mapping[str, int] = MappingProxyType({}),
+    ) -> None:
+        self._reference = _Stream(reference)
+        self._members = {key: _Stream(key) for key in members if key != reference}
+        self._tolerance_ns = tolerance_ns
+        self._deadline_ns = deadline_ns
+        self._offsets_ns = offsets_ns
+        self._seq = 0
+        self._rejected: Counter[str] = Counter()
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """Frames that are in no set, as `<sensor>/<stream>.<cause>`.
+
+        Causes: `unexpected` stream, `old_epoch`, exposed in the `future` of its own arrival, `changed` size or
+        encoding, `duplicate` exposure, `stale` (too late for its set), `unmatched` (no reference frame near it),
+        `overflow` (too many wait for a reference frame).
+        """
+        return dict(self._rejected)
+
+    def add(self, frame: Frame) -> list[FrameSet]:
+        """Takes one frame and returns the sets that are decided now, in order of time."""
+        stream = self._reference if frame.key == self._reference.key else self._members.get(frame.key)
+        if stream is None:
+            self._count(frame.key, "unexpected")
+        elif frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
+            # Believing it would make every later frame of this stream stale.
+            self._count(frame.key, "future")
+        else:
+            offset_ns = self._offsets_ns.get(frame.sensor, 0)
+            self._insert(stream, replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
+        return self._form()
+
+    def poll(self, now_ns: int) -> list[FrameSet]:
+        """Returns the sets whose deadline is over at `now_ns` (CLOCK_MONOTONIC), with what there is.
+
+        A stream that made one set wait in vain is not waited for again before it has delivered.
+        """
+        sets: list[FrameSet] = []
+        while self._reference.waiting:
+            is_over = self._reference.waiting[0].t_arrival_ns + self._deadline_ns <= now_ns
+            if not is_over and not all(stream.silent for stream in self._undecided()):
+                break
+            sets.append(self._emit())
+        return sets
+
+    def flush(self) -> list[FrameSet]:
+        """Returns all sets that still wait, with what there is: the end of a recording."""
+        return [self._emit() for _ in range(len(self._reference.waiting))]
+
+    def _insert(self, stream: "_Stream", frame: Frame) -> None:
+        if objection := stream.objection(frame):
+            self._count(frame.key, objection)
+            return
+        stream.insert(frame)
+        if stream is not self._reference and len(stream.waiting) > DEPTH:
+            self._drop_oldest(stream, "overflow")
+
+    def _form(self) -> list[FrameSet]:
+        sets: list[FrameSet] = []
+        while self._reference.waiting and (len(self._reference.waiting) > DEPTH or not self._undecided()):
+            sets.append(self._emit())
+        return sets
+
+    def _undecided(self) -> list["_Stream"]:
+        """The streams for which the first waiting set has no frame, but may still get one."""
+        t_ns = self._reference.waiting[0].t_host_ns
+        return [
+            stream
+            for stream in self._members.values()
+            if stream.latest_ns <= t_ns + self._tolerance_ns and stream.nearest(t_ns, self._tolerance_ns) is None
+        ]
+
+    def _emit(self) -> FrameSet:
+        silent = self._undecided()
+        reference = self._reference.take_oldest()
+        t_ns = reference.t_host_ns
+        frames, missing, spread_ns = {reference.key: reference}, [], 0
+        for stream in self._members.values():
+            nearest = stream.nearest(t_ns, self._tolerance_ns)
+            stream.silent = stream in silent
+            # What lies before its frame, or before the reach of any later set, is of no use any more.
+            useless_ns = t_ns - self._tolerance_ns if nearest is None else nearest.t_host_ns - 1
+            while stream.waiting and stream.waiting[0].t_host_ns <= useless_ns:
+                self._drop_oldest(stream, "unmatched")
+            stream.passed_ns = max(stream.passed_ns, useless_ns)
+            if nearest is None:
+                missing.append(stream.key)
+                continue
+            frames[stream.key] = stream.take_oldest()
+            spread_ns = max(spread_ns, abs(nearest.t_host_ns - t_ns))
+        self._seq += 1
+        return FrameSet(self._seq - 1, t_ns, frames, tuple(missing), spread_ns)
+
+    def _drop_oldest(self, stream: "_Stream", cause: str) -> None:
+        stream.take_oldest()
+        self._count(stream.key, cause)
+
+    def _count(self, key: Key, cause: str) -> None:
+        self._rejected[f"{key[0]}/{key[1]}.{cause}"] += 1
+
+
+class _Stream:
+    """Frames of one stream that wait, by time, and what is known of the stream."""
+
+    def __init__(self, key: Key) -> None:
+        self.key = key
+        self.waiting: list[Frame] = []
+        self.passed_ns = _NEVER_NS  # frames up to here are in a set or of no use
+        self.latest_ns = _NEVER_NS  # of the frame that arrived last: the stream has come so far
+        self.silent = False  # made the last set wait in vain
+        self._epoch = -1
+        self._form: tuple[object, ...] = ()
+        self._seen: deque[int] = deque(maxlen=MEMORY)
+
+    def objection(self, frame: Frame) -> str:
+        """Why a frame cannot be used; "" if it can."""
+        if frame.epoch < self._epoch:
+            return "old_epoch"
+        if frame.epoch == self._epoch:
+            if _form_of(frame) != self._form:
+                return "changed"
+            if frame.seq in self._seen:
+                return "duplicate"
+        if frame.t_host_ns <= self.passed_ns:
+            return "stale"
+        if any(frame.t_host_ns == other.t_host_ns for other in self.waiting):
+            return "duplicate"
+        return ""
+
+    def insert(self, frame: Frame) -> None:
+        """Takes a frame to which there is no objection; a new epoch forgets what was known of the last one."""
+        if frame.epoch > self._epoch:
+            self._epoch = frame.epoch
+            self._form = _form_of(frame)
+            self._seen.clear()
+        self._seen.append(frame.seq)
+        self.latest_ns = frame.t_host_ns
+        self.silent = False
+        insort(self.waiting, frame, key=lambda other: other.t_host_ns)
+
+    def take_oldest(self) -> Frame:
+        """Removes the first waiting frame; nothing before it is accepted from now on."""
+        frame = self.waiting.pop(0)
+        self.passed_ns = frame.t_host_ns
+        return frame
+
+    def nearest(self, t_ns: int, tolerance_ns: int) -> Frame | None:
+        """The waiting frame nearest to a time, if it is within the tolerance."""
+        frame = min(self.waiting, key=lambda other: abs(other.t_host_ns - t_ns), default=None)
+        return frame if frame is not None and abs(frame.t_host_ns - t_ns) <= tolerance_ns else None
+
+
+def _form_of(frame: Frame) -> tuple[object, ...]:
+    return frame.data.shape, frame.encoding, frame.geometry, frame.scale

@@ -1,0 +1,1 @@
+"""The recorder, its files, and the repair of files that were cut short."""

@@ -1,0 +1,105 @@
+"""One recording on disk, from its first byte to its final name."""
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import BinaryIO
+
+from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
+
+#: Added to the name while the file is written; what still has it when nobody writes was cut short.
+ACTIVE = ".active"
+
+
+def open_for_writing(path: Path) -> BinaryIO:
+    """Creates a file that must not exist yet."""
+    return path.open("xb")
+
+
+class RecordingFile:
+    """An MCAP file that is called `*.mcap.active` until it is complete.
+
+    The file is locked as long as this process lives and writes, so that nobody takes it for a leftover.
+
+    Args:
+        directory: where it goes.
+        name: its beginning; the time follows.
+        wall_ns: wall-clock time of its beginning [ns].
+        attachments: texts to attach at the start, by name.
+        compression, chunk_size: see `McapFile`.
+        open_file: creates the stream; a test may give a slow or full one.
+
+    Raises:
+        OSError: the file cannot be created or does not take the attachments.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        name: str,
+        wall_ns: int,
+        attachments: Mapping[str, str],
+        compression: Compression = Compression.LZ4,
+        chunk_size: int = CHUNK_SIZE,
+        open_file: Callable[[Path], BinaryIO] = open_for_writing,
+    ) -> None:
+        self.path = _free_name(directory, name, wall_ns)
+        self._active = self.path.with_name(self.path.name + ACTIVE)
+        self._stream = open_file(self._active)
+        try:
+            fcntl.flock(self._stream.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._file = McapFile(self._stream, compression, chunk_size)
+            for attachment, text in attachments.items():
+                self._file.attach(attachment, "text/toml", text.encode(), wall_ns)
+            self.flush()
+        except OSError:
+            self.abandon()
+            raise
+
+    @property
+    def size(self) -> int:
+        """Bytes written so far, but for the open chunk."""
+        return self._stream.tell()
+
+    def write(self, topic: str, message: str, payload: bytes, stamp_ns: int, seq: int) -> None:
+        """Appends one message; see `McapFile.write`. After an `OSError` only `abandon` makes sense."""
+        self._file.write(f"/{topic}", message, payload, stamp_ns, seq)
+
+    def attach(self, name: str, media_type: str, text: str, stamp_ns: int) -> None:
+        """Adds an attachment, at the start or later; see `McapFile.attach`."""
+        self._file.attach(name, media_type, text.encode(), stamp_ns)
+
+    def flush(self) -> None:
+        """Brings everything written so far to the disk, past the caches: neither a kill nor a power cut takes it."""
+        self._file.flush()
+        os.fdatasync(self._stream.fileno())
+
+    def finish(self, summary: Mapping[str, str]) -> Path:
+        """Writes `summary` as metadata and the index, closes the file and gives it its final name, which it returns."""
+        self._file.describe("abs.recording", summary)
+        self._file.finish()
+        os.fsync(self._stream.fileno())
+        self._stream.close()
+        os.rename(self._active, self.path)
+        return self.path
+
+    def abandon(self) -> Path:
+        """Closes the file as it is, to be recovered later; returns where it is."""
+        with contextlib.suppress(OSError):  # closing tries once more to write what the disk did not take
+            self._stream.close()
+        return self._active
+
+
+def _free_name(directory: Path, name: str, wall_ns: int) -> Path:
+    """A name that neither a finished nor an unfinished nor a recovered recording has."""
+    start = f"{name}_{datetime.fromtimestamp(wall_ns // 10**9, UTC):%Y-%m-%dT%H-%M-%SZ}"
+    taken = {path.name.split(".")[0] for path in directory.iterdir()}
+    counter = 1
+    stem = start
+    while stem in taken:
+        counter += 1
+        stem = f"{start}_{counter}"
+    return directory / f"{stem}.mcap"

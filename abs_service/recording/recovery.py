@@ -1,0 +1,130 @@
+"""Saves what can be read of a recording that was cut short or damaged."""
+
+import contextlib
+import fcntl
+import mmap
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.writer import MCAP0_MAGIC
+
+from abs_service.recording.mcap_scan import find_chunk
+from abs_service.recording.recording_file import ACTIVE
+from abs_service.recording.salvage import Salvage
+
+BROKEN = ".broken"
+RECOVERING = ".recovering"
+
+
+class RecoveryError(Exception):
+    """A file that cannot be recovered; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What became of one file.
+
+    Attributes:
+        source: the file that was read, where it is now; None if everything in it was saved and it is gone.
+        target: the file with all that could be read, complete with an index.
+        messages: messages saved.
+        chunks: chunks saved.
+        damaged: chunks and attachments left out because their checksum is wrong.
+        orphans: messages left out because nothing says what they are.
+        skipped_bytes: bytes that are no record, such as a torn end.
+    """
+
+    source: Path | None
+    target: Path
+    messages: int
+    chunks: int
+    damaged: int
+    orphans: int
+    skipped_bytes: int
+
+    def __str__(self) -> str:
+        saved = f"{self.target}: {self.messages} messages in {self.chunks} chunks saved"
+        if self.source is None:
+            return f"{saved}, nothing lost"
+        lost = f"{self.damaged} damaged chunks, {self.orphans} unknown messages and {self.skipped_bytes} bytes left out"
+        return f"{saved}; {lost}; the original is {self.source}"
+
+
+def recover(source: Path) -> Report:
+    """Writes all that can be read of `source` to a new file with an index, beside it.
+
+    `x.mcap.active` becomes `x.mcap`, and itself `x.mcap.broken` unless all of it was saved. Of any other file, `x.mcap`
+    say, the result is `x.recovered.mcap` and the original stays. The new file has its name only when it is complete; to
+    recover again after an interruption is safe.
+
+    Raises:
+        RecoveryError: the file cannot be read, is no MCAP file, or another process is writing it.
+        OSError: the new file cannot be written.
+    """
+    was_active = source.name.endswith(ACTIVE)
+    name = source.name.removesuffix(ACTIVE) if was_active else f"{source.name.removesuffix('.mcap')}.recovered.mcap"
+    target = source.with_name(name)
+    unfinished = target.with_name(target.name + RECOVERING)
+    with _locked(source) as stream, _mapped(source, stream) as data:
+        try:
+            with unfinished.open("wb") as output:
+                salvage = Salvage(data, output)
+                salvage.run()
+                output.flush()
+                os.fsync(output.fileno())
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
+        os.replace(unfinished, target)
+        lossless = not (salvage.damaged or salvage.orphans or salvage.skipped_bytes)
+        kept = _retire(source, lossless) if was_active else source
+    return Report(
+        kept,
+        target,
+        salvage.messages,
+        salvage.chunks,
+        salvage.damaged,
+        salvage.orphans,
+        salvage.skipped_bytes,
+    )
+
+
+def leftovers(directory: Path) -> list[Path]:
+    """Recordings in `directory` that were not finished, oldest first; some may still be written by another process."""
+    return sorted(directory.glob(f"*.mcap{ACTIVE}"), key=lambda path: path.stat().st_mtime)
+
+
+def _retire(source: Path, lossless: bool) -> Path | None:
+    if lossless:
+        source.unlink()
+        return None
+    broken = source.with_name(source.name.removesuffix(ACTIVE) + BROKEN)
+    os.replace(source, broken)
+    return broken
+
+
+@contextlib.contextmanager
+def _locked(source: Path) -> Iterator[BinaryIO]:
+    try:
+        stream = source.open("rb")
+    except OSError as error:
+        raise RecoveryError(f"{source}: cannot be read: {error.strerror}") from None
+    with stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RecoveryError(f"{source}: another process is writing or recovering it") from None
+        yield stream
+
+
+@contextlib.contextmanager
+def _mapped(source: Path, stream: BinaryIO) -> Iterator[mmap.mmap]:
+    if os.fstat(stream.fileno()).st_size == 0:
+        raise RecoveryError(f"{source}: the file is empty; nothing was recorded")
+    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if data[: len(MCAP0_MAGIC)] != MCAP0_MAGIC and find_chunk(data, 0) == len(data):
+            raise RecoveryError(f"{source}: holds no MCAP record")
+        yield data

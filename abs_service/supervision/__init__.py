@@ -1,0 +1,1 @@
+"""Child processes, and the life and end of `abs-service run`."""

@@ -1,0 +1,134 @@
+"""Child processes of the supervisor: each in a group of its own, on a lifeline, with its last words kept."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import IO, Protocol
+
+from abs_service.supervision import parent_watchdog
+
+#: Lines of a child's output that are kept.
+LAST_WORDS = 40
+
+
+class Process(Protocol):
+    """A process that runs or has ended."""
+
+    @property
+    def pid(self) -> int:
+        """Its number; 0 if there is none."""
+        ...
+
+    def poll(self) -> int | None:
+        """The exit code, negative for a signal; None while it runs."""
+        ...
+
+    def terminate(self) -> None:
+        """Asks it to end in order; harmless if it has."""
+        ...
+
+    def kill(self) -> None:
+        """Ends it and everything it started; harmless if it has ended."""
+        ...
+
+    def last_words(self) -> str:
+        """The last lines of what it wrote."""
+        ...
+
+
+class _NoProcess:
+    """Where there is no process: it has ended, and nothing that is asked of it matters."""
+
+    pid = 0
+
+    def poll(self) -> int:
+        """It has ended."""
+        return 0
+
+    def terminate(self) -> None:
+        """Does nothing."""
+
+    def kill(self) -> None:
+        """Does nothing."""
+
+    def last_words(self) -> str:
+        """It never said anything."""
+        return ""
+
+
+NO_PROCESS: Process = _NoProcess()
+
+#: Starts a component (its name is for the lines it writes) with arguments of `abs-service`.
+Spawn = Callable[[str, Sequence[str]], Process]
+
+
+class ChildProcess:
+    """`abs-service ARGUMENTS` as a child.
+
+    Args:
+        component: what it is called.
+        arguments: the command line after `abs-service`.
+        on_line: called with the component and each line that the child writes, from a thread.
+        program: what runs the arguments.
+    """
+
+    def __init__(
+        self,
+        component: str,
+        arguments: Sequence[str],
+        on_line: Callable[[str, str], None],
+        program: Sequence[str] = (sys.executable, "-m", "abs_service"),
+    ) -> None:
+        self._lines: deque[str] = deque(maxlen=LAST_WORDS)
+        # A group of its own, so that Ctrl-C in the terminal reaches only the supervisor, which knows the order.
+        self._process = subprocess.Popen(
+            [*program, *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env=os.environ | {parent_watchdog.VARIABLE: "1", "PYTHONUNBUFFERED": "1"},
+            process_group=0,
+            text=True,
+            errors="replace",
+        )
+        self._reader = threading.Thread(
+            target=self._read, args=(self._process.stdout, component, on_line), name=component, daemon=True
+        )
+        self._reader.start()
+
+    @property
+    def pid(self) -> int:
+        """See `Process`."""
+        return self._process.pid
+
+    def poll(self) -> int | None:
+        """See `Process`."""
+        return self._process.poll()
+
+    def terminate(self) -> None:
+        """See `Process`."""
+        if self.poll() is None:
+            self._process.terminate()
+
+    def kill(self) -> None:
+        """See `Process`."""
+        if self.poll() is None:
+            os.killpg(self.pid, signal.SIGKILL)
+            with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the kernel, say in a driver
+                self._process.wait(1.0)
+
+    def last_words(self) -> str:
+        """See `Process`; waits until all that an ended process wrote has been read."""
+        self._reader.join(timeout=1.0)
+        return "\n".join(self._lines)
+
+    def _read(self, output: IO[str], component: str, on_line: Callable[[str, str], None]) -> None:
+        with output, self._process:  # leaving the latter waits for the end and closes the lifeline
+            for line in output:
+                self._lines.append(line.rstrip("\n"))
+                on_line(component, line.rstrip("\n"))

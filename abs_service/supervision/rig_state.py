@@ -1,0 +1,98 @@
+"""What a running rig said lately, gathered from its messages for people and scripts to read."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.health_pb2 import Health
+from absmsg.v1.surface_truth_pb2 import SurfaceTruth
+from google.protobuf.message import DecodeError
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Sample
+from abs_service.tracking.tracker_log import Report, TrackerLog, points
+
+#: The topics that `Live.take` understands.
+PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.truth("*"))
+
+
+@dataclass(frozen=True)
+class Heard:
+    """The last health of a component, when it came, CLOCK_MONOTONIC [ns], and the one before."""
+
+    health: Health = field(default_factory=Health)
+    t_ns: int = 0
+    before: "Heard | None" = None
+
+    def rate(self, gauge: str) -> float:
+        """How fast a gauge grew lately, per second; 0 if it shrank, as a file's size does when a new one begins."""
+        if self.before is None or self.t_ns <= self.before.t_ns:
+            return 0.0
+        growth = self.health.gauges.get(gauge, 0.0) - self.before.health.gauges.get(gauge, 0.0)
+        return max(growth, 0.0) * 1e9 / (self.t_ns - self.before.t_ns)
+
+
+class Live:
+    """The present of a rig. Not for several threads.
+
+    Args:
+        trackers: their names.
+        clock: monotonic time [ns].
+
+    Attributes:
+        trackers: what each of them said.
+        heard: health by component.
+        garbled: messages that could not be read.
+    """
+
+    def __init__(self, trackers: Iterable[str], clock: Callable[[], int]) -> None:
+        self.trackers = {name: TrackerLog() for name in trackers}
+        self.heard: dict[str, Heard] = {}
+        self.garbled = 0
+        self._clock = clock
+
+    def take(self, sample: Sample) -> list[Report]:
+        """Takes one message and returns the estimates that it completes; counts messages that cannot be read."""
+        try:
+            return self._take(sample)
+        except (DecodeError, ValueError):
+            self.garbled += 1
+            return []
+
+    def _take(self, sample: Sample) -> list[Report]:
+        if sample.message == Health.DESCRIPTOR.full_name:
+            health = Health.FromString(sample.payload)
+            before = replace(self.heard.get(health.component, Heard()), before=None)
+            self.heard[health.component] = Heard(health, self._clock(), before if before.t_ns else None)
+        elif sample.message == SurfaceTruth.DESCRIPTOR.full_name:
+            self._take_truth(SurfaceTruth.FromString(sample.payload))
+        elif (tracker := self.trackers.get(sample.topic.partition("/")[0])) is not None:
+            return list(_take_from(tracker, sample))
+        return []
+
+    def health(self, component: str) -> Health:
+        """What a component said last; empty if it said nothing yet."""
+        return self.heard.get(component, Heard()).health
+
+    def preparing(self) -> bool:
+        """Whether a tracker is compiling its kernels, or loading those that it compiled once."""
+        return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
+
+    def without_topology(self) -> list[str]:
+        """The trackers whose mesh has to be asked for, because its topology was lost on the way."""
+        return [name for name, tracker in self.trackers.items() if tracker.lacks_topology]
+
+    def _take_truth(self, truth: SurfaceTruth) -> None:
+        points_r = points(truth.points_f32).reshape(truth.rows, truth.columns, 3)
+        for tracker in self.trackers.values():
+            tracker.truth.add_truth(truth.header.t_host_ns, points_r, truth.surface)
+
+
+def _take_from(tracker: TrackerLog, sample: Sample) -> Iterator[Report]:
+    if sample.message == DeformationState.DESCRIPTOR.full_name:
+        yield from tracker.take_state(DeformationState.FromString(sample.payload))
+    elif sample.message == DeformedMesh.DESCRIPTOR.full_name:
+        yield from tracker.take_mesh(DeformedMesh.FromString(sample.payload))
+    elif sample.message == MeshTopology.DESCRIPTOR.full_name:
+        tracker.take_topology(MeshTopology.FromString(sample.payload))

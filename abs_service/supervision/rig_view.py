@@ -1,0 +1,173 @@
+"""The facts that every display shows, taken from what the components say of themselves."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol, Self
+
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus import keys
+from abs_service.supervision.rig_state import Live
+from abs_service.supervision.supervisor import Child, State
+from abs_service.tracking.tracker_log import Report
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One stream of images: its topic without `/image`, rate [Hz], age of the image last tracked [ms], losses."""
+
+    name: str
+    rate_hz: float
+    age_ms: float | None
+    published: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The recorder: file being written, its size, bytes written per second, what was recorded and what was lost."""
+
+    file: Path
+    size: int
+    rate: float
+    recorded: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class View:
+    """One look at a running rig.
+
+    Attributes:
+        rig: its name.
+        endpoint: where applications connect.
+        directory: folder of the recordings.
+        live: what the components said.
+        children: the processes.
+        elapsed_s: time since the start.
+        now_ns: CLOCK_MONOTONIC [ns].
+    """
+
+    rig: str
+    endpoint: str
+    directory: Path
+    live: Live
+    children: Sequence[Child]
+    elapsed_s: float
+    now_ns: int
+
+    @property
+    def streams(self) -> list[Stream]:
+        """All streams of images, by name."""
+        health, ages = self.live.health("capture"), self._ages_ms()
+        topics = [key.removeprefix("published.") for key in health.counters if key.startswith("published.")]
+        return [
+            Stream(
+                name=topic.removesuffix("/image"),
+                rate_hz=health.gauges.get(f"rate_hz.{topic}", 0.0),
+                age_ms=ages.get(topic.partition("/")[0]),
+                published=health.counters[f"published.{topic}"],
+                dropped=health.counters.get(f"dropped.{topic}", 0),
+            )
+            for topic in sorted(topics)
+            if keys.is_image(topic)
+        ]
+
+    @property
+    def recording(self) -> Recording | None:
+        """The recorder; None if it did not begin a file."""
+        health = self.live.health("record")
+        if not health.labels.get("file"):
+            return None
+        return Recording(
+            file=self.directory / health.labels["file"].removesuffix(".active"),
+            size=int(health.gauges.get("file_bytes", 0)),
+            rate=self.live.heard["record"].rate("file_bytes"),
+            recorded=health.counters.get("recorded", 0),
+            dropped=_sum(health, "dropped."),
+        )
+
+    @property
+    def troubles(self) -> list[tuple[str, int, str]]:
+        """Component, level and message of everything that needs attention."""
+        found: list[tuple[str, int, str]] = [
+            (name, heard.health.level, heard.health.message)
+            for name, heard in sorted(self.live.heard.items())
+            if heard.health.level >= Health.LEVEL_WARNING and heard.health.message and name != "run"
+        ]
+        failed = [child for child in self.children if child.state is State.FAILED]
+        return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
+
+    @property
+    def activity(self) -> str:
+        """What is being waited for; "" once there are estimates, or if nothing is tracked."""
+        if self.live.preparing():
+            return "Preparing kernels; the first start compiles them, which takes up to a minute …"
+        if "capture" not in self.live.heard:
+            return "Starting the processes …"
+        if any(tracker.last is None for tracker in self.live.trackers.values()):
+            return "Waiting for the first estimate …"
+        return ""
+
+    def summary(self) -> list[str]:
+        """What happened, in a few lines."""
+        streams, recording = self.streams, self.recording
+        frames = sum(stream.published for stream in streams)
+        dropped = sum(stream.dropped for stream in streams)
+        lines = [f"{self.elapsed_s:.1f} s, {frames} images, {dropped} dropped"]
+        for name, tracker in self.live.trackers.items():
+            lines += [f"{name}: {line}" for line in tracker.summary()]
+        if recording:
+            lines.append(
+                f"{recording.file}: {size(recording.size)}, {recording.recorded} messages, {recording.dropped} dropped"
+            )
+        restarts = {child.component: child.restarts for child in self.children if child.restarts}
+        if restarts:
+            lines.append("restarts: " + ", ".join(f"{name} {number}" for name, number in restarts.items()))
+        return lines
+
+    def _ages_ms(self) -> dict[str, float]:
+        ages: dict[str, float] = {}
+        for tracker in self.live.trackers.values():
+            for sensor, t_host_ns in tracker.seen_ns.items():
+                age_ms = (self.now_ns - t_host_ns) * 1e-6
+                ages[sensor] = min(age_ms, ages.get(sensor, age_ms))
+        return ages
+
+
+class Display(Protocol):
+    """Shows a running rig. Used in a `with` statement; after it, the terminal is as it was before."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *error: object) -> None: ...
+
+    def update(self, view: View) -> None:
+        """Shows how things are now; called some ten times a second."""
+        ...
+
+    def estimate(self, report: Report) -> None:
+        """Shows one estimate."""
+        ...
+
+    def note(self, text: str) -> None:
+        """Says something once, in passing. May be called from any thread."""
+        ...
+
+    def close(self, view: View) -> None:
+        """Shows the summary."""
+        ...
+
+
+def size(number: float) -> str:
+    """Bytes for people: 1.2 MB."""
+    for unit in ("B", "kB", "MB"):
+        if abs(number) < 1000:
+            return f"{number:.0f} {unit}" if unit == "B" else f"{number:.1f} {unit}"
+        number /= 1000
+    return f"{number:.2f} GB"
+
+
+def _sum(health: Health, prefix: str) -> int:
+    return sum(number for name, number in health.counters.items() if name.startswith(prefix))

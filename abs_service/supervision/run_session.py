@@ -1,0 +1,139 @@
+"""One run of a rig: moves messages to the display and signs of life to the supervisor."""
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Bus, Sample
+from abs_service.bus.health import Health, Level
+from abs_service.bus.queues import LatestQueue
+from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.supervision import rig_state
+from abs_service.supervision.rig_view import Display, View
+from abs_service.supervision.supervisor import Child, State, Supervisor
+
+#: Messages per topic that may wait to be shown.
+DEPTH = 64
+#: Time between two looks at the children, at most [s].
+PERIOD_S = 0.05
+#: Time between two questions for what was lost, and patience for the answer [s].
+QUESTION_S, ANSWER_S = 1.0, 0.2
+
+_LEVELS: Mapping[State, Level] = {
+    State.PAUSED: Level.WARNING,
+    State.STALLED: Level.WARNING,
+    State.FAILED: Level.ERROR,
+}
+
+
+class Session:
+    """Everything that `abs-service run` does between its start and its end.
+
+    Args:
+        bus: where the rig speaks.
+        rig: its name.
+        endpoint: where applications connect, for people to read.
+        directory: folder of the recordings, for people to read.
+        trackers: names of the trackers.
+        supervisor: looks after the processes.
+        display: where to show how they are.
+        clock: time.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        rig: str,
+        endpoint: str,
+        directory: Path,
+        trackers: Iterable[str],
+        supervisor: Supervisor,
+        display: Display,
+        clock: WallClock,
+    ) -> None:
+        self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
+        self._supervisor = supervisor
+        self._display = display
+        self._clock = clock
+        self._begin_ns = self._asked_ns = clock.monotonic()
+        self._live = rig_state.Live(trackers, clock.monotonic)
+        self._health = Health(bus, "run", Speaker(rig, clock))
+        self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
+        for pattern in rig_state.PATTERNS:
+            bus.subscribe(pattern, lambda sample: self._inbox.put(sample.topic, sample))
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the start [s]."""
+        return (self._clock.monotonic() - self._begin_ns) * 1e-9
+
+    def go_on_until(self, over: Callable[[], bool]) -> None:
+        """Runs until `over` says so or the supervisor has nothing left to do."""
+        while not over() and self._supervisor.verdict() is None:
+            self._supervisor.poll()
+            self._report()
+            self._listen(PERIOD_S)
+            self._catch_up()
+
+    def stop(self) -> None:
+        """Stops the processes in order, and hears what they say last."""
+
+        def listen(seconds: float) -> None:
+            # Also when nobody reads the output any more, the processes have to be stopped.
+            with suppress(BrokenPipeError):
+                self._listen(seconds)
+
+        self._supervisor.stop(listen)
+        listen(PERIOD_S)
+        self._report()
+        self._health.publish()
+
+    def view(self) -> View:
+        """One look at everything."""
+        return View(
+            rig=self._rig,
+            endpoint=self._endpoint,
+            directory=self._directory,
+            live=self._live,
+            children=tuple(self._supervisor.children.values()),
+            elapsed_s=self.elapsed_s,
+            now_ns=self._clock.monotonic(),
+        )
+
+    def _listen(self, seconds: float) -> None:
+        end_ns = self._clock.monotonic() + int(seconds * 1e9)
+        while (remaining_ns := end_ns - self._clock.monotonic()) > 0:
+            arrived = self._inbox.take(remaining_ns * 1e-9)
+            if arrived is None:
+                break
+            self._take(*arrived)
+        self._display.update(self.view())
+
+    def _catch_up(self) -> None:
+        """Asks for the topologies that the network dropped: each is sent once, and errors are not known without."""
+        if self._clock.monotonic() - self._asked_ns < QUESTION_S * 1e9:
+            return
+        self._asked_ns = self._clock.monotonic()
+        for tracker in self._live.without_topology():
+            for sample in self._bus.ask(keys.topology(tracker), ANSWER_S):
+                self._take(sample.topic, sample)
+
+    def _take(self, topic: str, sample: Sample) -> None:
+        for report in self._live.take(sample):
+            self._display.estimate(report)
+        if topic.startswith("health/"):
+            component = topic.removeprefix("health/")
+            busy = self._live.health(component).labels.get("phase") == "preparing"
+            self._supervisor.heard(component, busy)
+
+    def _report(self) -> None:
+        for child in self._supervisor.children.values():
+            self._health.count_up_to({f"restarts.{child.component}": child.restarts})
+            self._health.report(child.component, _LEVELS.get(child.state, Level.OK), _condition(child))
+        self._health.count_up_to({"garbled": self._live.garbled, "not_shown": sum(self._inbox.dropped.values())})
+        self._health.tick()
+
+
+def _condition(child: Child) -> str:
+    return f"{child.component} {child.state.value}: {child.reason}" if child.reason else ""

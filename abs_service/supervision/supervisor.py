@@ -1,0 +1,204 @@
+"""Starts the processes of a rig, restarts those that end or fall silent, and stops them in order.
+
+A state machine without threads: `poll` does what is due, the caller decides how often and hands in time and processes.
+"""
+
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn
+from abs_service.supervision.exit_codes import Exit
+
+_log = logging.getLogger(__name__)
+
+#: Pause before a restart: doubles with each end within the window, up to the longest.
+FIRST_PAUSE_NS, LONGEST_PAUSE_NS = 200_000_000, 3_000_000_000
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much patience a supervisor has.
+
+    Attributes:
+        restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
+        startup_ns: a process may be silent for this long before its first health, and while it says it is busy [ns].
+        stall_ns: afterwards, a process that is silent for this long is restarted [ns].
+        stop_ns: time that all processes together have to end in order [ns].
+    """
+
+    restarts: int = 5
+    window_ns: int = 60_000_000_000
+    startup_ns: int = 180_000_000_000
+    stall_ns: int = 10_000_000_000
+    stop_ns: int = 4_000_000_000
+
+
+class State(StrEnum):
+    """Where a child is in its life."""
+
+    RUNNING = "running"
+    PAUSED = "paused"  # not there yet, or ended; will be started when its pause is over
+    STALLED = "stalled"  # lived, but said nothing for too long and was killed; will be started again
+    FINISHED = "finished"  # ended in order by itself
+    FAILED = "failed"  # given up
+    STOPPED = "stopped"
+
+
+@dataclass
+class Child:
+    """One supervised process.
+
+    Attributes:
+        component: its name in health: capture, track/<tracker>, record.
+        arguments: its command line after `abs-service`.
+        stage: children of lower stages are stopped first.
+        state: where it is.
+        reason: why it is there, in plain words.
+        restarts: how often it was started again.
+        process: what runs it; `NO_PROCESS` while nothing does.
+        exit_code: of its last end.
+    """
+
+    component: str
+    arguments: tuple[str, ...]
+    stage: int
+    state: State = State.PAUSED
+    reason: str = ""
+    restarts: int = 0
+    exit_code: int = 0
+    process: Process = field(default=NO_PROCESS, repr=False)
+    silent_after_ns: int = 0
+    start_at_ns: int = 0
+    ends_ns: deque[int] = field(default_factory=deque, repr=False)
+
+
+class Supervisor:
+    """Looks after children until told to stop.
+
+    Args:
+        children: whom to look after; started by the first `poll`.
+        spawn: starts a process.
+        clock: monotonic time [ns].
+        limits: when to restart and when to give up.
+    """
+
+    def __init__(
+        self, children: Iterable[Child], spawn: Spawn, clock: Callable[[], int], limits: Limits | None = None
+    ) -> None:
+        self.children = {child.component: child for child in children}
+        self._spawn = spawn
+        self._clock = clock
+        self._limits = limits or Limits()
+
+    def poll(self) -> None:
+        """Starts, restarts and gives up whatever is due now."""
+        now_ns = self._clock()
+        for child in self.children.values():
+            if child.state is State.RUNNING:
+                self._look_after(child, now_ns)
+            if child.state in (State.PAUSED, State.STALLED) and now_ns >= child.start_at_ns:
+                self._start(child, now_ns)
+
+    def heard(self, component: str, busy: bool = False) -> None:
+        """Notes a sign of life. A busy component (one that compiles kernels) may be silent for longer than others."""
+        child = self.children.get(component)
+        if child is not None and child.state is State.RUNNING:
+            child.silent_after_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
+
+    def refused(self) -> Child | None:
+        """A child that cannot work until the user changes something; everything should stop."""
+        return next((child for child in self._failed() if child.exit_code == Exit.USER), None)
+
+    def verdict(self) -> Exit | None:
+        """The exit code with which the whole rig should end now; None as long as there is something to do.
+
+        Without images or without any tracker there is nothing left to do; a recorder is not needed for that.
+        """
+        if self.refused():
+            return Exit.USER
+        capture = [child for child in self.children.values() if child.component == "capture"]
+        trackers = [child for child in self.children.values() if child.component.startswith("track/")]
+        for group in (capture, trackers):
+            if group and all(child.state is State.FAILED for child in group):
+                return Exit.FAILED
+        finished = any(child.state is State.FINISHED for child in capture)
+        return Exit.OK if finished else None
+
+    def stop(self, wait: Callable[[float], None]) -> None:
+        """Stops all children: stage after stage, so that each later one still takes what the earlier ones said.
+
+        Args:
+            wait: passes the time given in seconds.
+        """
+        begin_ns = self._clock()
+        stages = sorted({child.stage for child in self.children.values()})
+        for number, stage in enumerate(stages):
+            children = [child for child in self.children.values() if child.stage == stage]
+            for child in children:
+                child.process.terminate()
+            # A share for each of the earlier stages; the last one, which drains to disk, has all that is left.
+            share = (number + 1) / (len(stages) + 1) if number + 1 < len(stages) else 1.0
+            deadline_ns = begin_ns + int(share * self._limits.stop_ns)
+            while self._clock() < deadline_ns and any(child.process.poll() is None for child in children):
+                wait(0.02)
+            for child in children:
+                self._bury(child)
+
+    def _start(self, child: Child, now_ns: int) -> None:
+        child.process = self._spawn(child.component, child.arguments)
+        child.state, child.reason = State.RUNNING, ""
+        child.silent_after_ns = now_ns + self._limits.startup_ns
+
+    def _look_after(self, child: Child, now_ns: int) -> None:
+        code = child.process.poll()
+        if code is None and now_ns < child.silent_after_ns:
+            return
+        if code is None:
+            child.process.kill()
+            self._ended(child, now_ns, "said nothing for too long", State.STALLED)
+            return
+        child.exit_code = code
+        if code == Exit.OK:
+            child.state, child.process = State.FINISHED, NO_PROCESS
+        elif code in (Exit.USER, Exit.GIVE_UP):
+            self._give_up(child, child.process.last_words())
+        else:
+            self._ended(child, now_ns, _why(code, child.process.last_words()), State.PAUSED)
+
+    def _ended(self, child: Child, now_ns: int, reason: str, state: State) -> None:
+        while child.ends_ns and child.ends_ns[0] <= now_ns - self._limits.window_ns:
+            child.ends_ns.popleft()
+        if len(child.ends_ns) >= self._limits.restarts:
+            times = f"needed more than {self._limits.restarts} restarts in {self._limits.window_ns / 1e9:g} s"
+            self._give_up(child, f"{times}; the last time it {reason}")
+            return
+        child.start_at_ns = now_ns + min(FIRST_PAUSE_NS << len(child.ends_ns), LONGEST_PAUSE_NS)
+        child.ends_ns.append(now_ns)
+        child.restarts += 1
+        child.state, child.reason, child.process = state, reason, NO_PROCESS
+        _log.warning("%s %s; starting it again", child.component, reason)
+
+    def _give_up(self, child: Child, reason: str) -> None:
+        child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
+        if child is not self.refused():  # whose message is the last word of the whole run
+            _log.error("%s is given up: %s", child.component, reason)
+
+    def _bury(self, child: Child) -> None:
+        if child.process.poll() is None:
+            child.process.kill()
+            child.reason = "did not end in time and was killed"
+        if child.state in (State.RUNNING, State.PAUSED, State.STALLED):
+            child.state, child.exit_code = State.STOPPED, child.process.poll() or 0
+        child.process = NO_PROCESS
+
+    def _failed(self) -> list[Child]:
+        return [child for child in self.children.values() if child.state is State.FAILED]
+
+
+def _why(code: int, last_words: str) -> str:
+    how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
+    last = last_words.strip().rpartition("\n")[2]
+    return f"{how}: {last}" if last else how

@@ -1,0 +1,1 @@
+"""The object in the first depth image: region, detection, initial mesh."""

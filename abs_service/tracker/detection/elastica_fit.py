@@ -1,0 +1,198 @@
+"""A hanging strip seen from its side: the plane in which it bends, and the heavy elastica nearest to its points."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy  # its parts are imported when they are first used
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.elastica import Elastica, heavy_elastica
+
+Vector = NDArray[np.float64]
+
+#: Typical error of a distance [m]; points that are farther from the fitted shape count less and less.
+NOISE_M = 5e-3
+
+#: What is this many times farther away is something else, or a pixel that shows two things at once.
+LARGEST_GAP = 3.0
+
+#: Step of the numerical derivatives: of a place [m], an angle [rad], and the logarithm of a load.
+STEP = 1e-3
+
+#: Loads w L³ / D that are looked for: a strip that sags by a thousandth of its length, and a thread.
+LOADS = (1e-2, 300.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """The plane of bending: unit vectors across (along the gripper line), ahead (horizontal) and down, in the rig."""
+
+    across: Vector
+    ahead: Vector
+    down: Vector
+
+    def coordinates(self, points: NDArray[np.float64]) -> tuple[Vector, NDArray[np.float64]]:
+        """Coordinate across (n,) and the point in the plane of bending (n, 2) [m]."""
+        return points @ self.across, np.stack([points @ self.ahead, points @ self.down], axis=-1)
+
+    def normals(self, phi: Vector) -> NDArray[np.float64]:
+        """Normals (n, 3) in the rig of a curve with inclination φ (n,)."""
+        return normals_at(phi) @ np.array([self.ahead, self.down])
+
+    def tilted(self, tilt: NDArray[np.float64]) -> "Plane":
+        """The frame whose across points more ahead and down by `tilt` (2,); down stays as near to gravity as it can."""
+        return _plane(self.across + tilt[0] * self.ahead + tilt[1] * self.down, self.down, self.ahead)
+
+
+@dataclass(frozen=True, eq=False)
+class Hang:
+    """An elastica in the plane of bending.
+
+    Attributes:
+        tip: inclination at the free end [rad].
+        load: w L³ / D.
+        middle: mean of its nodes (2,) [m].
+        length: of the strip [m].
+    """
+
+    tip: float
+    load: float
+    middle: Vector
+    length: float
+
+    @cached_property
+    def inclination(self) -> Vector:
+        """Of the nodes (STEPS + 1,) [rad]."""
+        return self._shape.inclination[0]
+
+    @cached_property
+    def nodes(self) -> NDArray[np.float64]:
+        """Points (STEPS + 1, 2) from the gripper to the free end [m]."""
+        points = self.length * self._shape.points[0]
+        return points - points.mean(axis=0) + self.middle
+
+    def unroll(self, points: NDArray[np.float64]) -> tuple[Vector, Vector, Vector]:
+        """Arc length from the gripper, distance along the normal [m], inclination [rad] nearest to points (n, 2)."""
+        nodes = self.nodes
+        nearest = np.argmin(np.sum(nodes**2, axis=1) - 2 * points @ nodes.T, axis=1)
+        phi, gap = self.inclination[nearest], points - nodes[nearest]
+        tangent = np.stack([np.cos(phi), np.sin(phi)], axis=-1)
+        along = nearest * (self.length / (len(nodes) - 1)) + np.sum(gap * tangent, axis=1)
+        return along, np.sum(gap * normals_at(phi), axis=1), phi
+
+    def cut(self, low: float, high: float) -> "Hang":
+        """About the part from arc length `low` to `high`; beyond the ends it goes on straight."""
+        shift = (low + high - self.length) / 2
+        slope = self.inclination[len(self.inclination) // 2]
+        middle = self.middle + shift * np.array([np.cos(slope), np.sin(slope)])
+        length = high - low
+        return Hang(self.tip, float(np.clip(self.load * (length / self.length) ** 3, *LOADS)), middle, length)
+
+    @cached_property
+    def _shape(self) -> Elastica:
+        return heavy_elastica(self.tip, self.load)
+
+
+def normals_at(phi: Vector) -> NDArray[np.float64]:
+    """Unit normals (…, 2) of tangents with inclination φ (…)."""
+    return np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
+
+
+def _plane(across: Vector, down: Vector, ahead: Vector) -> Plane:
+    across = across / np.linalg.norm(across)
+    down = down - (down @ across) * across
+    down = down / np.linalg.norm(down)
+    forward = np.cross(across, down)
+    return Plane(across, forward if forward @ ahead > 0 else -forward, down)
+
+
+def find_plane(points: NDArray[np.float64], gravity: Vector) -> Plane:
+    """The horizontal gripper line along which all points fall onto one curve, and with which the outline is even.
+
+    A bent strip is a cylinder, so its points collapse onto a curve in one direction only. A flat one collapses in all
+    directions of its plane; then that is the one in which a rectangle has no skew. Among equals, the shorter side.
+    """
+    some = np.cross(gravity, np.eye(3)[np.argmin(np.abs(gravity))])
+    some /= np.linalg.norm(some)
+    other = np.cross(gravity, some)
+    turns = np.deg2rad(np.arange(0, 180, 2))[:, None]
+    lines = np.asarray(np.cos(turns) * some + np.sin(turns) * other, np.float64)
+    frames = [_plane(line, gravity, np.asarray(np.cross(line, gravity), np.float64)) for line in lines]
+    return min(frames, key=lambda frame: _unevenness(*frame.coordinates(points)))
+
+
+def _unevenness(across: Vector, flat: NDArray[np.float64]) -> float:
+    """How thick the curve is in logarithmic measure, plus the skew; slightly more if the curve is shorter than wide."""
+    chord, height, _ = _chord(flat)
+    curve, near = _curve(chord, height)
+    thickness = np.std((height - curve(chord))[near])
+    skew = np.corrcoef(across, chord)[0, 1]
+    return float(np.log(thickness**2 + (0.5 * NOISE_M) ** 2) + skew**2 + 0.1 * (np.std(across) > np.std(chord)))
+
+
+def _chord(flat: NDArray[np.float64]) -> tuple[Vector, Vector, NDArray[np.float64]]:
+    """Coordinates (n,) along and beside the longest direction of points (n, 2), and the axes (2, 2) as rows."""
+    centered = flat - flat.mean(axis=0)
+    axes = np.linalg.eigh(centered.T @ centered)[1].T[::-1]
+    along, beside = axes @ centered.T
+    return along, beside, axes
+
+
+def _curve(along: Vector, beside: Vector) -> tuple[np.polynomial.Polynomial, NDArray[np.bool_]]:
+    """A smooth curve through points, and which of them (n,) it is for: all but a few that show two things at once."""
+    near = np.ones(len(along), bool)
+    curve = np.polynomial.Polynomial.fit(along, beside, 4)
+    for _ in range(2):
+        gap = np.abs(beside - curve(along))
+        near = gap <= max(LARGEST_GAP * NOISE_M, LARGEST_GAP * 1.5 * float(np.median(gap)))
+        curve = np.polynomial.Polynomial.fit(along[near], beside[near], 4)
+    return curve, near
+
+
+def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> Hang:
+    """The best of some shapes of about the right length, place and direction."""
+    along, beside, axes = _chord(flat)
+    curve, near = _curve(along, beside)
+    low, high = (float(np.quantile(along[near], share)) for share in (0.02, 0.98))
+    chord = np.linspace(low, high, 50)
+    chord = chord[::-1] if axes[0] @ towards_gripper > 0 else chord
+    nodes = flat.mean(axis=0) + np.stack([chord, curve(chord)], axis=-1) @ axes
+    steps = np.diff(nodes, axis=0)
+    length = float(np.linalg.norm(steps, axis=1).sum())
+    end = float(np.arctan2(*steps[-1, ::-1]))
+    hangs = [
+        Hang(end + np.deg2rad(turn), load, nodes.mean(axis=0), length)
+        for turn in (-60, -40, -20, 0, 20, 40, 60)
+        for load in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)
+    ]
+    return min(hangs, key=lambda hang: float(np.mean(np.minimum(np.abs(hang.unroll(flat)[1]), 10 * NOISE_M))))
+
+
+def fit(hang: Hang, flat: NDArray[np.float64]) -> Hang:
+    """The hang of the same length with the least distance to points (n, 2); it may not slide along itself."""
+    bounds = ([-np.inf, -np.inf, np.log(LOADS[0] / hang.load)], [np.inf, np.inf, np.log(LOADS[1] / hang.load)])
+    found = scipy.optimize.least_squares(
+        lambda p: _changed(hang, p).unroll(flat)[1] / NOISE_M,
+        np.clip(np.zeros(3), *bounds),
+        bounds=bounds,
+        loss="soft_l1",
+        x_scale=(0.01, 0.1, 1.0),
+    )
+    return _changed(hang, found.x)
+
+
+def load_deviation(hang: Hang, flat: NDArray[np.float64]) -> float:
+    """Standard deviation of the logarithm of a fitted hang's load, from how its points (n, 2) scatter."""
+    steps = STEP * np.eye(3)
+    ahead, back = ([_changed(hang, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
+    slopes = (np.array(ahead) - np.array(back)) / (2 * STEP)
+    scatter = 1.4826 * np.median(np.abs(hang.unroll(flat)[1]))  # of a normal distribution, whatever a few points do
+    return float(scatter * np.sqrt(np.linalg.inv(slopes @ slopes.T)[2, 2]))
+
+
+def _changed(hang: Hang, by: NDArray[np.float64]) -> Hang:
+    """Moved beside its chord [m], with another inclination at the free end [rad] and another logarithm of the load."""
+    chord = hang.nodes[-1] - hang.nodes[0]
+    beside = np.array([-chord[1], chord[0]]) / np.linalg.norm(chord)
+    return Hang(hang.tip + by[1], hang.load * float(np.exp(by[2])), hang.middle + by[0] * beside, hang.length)

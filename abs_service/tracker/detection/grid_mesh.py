@@ -1,0 +1,144 @@
+"""The mesh of an object of unknown shape: a grid laid over it in the depth image."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import scipy  # its parts are imported when they are first used
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.mesh import Mesh
+from calib import pose
+
+#: A mesh with fewer vertices carries no deformation.
+LEAST_VERTICES = 25
+
+#: Share of a grid point's neighbourhood that must show the object for it to become a vertex.
+LEAST_COVER = 0.75
+
+#: Distances around a grid point that differ by more from their median belong to another surface [m].
+LARGEST_RELIEF_M = 0.03
+
+#: A triangle with a side longer than this many typical sides spans a jump between two surfaces.
+LONGEST_SIDE = 5.0
+
+#: A connected part of the mesh with a smaller share of its vertices is an island: the region's rim often shows some of
+#: what is behind the object, which no smooth surface could carry.
+LEAST_PART = 0.1
+
+
+def grid_mesh(sighting: Sighting) -> Mesh:
+    """Lays a square grid over the object in the image, along the sides of the smallest rectangle around it.
+
+    What one camera sees is one distance per direction, so the grid never folds, whatever the object's shape. Every
+    vertex is a plane fitted to the distances around it, so it is less noisy than a pixel; where the object is not,
+    there is no vertex, so the mesh has its outline.
+
+    Returns:
+        The mesh without colours; its chart is the grid.
+
+    Raises:
+        SightingError: the object is too small in the image.
+    """
+    distance, camera = sighting.distance, sighting.camera
+    valid = np.isfinite(distance)
+    spacing = float(np.sqrt(np.count_nonzero(valid) / sighting.vertices))
+    grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
+    rows, columns = grid.shape[:2]
+    pixels = grid.reshape(-1, 2)
+    at_grid, deviation = _local_planes(pixels, distance, 0.75 * spacing)
+    place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
+    positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
+    faces = _without_islands(_without_jumps(positions, triangles(place)))
+    chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
+    used = np.unique(faces)
+    if len(used) < LEAST_VERTICES:
+        raise SightingError(
+            f"the object is too small in the depth image: {len(used)} vertices, {LEAST_VERTICES} needed"
+        )
+    position_of = np.full(rows * columns, -1, np.int32)
+    position_of[used] = np.arange(len(used), dtype=np.int32)
+    unknown = np.full((len(used), 3), np.nan, np.float32)
+    mesh = Mesh(positions[used], position_of[faces], unknown, chart[used])
+    sight = (positions[used] - camera.center) / at_grid[used, None]
+    return replace(mesh, deviation=deviation[used] * np.abs(np.einsum("ni,ni->n", mesh.normals, sight)))
+
+
+def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
+    """Pixel coordinates (rows, columns, 2) of a grid over the smallest rectangle around pixels (k, 2)."""
+    center, size, angle = cv2.minAreaRect(pixels)
+    if size[0] < size[1]:
+        size, angle = size[::-1], angle + 90
+    angle = np.deg2rad((angle + 90) % 180 - 90)  # the long side points right, so that the grid is not mirrored
+    right = np.array([np.cos(angle), np.sin(angle)])
+    down = np.array([-np.sin(angle), np.cos(angle)])
+    columns, rows = (np.ceil(np.asarray(size) / spacing).astype(int) + 1).tolist()
+    across = (np.arange(columns) - (columns - 1) / 2) * spacing
+    along = (np.arange(rows) - (rows - 1) / 2) * spacing
+    return np.asarray(center) + across[None, :, None] * right + along[:, None, None] * down
+
+
+def _local_planes(
+    pixels: NDArray[np.float64], distance: NDArray[np.float32], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each, and its standard deviation [m].
+
+    Both are NaN where the object is not. How far a single pixel deviates is told from the residuals of all planes
+    together, because one plane alone may have no more pixels than coefficients.
+    """
+    height, width = distance.shape
+    reach = int(np.ceil(radius))
+    steps = np.stack(np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1)), axis=-1).reshape(-1, 2)
+    result, share = np.full((2, len(pixels)), np.nan)
+    squares, freedom = 0.0, 0
+    for g, pixel in enumerate(pixels):
+        around = np.floor(pixel + 0.5).astype(int) + steps
+        around = around[np.linalg.norm(around - pixel, axis=1) <= max(radius, 1.0)]
+        inside = np.all((around >= 0) & (around < (width, height)), axis=1)
+        values = np.full(len(around), np.nan)
+        values[inside] = distance[around[inside, 1], around[inside, 0]]
+        near = np.abs(values - np.nanmedian(values)) < LARGEST_RELIEF_M if np.isfinite(values).any() else inside & False
+        if np.count_nonzero(near) < max(LEAST_COVER * len(around), 3):
+            continue
+        plane = np.column_stack([np.ones(np.count_nonzero(near)), around[near] - pixel])
+        inverse = np.linalg.pinv(plane)
+        fitted = inverse @ values[near]
+        result[g], share[g] = fitted[0], np.linalg.norm(inverse[0])
+        squares += float(np.sum((values[near] - plane @ fitted) ** 2))
+        freedom += len(plane) - 3
+    return result, share * np.sqrt(squares / max(freedom, 1))
+
+
+def triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Triangles (m, 3) of a grid of vertex indices (rows, columns), −1 where there is none; seen from the camera.
+
+    A cell with four vertices gives two triangles, one with three gives one.
+    """
+    corners = np.stack([place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]], axis=-1).reshape(-1, 4)
+    whole = np.all(corners >= 0, axis=1)
+    faces = []
+    for triangle, opposite in (([0, 1, 2], 3), ([0, 2, 3], 1), ([0, 1, 3], 2), ([1, 2, 3], 0)):
+        wanted = whole if opposite in (1, 3) else np.zeros_like(whole)
+        keep = (wanted | (corners[:, opposite] < 0)) & np.all(corners[:, triangle] >= 0, axis=1)
+        faces.append(corners[keep][:, triangle])
+    return np.concatenate(faces)
+
+
+def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangles (m, 3) that do not span a jump in distance."""
+    if not len(faces):
+        return faces
+    sides = np.linalg.norm(positions[faces] - positions[np.roll(faces, 1, axis=1)], axis=2)
+    return faces[sides.max(axis=1) < LONGEST_SIDE * np.median(sides)]
+
+
+def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The triangles (m, 3) of the connected parts that are large enough."""
+    used, corners = np.unique(faces, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    links = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]]).T
+    graph = scipy.sparse.coo_array((np.ones(links.shape[1]), links), shape=(len(used), len(used)))
+    count, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    sizes = np.bincount(part, minlength=count)
+    return faces[sizes[part[corners[:, 0]]] >= LEAST_PART * len(used)]

@@ -1,0 +1,167 @@
+"""Finds a flat sheet in a depth image."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.sheet_mesh import Sheet
+from calib import pose
+from calib.camera import Camera
+from calib.pose import Pose
+
+#: A sheet with fewer pixels has no sides that could be found.
+LEAST_PIXELS = 200
+
+#: Points that plane and paraboloid are fitted to; more would be slower, not better.
+MOST_POINTS = 5000
+
+#: Height of the arch over the object above which it is not flat [m].
+LARGEST_BOW_M = 0.02
+
+#: Distance from the plane up to which a pixel shows the sheet, however small the noise is [m].
+LEAST_GAP_M = 0.01
+
+#: Share of their pixels that object and rectangle have in common if it is a sheet. A disc has 0.90, a sheet of 450
+#: pixels 0.96 and more, one of which a finger hides 6 % 0.94.
+LEAST_OVERLAP = 0.93
+
+
+def find_sheet(sighting: Sighting) -> Sheet:
+    """The sheet in sight: a plane through its points, and the rectangle around its outline on that plane.
+
+    A long side across the image points to the right, another one up.
+
+    Raises:
+        SightingError: too little is in sight, or it is not flat, or no rectangle.
+    """
+    camera = sighting.camera
+    seen = np.isfinite(sighting.distance)
+    if np.count_nonzero(seen) < LEAST_PIXELS:
+        raise SightingError(f"the object has {np.count_nonzero(seen)} pixels, a sheet needs {LEAST_PIXELS}")
+    window = _window(seen)
+    rows, columns = np.indices(seen.shape)[:, *window]
+    rays = camera.directions(np.stack([columns, rows], axis=-1)) @ camera.T_rs[:3, :3].T
+    points = camera.center + rays * sighting.distance[window][..., None]
+    T_rp = _plane(points[seen[window]], camera)
+    pixels = _pixels_on_plane(pose.transform(pose.inverse(T_rp), points))
+    corner = np.array([columns[0, 0], rows[0, 0]])
+    outline_rays = camera.directions(corner + _outline(pixels)) @ camera.T_rs[:3, :3].T
+    sheet = _rectangle(_meet(outline_rays, camera.center, T_rp), T_rp)
+    _check_overlap(pixels, _meet(rays, camera.center, sheet.T_rp), sheet)
+    return sheet
+
+
+def _window(seen: NDArray[np.bool_]) -> tuple[slice, slice]:
+    """Rows and columns of the smallest part of an image (height, width) that contains all that is set, and some rim."""
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    return slice(max(rows[0] - 2, 0), rows[-1] + 3), slice(max(columns[0] - 2, 0), columns[-1] + 3)
+
+
+def _plane(points: NDArray[np.float64], camera: Camera) -> Pose:
+    """The plane of least absolute distances from points (k, 3); x to the camera's right, z away from it."""
+    points = points[:: len(points) // MOST_POINTS + 1]
+    center, normal = np.mean(points, axis=0), camera.T_rs[:3, 2]
+    weights = np.ones(len(points))
+    for _ in range(20):
+        center = np.average(points, axis=0, weights=weights)
+        arms = points - center
+        normal = np.linalg.eigh((arms * weights[:, None]).T @ arms)[1][:, 0]
+        weights = 1 / np.maximum(np.abs(arms @ normal), 1e-3)
+    z = normal * np.sign(normal @ (center - camera.center))
+    x = camera.T_rs[:3, 0] - z * (z @ camera.T_rs[:3, 0])
+    x /= np.linalg.norm(x)
+    T_rp = np.eye(4)
+    T_rp[:3] = np.stack([x, np.cross(z, x), z, center], axis=1)
+    return T_rp
+
+
+def _pixels_on_plane(points_p: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """The largest connected set of pixels (height, width) with points near the plane z = 0; specks do not count.
+
+    Raises:
+        SightingError: the points (height, width, 3), NaN where there is none, are on no plane.
+    """
+    valid = points_p[np.isfinite(points_p[..., 2])]
+    _check_flat(valid)
+    gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), LEAST_GAP_M)
+    near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # NaN is not
+    labels, statistics = cv2.connectedComponentsWithStats(cv2.medianBlur(near, 3))[1:3]
+    return np.asarray(labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
+
+
+def _check_flat(points_p: NDArray[np.float64]) -> None:
+    """Fits a paraboloid to points (k, 3), which averages their noise.
+
+    Raises:
+        SightingError: it rises by more than `LARGEST_BOW_M` over them.
+    """
+    a, b, z = points_p[:: len(points_p) // MOST_POINTS + 1].T
+    arch = np.column_stack([a * a, a * b, b * b])
+    terms = np.column_stack([arch, np.ones_like(a), a, b])
+    coefficients = np.zeros(6)
+    for _ in range(10):
+        weight = 1 / np.sqrt(np.maximum(np.abs(z - terms @ coefficients), 1e-3))
+        coefficients = np.linalg.lstsq(terms * weight[:, None], z * weight, rcond=None)[0]
+    bow = float(np.ptp(arch @ coefficients[:3]))
+    if bow > LARGEST_BOW_M:
+        raise SightingError(f"the object arches by {bow * 1e3:.0f} mm; a sheet must be flat to be found")
+
+
+def _outline(pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Pixel coordinates (k, 2) halfway between neighbours of which one is set: the rim, give or take half a pixel."""
+    padded = np.pad(pixels, 1)
+    row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
+    across = np.column_stack([column - 0.5, row - 1.0])
+    row, column = np.nonzero(padded[1:] != padded[:-1])
+    return np.asarray(np.concatenate([across, np.column_stack([column - 1.0, row - 0.5])]), np.float64)
+
+
+def _meet(rays: NDArray[np.float64], center: NDArray[np.float64], T_rp: Pose) -> NDArray[np.float64]:
+    """Coordinates (…, 2) on a plane [m] where lines of sight (…, 3) from a camera's centre meet it."""
+    rays_p, center_p = rays @ T_rp[:3, :3], pose.transform(pose.inverse(T_rp), center)
+    return np.asarray(center_p[:2] - rays_p[..., :2] * (center_p[2] / rays_p[..., 2:]), np.float64)
+
+
+def _rectangle(outline: NDArray[np.float64], T_rp: Pose) -> Sheet:
+    """The rectangle of least absolute distances from the points (k, 2) of an outline on a plane, and its pose."""
+    middle, _, degrees = cv2.minAreaRect(outline.astype(np.float32))
+    angle, arms = np.deg2rad(degrees), outline - middle
+    sides = np.zeros((2, 2))  # of the first axis low, high; of the second
+    for turn in range(15):
+        local = arms @ _axes(angle).T
+        sides = np.stack([local.min(axis=0), local.max(axis=0)], axis=1) if turn == 0 else sides
+        gaps = (local[:, :, None] - sides).reshape(-1, 4)
+        side = np.argmin(np.abs(gaps), axis=1)
+        gap = gaps[np.arange(len(gaps)), side]
+        lever = np.where(side < 2, local[:, 1], -local[:, 0])
+        design = np.column_stack([side[:, None] == np.arange(4), -lever])
+        weight = 1 / np.sqrt(np.maximum(np.abs(gap), np.median(np.abs(gap)) + 1e-9))
+        step = np.linalg.lstsq(design * weight[:, None], gap * weight, rcond=None)[0]
+        sides, angle = sides + step[:4].reshape(2, 2), angle + step[4]
+    size = sides[:, 1] - sides[:, 0]
+    center = np.asarray(middle) + sides.mean(axis=1) @ _axes(angle)
+    if size[0] < size[1]:
+        size, angle = size[::-1], angle + np.pi / 2
+    angle = np.pi / 4 - (np.pi / 4 - angle) % np.pi  # −135° … 45° from the camera's right, clockwise
+    T_ps = pose.from_rotation_vector((0, 0, angle), (*center, 0))
+    return Sheet(T_rp @ T_ps, float(size[0]), float(size[1]))
+
+
+def _axes(angle: float) -> NDArray[np.float64]:
+    return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+
+
+def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet) -> None:
+    """Compares the object's pixels (height, width) with those whose places (height, width, 2) are in the rectangle.
+
+    Raises:
+        SightingError: they have less than `LEAST_OVERLAP` in common.
+    """
+    rectangle = np.all(np.abs(places) < (sheet.width / 2, sheet.height / 2), axis=-1)
+    overlap = np.count_nonzero(pixels & rectangle) / np.count_nonzero(pixels | rectangle)
+    if overlap < LEAST_OVERLAP:
+        raise SightingError(
+            f"the object is no rectangle: it has {overlap:.0%} in common with one of "
+            f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, a sheet {LEAST_OVERLAP:.0%} at least"
+        )

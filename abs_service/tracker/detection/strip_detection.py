@@ -1,0 +1,235 @@
+"""A strip that a gripper holds, found in the depth image in which it is first seen, bent by its weight as it is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.elastica_fit import (
+    LARGEST_GAP,
+    NOISE_M,
+    Hang,
+    Plane,
+    Vector,
+    find_plane,
+    first_guess,
+    fit,
+    load_deviation,
+    normals_at,
+)
+from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.mesh import Mesh
+from calib import pose
+from calib.camera import Camera
+from calib.pose import Pose
+
+#: Fewer pixels tell no shape; of more, as many as this are used.
+LEAST_PIXELS, MOST_PIXELS = 100, 1500
+
+#: A pixel farther beyond an end, as a share of the length, shows something else in the same direction.
+LARGEST_OVERHANG = 0.08
+
+#: A part of the pixels that lies on one elastica at least if they show a strip.
+LEAST_SHARE = 0.7
+
+#: Relative difference between the length that is given and the one that is seen up to which it is the strip.
+LENGTH_TOLERANCE = 0.2
+
+#: So many pixels beside those that certainly show the strip may show it as well.
+RIM_PX = 4
+
+#: The outline is read off where this share of the strip is still beyond, because rims are ragged.
+RIM_SHARE = 0.05
+
+#: A pixel shows no more of the strip than under this cosine between line of sight and normal. Pixels at an end that
+#: show other things as well lie on the curve's extrapolation, which may turn away from the camera: with all the area
+#: that they would have there, the strip grew by a fifth.
+LEAST_COSINE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Strip:
+    """Where a strip is held and how it hangs.
+
+    Attributes:
+        T_rg: pose of the gripper line: origin in its middle, x along the strip, y along the line, z the normal of the
+            side that faces the sensor.
+        length, width: free length from the gripper line to the other end, and width [m].
+        turn: nodes (STEPS + 1,) from the gripper to the free end: angle by which the tangent has turned since the
+            gripper, positive towards z [rad].
+        pixel: length along the strip that one of the sensor's pixels shows [m].
+        load_deviation: standard deviation of the logarithm of the load by which it hangs like this; 0 if that is known.
+    """
+
+    T_rg: Pose
+    length: float
+    width: float
+    turn: NDArray[np.float64]
+    pixel: float
+    load_deviation: float = 0.0
+
+    def bends(self, segments: int) -> NDArray[np.float64]:
+        """Angles (segments,) by which equal parts of the strip bend, the first at the gripper [rad]."""
+        nodes = np.linspace(0, 1, len(self.turn))
+        return np.diff(np.interp(np.linspace(0, 1, segments + 1), nodes, self.turn))
+
+    @property
+    def length_deviation(self) -> float:
+        """Standard deviation of the length and of the gripper's place along the strip [m]: about a pixel.
+
+        So much the ends scatter in simulated images, because the pixels there show what is behind the strip as well.
+        """
+        return self.pixel
+
+    def flat_mesh(self, vertices: int) -> Mesh:
+        """A regular grid of about so many vertices on the strip if it were flat; rows go along it."""
+        T_gp = pose.from_rotation_vector((np.pi, 0, 0), (self.length / 2, 0, 0))
+        return Sheet(self.T_rg @ T_gp, self.length, self.width).mesh(vertices)
+
+
+def find_strip(sighting: Sighting, gravity: Vector, towards_gripper: Vector, length: float = 0.0) -> Strip:
+    """Fits a heavy elastica to the points of a strip; where its edges are tells the rest.
+
+    Args:
+        sighting: the strip alone.
+        gravity: unit vector (3,) in the rig.
+        towards_gripper: vector (3,) in the rig that tells the held end from the other one.
+        length: free length if it is known [m], else 0: as it is seen.
+
+    Raises:
+        SightingError: too little to see, or no strip.
+    """
+    seen = sighting.points
+    if len(seen) < LEAST_PIXELS:
+        raise SightingError(f"the strip is too small in the depth image: {len(seen)} pixels, {LEAST_PIXELS} needed")
+    seen = seen[:: -(-len(seen) // MOST_PIXELS)]
+    plane = find_plane(seen, gravity)
+    hang = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
+    points = np.concatenate([seen, sighting.beside(RIM_PX)])
+    fitted = _Fitted(plane, hang, np.arange(len(points)) < len(seen), (0.0, 0.0), False, 0.0)
+    for _ in range(5):
+        fitted = _refine(fitted, points, sighting.camera)
+    share = float(np.mean(fitted.belongs[: len(seen)]))
+    _check((fitted.hang.length, fitted.sides[1] - fitted.sides[0]), length, share)
+    hang = fitted.hang.cut(fitted.hang.length - (length or fitted.hang.length), fitted.hang.length)
+    flat = fitted.plane.coordinates(points)[1][fitted.belongs]
+    along = hang.unroll(flat)[0]
+    # Pixels on an end show what is behind it as well, and would bend the strip most of all.
+    inner = flat[np.minimum(along, hang.length - along) > fitted.pixel / 2]
+    hang = fit(hang, inner)
+    return _strip(fitted, hang, load_deviation(hang, inner))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """How far the search for a strip is.
+
+    Attributes:
+        plane: of bending.
+        hang: shape, from end to end of what is seen.
+        belongs: which points (n,) show the strip.
+        sides: first and last place across [m].
+        faces: whether the camera is on the side of the plane's normals.
+        pixel: length along the strip that a pixel shows [m].
+    """
+
+    plane: Plane
+    hang: Hang
+    belongs: NDArray[np.bool_]
+    sides: tuple[float, float]
+    faces: bool
+    pixel: float
+
+
+def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fitted:
+    """Fits shape, outline and plane to points (n, 3) once more, one after the other."""
+    plane, sight = before.plane, points - camera.center
+    across, flat = plane.coordinates(points)
+    hang = fit(before.hang, flat[before.belongs])
+    along, gap, phi = hang.unroll(flat)
+    beyond = np.abs(along - hang.length / 2) - hang.length / 2
+    belongs = (np.abs(gap) < LARGEST_GAP * NOISE_M) & (beyond < LARGEST_OVERHANG * hang.length)
+    normals = plane.normals(phi)
+    high, wide = (size[belongs] for size in _pixel_sizes(sight, normals, camera.fx))
+    across, along, gap, phi = across[belongs], along[belongs], gap[belongs], phi[belongs]
+    first, last = _extent(along, high, wide)
+    left, right = _extent(across, wide, high)
+    tilt = _tilt(across - (left + right) / 2, along - (first + last) / 2, gap, phi)
+    faces = bool(np.mean(np.sum(normals * sight, axis=1)[belongs] < 0) > 0.5)
+    pixel = float(np.median(high))
+    return _Fitted(plane.tilted(tilt), hang.cut(first, last), belongs, (left, right), faces, pixel)
+
+
+def _check(size: tuple[float, float], length: float, share: float) -> None:
+    """Whether what is seen can be the strip.
+
+    Raises:
+        SightingError: it is wider than long, of another length than the given one [m] (0: not given), or no such curve.
+    """
+    if share < LEAST_SHARE:
+        raise SightingError(
+            f"the object hangs like no strip: {share:.0%} of it lie on one curve, {LEAST_SHARE:.0%} needed"
+        )
+    if size[1] > size[0]:
+        raise SightingError(f"the object is no strip: it is {size[0]:.3f} m long, but {size[1]:.3f} m wide")
+    if length and abs(size[0] / length - 1) > LENGTH_TOLERANCE:
+        raise SightingError(
+            f"the strip in sight is {size[0]:.3f} m long, which differs by more than {LENGTH_TOLERANCE:.0%} from "
+            f"length_m = {length:g}"
+        )
+
+
+def _pixel_sizes(sight: NDArray[np.float64], normals: NDArray[np.float64], focal: float) -> tuple[Vector, Vector]:
+    """Length along and across the strip (n,) [m] that each pixel shows; `sight` goes from the camera to the points."""
+    distance = np.linalg.norm(sight, axis=1)
+    cosine = np.abs(np.sum(normals * sight, axis=1)) / distance
+    return distance / focal / np.maximum(cosine, LEAST_COSINE), distance / focal
+
+
+def _extent(coordinate: Vector, size: Vector, other_size: Vector) -> tuple[float, float]:
+    """First and last place that a rectangle covers, from where shares of its area lie.
+
+    A pixel at the rim that shows something else as well has been left out, whatever its share; half a pixel is what
+    goes lost on average.
+
+    Args:
+        coordinate: of the pixels (n,) [m].
+        size, other_size: of the pixels in that direction and the other one (n,) [m].
+    """
+    order = np.argsort(coordinate)
+    area = (size * other_size)[order]
+    share = (np.cumsum(area) - 0.5 * area) / area.sum()
+    inner = np.interp([RIM_SHARE, 1 - RIM_SHARE], share, coordinate[order])
+    rim = (inner[1] - inner[0]) * RIM_SHARE / (1 - 2 * RIM_SHARE)
+    half = 0.5 * np.interp([RIM_SHARE, 1 - RIM_SHARE], share, size[order])
+    return float(inner[0] - rim - half[0]), float(inner[1] + rim + half[1])
+
+
+def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np.float64]:
+    """How much more ahead and down (2,) the gripper line points than it was thought to.
+
+    Seen from a wrong direction the points scatter beside the curve in proportion to where they are across; what
+    turns in the strip's own plane shows as skew of the outline.
+    """
+    normals = normals_at(phi)
+    tangent = np.array([np.cos(np.median(phi)), np.sin(np.median(phi))])
+    y, s = across - across.mean(), along - along.mean()
+    wide, long, skew = np.mean(y * y), np.mean(s * s), np.mean(y * s)
+    turn = skew * (wide - long) / ((wide - long) ** 2 + (0.1 * (wide + long)) ** 2)
+    weight = np.sqrt(len(y) * wide)
+    rows = np.vstack([normals * y[:, None], weight * tangent])
+    return np.linalg.lstsq(rows, np.append(gap - gap.mean(), weight * turn), rcond=None)[0]
+
+
+def _strip(fitted: _Fitted, hang: Hang, deviation: float) -> Strip:
+    """The strip in the rig, whose z axis is on the camera's side."""
+    plane, sides = fitted.plane, fitted.sides
+    start = hang.inclination[:1]
+    sign = 1.0 if fitted.faces else -1.0
+    z = sign * plane.normals(start)[0]
+    x = np.cos(start) * plane.ahead + np.sin(start) * plane.down
+    T_rg = np.eye(4)
+    T_rg[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T_rg[:3, 3] = hang.nodes[0] @ np.array([plane.ahead, plane.down]) + np.mean(sides) * plane.across
+    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start), fitted.pixel, deviation)

@@ -1,0 +1,1 @@
+"""Kernels and bases that several deformation models share."""

@@ -1,0 +1,205 @@
+"""Spline surfaces as one polynomial per knot span: half the work of summing base splines at every vertex."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.fused_cost import Step, deforming
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.parts import spline
+from abs_service.tracker.models.parts.tile_buffer import LANES, TILE, write
+from calib.jit import composed, kernel, prange
+
+
+class Patches:
+    """Vertices beside a rational spline surface, sorted by knot span.
+
+    Within a span, numerator and denominator of eq. 2 are polynomials of degree d in each of two coordinates that run
+    from −½ to ½ there. The numerator's (d + 1)² coefficients are linear in the span's control points, and all vertices
+    of the span share them; the denominator belongs to the vertices alone.
+    """
+
+    def __init__(
+        self,
+        u: NDArray[np.float64],
+        w: NDArray[np.float64],
+        offset: NDArray[np.float64],
+        weights: NDArray[np.float64],
+        degree: int,
+    ):
+        """Takes surface parameters (n,), sorted by span, offsets (n,) [m] and the control points' weights.
+
+        Args:
+            u, w: surface parameters (n,) in [0, 1], in ascending order of the spans that `spline.support` numbers.
+            offset: o of eq. 7 (n,) [m].
+            weights: of the control points (rows, columns).
+            degree: of the surface.
+        """
+        span, control = spline.support(u, w, weights.shape, degree)
+        spans = np.subtract(weights.shape, degree)
+        of_u, of_w = (spline.power_form(points, degree) for points in weights.shape)
+        powers = np.einsum("ilp,jmq->ijpqlm", of_u, of_w).reshape(*control.shape, -1)
+        powers *= weights.ravel()[control][:, :, None]
+        self._powers = np.pad(powers, ((0, 0), (0, 0), (0, -powers.shape[2] % LANES))).astype(np.float32)
+        self._control = control
+        self._start = np.searchsorted(span, np.arange(len(control) + 1)).astype(np.int64)
+        evaluate = composed(_evaluate, _polynomial=composed(_polynomial, ORDERS=degree + 1))
+        self._deform = composed(_deform, _evaluate=evaluate)
+        place = np.clip([u, w], 0, 1) * spans[:, None] - np.divmod(span, spans[1]) - 0.5
+        denominator = _polynomials(powers.sum(axis=1).reshape(-1, degree + 1, degree + 1)[span], *place)
+        value, along_u, along_w = denominator
+        self._vertices = np.zeros((6, len(u) + LANES), np.float32)
+        self._vertices[:, : len(u)] = [*place, offset, 1 / value, along_u, along_w]
+
+    def deform(self, thetas: NDArray[np.float64]) -> Surface:
+        """Vertices and normals for every row of `thetas` (population, 3 · control points) [m]."""
+        shape = len(thetas), 3, self._vertices.shape[1] - LANES
+        vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
+        self._deform(thetas, *self._arguments, vertices, normals)
+        return Surface(vertices, normals)
+
+    def step(self) -> Step:
+        """The same for a chain."""
+        return deforming(self._deform, self._vertices.shape[1] - LANES, self._arguments)
+
+    @property
+    def _arguments(self) -> tuple[NDArray[np.generic], ...]:
+        return self._control, self._powers, self._start, self._vertices
+
+    def raise_vertices(self, by: NDArray[np.float64]) -> None:
+        """Adds lengths (n,) [m] to the offsets."""
+        self._vertices[2, : len(by)] += by.astype(np.float32)
+
+
+def _polynomials(
+    coefficients: NDArray[np.float64], u: NDArray[np.float64], w: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Values of n polynomials (n, d + 1, d + 1) at u and w (n,), and their derivatives by u and by w."""
+    powers = np.arange(coefficients.shape[1])
+    (of_u, by_u), (of_w, by_w) = (
+        (at[:, None] ** powers, powers * at[:, None] ** np.maximum(powers - 1, 0)) for at in (u, w)
+    )
+    value, along_u, along_w = (
+        np.einsum("nlm,nl,nm->n", coefficients, a, b) for a, b in ((of_u, of_w), (by_u, of_w), (of_u, by_w))
+    )
+    return value, along_u, along_w
+
+
+#: Coefficients of a polynomial; a constant, so that the compiler unrolls what runs over them.
+ORDERS = 3
+
+
+@kernel
+def _find_coefficients(
+    control: NDArray[np.float64],
+    span_control: NDArray[np.int32],
+    powers: NDArray[np.float32],
+    coefficients: NDArray[np.float32],
+) -> None:
+    """Coefficients (spans, 3, q…) of x, y and z from the first control point on.
+
+    From there, all are so near that single precision does: rounding moves a vertex by less than it does afterwards.
+
+    Args:
+        control: one candidate's parameters (3 · control points,).
+        span_control: control points of every span (spans, q).
+        powers: each control point's share of every coefficient (spans, q, q…), zeros up to a multiple of `LANES`.
+        coefficients: results.
+    """
+    lanes = np.uintp(powers.shape[2] // LANES * LANES)
+    coefficients[:] = 0
+    for s in range(powers.shape[0]):
+        x, y, z = coefficients[s, 0], coefficients[s, 1], coefficients[s, 2]
+        for p in range(powers.shape[1]):
+            first, shares = 3 * span_control[s, p], powers[s, p]
+            px = np.float32(control[first] - control[0])
+            py = np.float32(control[first + 1] - control[1])
+            pz = np.float32(control[first + 2] - control[2])
+            for q in range(lanes):
+                x[q] += shares[q] * px
+                y[q] += shares[q] * py
+                z[q] += shares[q] * pz
+
+
+@kernel
+def _polynomial(
+    coefficients: NDArray[np.float32], u: np.float32, w: np.float32
+) -> tuple[np.float32, np.float32, np.float32]:
+    """Value and derivatives by u and by w, by Horner's rule, of coefficients as in `_evaluate`."""
+    value, by_u, by_w = np.float32(0), np.float32(0), np.float32(0)
+    for i in range(ORDERS):
+        row, slope = coefficients[(ORDERS - i) * ORDERS - 1], np.float32(0)
+        # Nothing is multiplied by 0 to begin with: since that could be NaN, the compiler would not leave it out.
+        for j in range(1, ORDERS):
+            slope = slope * w + row if j > 1 else row
+            row = row * w + coefficients[(ORDERS - i) * ORDERS - 1 - j]
+        by_u = by_u * u + value if i > 1 else value
+        value = value * u + row if i > 0 else row
+        by_w = by_w * u + slope if i > 0 else slope
+    return value, by_u, by_w
+
+
+@kernel
+def _evaluate(
+    coefficients: NDArray[np.float32],
+    origin: NDArray[np.float64],
+    start: NDArray[np.int64],
+    places: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+) -> None:
+    """Eq. 8 for a candidate.
+
+    Args:
+        coefficients: of the numerator's x, y and z (spans, 3, (d + 1)²…), powers of w within those of u.
+        origin: from which they count (3…) [m].
+        start: first vertex of every span, and the number of vertices, (spans + 1,).
+        places: u, w, offset, 1 / denominator and its derivatives by u and by w (6, n + `LANES`).
+        vertices, normals: results (3, n).
+    """
+    one, n, s = np.float32(1), vertices.shape[1], 0
+    ox, oy, oz = np.float32(origin[0]), np.float32(origin[1]), np.float32(origin[2])
+    result = np.empty((6, TILE + LANES), np.float32)
+    for first in range(0, n, TILE):
+        last = min(first + TILE, n)
+        begin = first
+        while begin < last:
+            while start[s + 1] <= begin:
+                s += 1
+            end = min(start[s + 1], last)
+            cx, cy, cz = coefficients[s, 0], coefficients[s, 1], coefficients[s, 2]
+            u, w, offset = places[0, begin:], places[1, begin:], places[2, begin:]
+            share, by_u, by_w = places[3, begin:], places[4, begin:], places[5, begin:]
+            shift, lanes = np.uintp(begin - first), np.uintp((end - begin + LANES - 1) // LANES * LANES)
+            for v in range(lanes):
+                x, ux, wx = _polynomial(cx, u[v], w[v])
+                y, uy, wy = _polynomial(cy, u[v], w[v])
+                z, uz, wz = _polynomial(cz, u[v], w[v])
+                x, y, z = x * share[v], y * share[v], z * share[v]
+                ux, uy, uz = ux - x * by_u[v], uy - y * by_u[v], uz - z * by_u[v]
+                wx, wy, wz = wx - x * by_w[v], wy - y * by_w[v], wz - z * by_w[v]
+                a, b, d = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+                inverse = one / np.sqrt(a * a + b * b + d * d + np.float32(1e-20))
+                a, b, d = a * inverse, b * inverse, d * inverse
+                x, y, z = ox + x + a * offset[v], oy + y + b * offset[v], oz + z + d * offset[v]
+                at = shift + v
+                result[0, at], result[1, at], result[2, at] = x, y, z
+                result[3, at], result[4, at], result[5, at] = a, b, d
+            begin = end
+        write(result, first, last - first, vertices, normals)
+
+
+@kernel
+def _deform(
+    thetas: NDArray[np.float64],
+    span_control: NDArray[np.int32],
+    powers: NDArray[np.float32],
+    start: NDArray[np.int64],
+    places: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+) -> None:
+    """Vertices and normals (population, 3, n) of parameters (population, dim)."""
+    for k in prange(thetas.shape[0]):
+        coefficients = np.empty((powers.shape[0], 3, powers.shape[2]), np.float32)
+        _find_coefficients(thetas[k], span_control, powers, coefficients)
+        _evaluate(coefficients, thetas[k], start, places, vertices[k], normals[k])

@@ -1,0 +1,1 @@
+"""Search steps that several optimisers share."""

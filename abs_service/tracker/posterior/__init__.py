@@ -1,0 +1,1 @@
+"""Cost of theta: objective plus priors, its curvature, and the covariance."""

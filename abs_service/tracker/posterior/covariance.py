@@ -1,0 +1,106 @@
+"""How well Θ is known, and every vertex.
+
+**Θ.** At the Θ that was found, JᵀJ + P is the curvature of the cost, of the sensors' normalised residuals r with
+derivatives J and of the priors P, and Σ = (JᵀJ + P)⁻¹ is the covariance if every residual scatters as its noise model
+says. It does not: a colour is read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform quantisation)
+to its variance where the print is sharp, and on smooth print a cautious model says too much. What the residuals did is
+known, so the sandwich Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ takes their squares instead (White, Econometrica 50, 1982).
+The leverage h = diag(J Σ Jᵀ) is how much of its own noise each residual has lost to the fit (HC2 of MacKinnon and
+White, J. Econometrics 29, 1985): if the models are right, r² / (1 − h) is 1 on average and the sandwich Σ.
+
+**Vertices.** Every vertex is bound to the surface where the first frame's noise put it, off by σε along its normal n
+with ε standard normal, and keeps that offset in all frames. The sensors see the surface, not the vertex; so a search
+moves Θ until the mesh lies on the surface as well as Θ can make it, and only the rest of the offsets remains. With the
+derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
+so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
+D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That hardly changes with the frames, and is told
+once for a mesh, in the frame after the one that it was made from; its part along the normal goes with the vertices.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.posterior.curvature import add_at
+from abs_service.tracker.terms.linearization import Linearization
+from calib.jit import kernel
+
+#: Least share of its noise that a residual keeps: below, rounding decides.
+LEAST_KEPT = 1e-6
+
+
+def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of Θ: Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ, where P = Σ⁻¹ − JᵀJ.
+
+    Args:
+        inverse: Σ (dim, dim), of the curvature of likelihood and priors.
+        sensed: r and J of the sensors, in parts.
+    """
+    excess = np.zeros_like(inverse)  # of Jᵀ diag(r² / (1 − h)) J over JᵀJ
+    for part in sensed:
+        own, jacobian = part.parameters, part.jacobian
+        answer = jacobian @ inverse[own][:, own]
+        kept = np.maximum(1 - np.einsum("md,md->m", answer, jacobian), LEAST_KEPT)
+        add_at(own, (jacobian.T * (part.residual**2 / kept - 1)) @ jacobian, excess)
+    return inverse + inverse @ excess @ inverse
+
+
+def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """D Σ Dᵀ (n, 3, 3) of every vertex, for its derivatives D and the covariance Σ (dim, dim) of Θ."""
+    result = np.empty((len(moves.local), 3, 3))
+    for group, own in enumerate(moves.parameters):
+        vertices = np.flatnonzero(moves.group == group)
+        in_a_row = vertices.size and vertices[-1] - vertices[0] == vertices.size - 1
+        local = moves.local[slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices]  # a slice copies nothing
+        # One product of matrices for all vertices: n small ones take several times as long.
+        weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
+        _multiply(weighted, local, vertices, result)
+    return result
+
+
+@kernel
+def _multiply(
+    left: NDArray[np.float64], right: NDArray[np.float64], to: NDArray[np.int64], result: NDArray[np.float64]
+) -> None:
+    """Products left rightᵀ (3, 3) of pairs of matrices (n, 3, k), which are symmetric, to the places `to` (n,)."""
+    for v in range(to.size):
+        a, b = left[v], right[v]
+        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for d in range(left.shape[2]):  # one pass over both for all six
+            xx += a[0, d] * b[0, d]
+            xy += a[0, d] * b[1, d]
+            xz += a[0, d] * b[2, d]
+            yy += a[1, d] * b[1, d]
+            yz += a[1, d] * b[2, d]
+            zz += a[2, d] * b[2, d]
+        square = result[to[v]]
+        square[0, 0], square[1, 1], square[2, 2] = xx, yy, zz
+        square[0, 1], square[0, 2], square[1, 2] = xy, xz, yz
+        square[1, 0], square[2, 0], square[2, 1] = xy, xz, yz
+
+
+def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
+    normals = surface.normals[0].T.astype(np.float64)
+    return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
+
+
+def remaining(
+    normals: NDArray[np.float64],
+    deviation: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+    response: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Variance (n,) [m²] along the normals of the part of the mesh's own errors that Θ does not correct.
+
+    Args:
+        normals: unit normals (n, 3).
+        deviation: σ of the vertices along them (n,) [m].
+        jacobian: D, derivatives (n, 3, dim) of the vertices.
+        response: −Σ JᵀJE, the change (dim, n) of Θ with which the search answers each vertex's error.
+    """
+    left = np.einsum("ni,nid->nd", normals, jacobian) @ response
+    left.flat[:: len(left) + 1] += deviation
+    return np.einsum("nk,nk->n", left, left)

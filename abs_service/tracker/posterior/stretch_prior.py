@@ -1,0 +1,105 @@
+"""What is known about how far a surface stretches: the prior of the lengths of a mesh's edges."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.posterior.edge_runs import EdgeRuns
+from abs_service.tracker.terms.linearization import Linearization, split
+from calib.jit import kernel
+
+
+class StretchPrior:
+    """Relative edge-length changes are normal with zero mean; it penalises stretching and shearing, never bending."""
+
+    def __init__(self, mesh: Mesh, deviation: float):
+        self._edges = mesh.edges
+        lengths = np.linalg.norm(mesh.vertices[self._edges[:, 0]] - mesh.vertices[self._edges[:, 1]], axis=1)
+        self._inverse_lengths = (1 / lengths).astype(np.float32)
+        self._runs = EdgeRuns(self._edges, self._inverse_lengths, len(mesh.vertices))
+        self._inverse_deviation = 1 / deviation
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """Negative log-density (population,) of the edge lengths, up to a constant."""
+        return self._runs.sum_squares(surface.vertices, 0.5 * self._inverse_deviation**2)
+
+    def step(self) -> Step:
+        """The same for one candidate of a chain."""
+        return self._runs.step(0.5 * self._inverse_deviation**2)
+
+    def linearize(self, surface: Surface, moves: Moves) -> list[Linearization]:
+        """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""
+        start = np.zeros(len(moves.parameters) + 2, np.int64)
+        _count_edges(self._edges, moves.group, start)
+        within, residual = start[-2], np.empty(len(self._edges))
+        rows = np.empty((within, moves.local.shape[2]))
+        across = np.zeros((len(self._edges) - within, moves.dimension))
+        scales = self._inverse_lengths * self._inverse_deviation
+        of_points = moves.local, moves.group, moves.parameters
+        edges = surface.vertices[0], self._edges, scales, self._inverse_deviation
+        _stretch_rows(*edges, *of_points, start[:-1].copy(), residual, rows, across)
+        parts = split(residual[:within], rows, start[:-1], moves.parameters)
+        return [*parts, Linearization(residual[within:], across)]
+
+
+@kernel
+def _count_edges(edges: NDArray[np.int32], group: NDArray[np.int32], start: NDArray[np.int64]) -> None:
+    """Where the edges within each group begin when they are sorted, and those between; zeros (groups + 2,) before."""
+    for e in range(edges.shape[0]):
+        own, other = group[edges[e, 0]], group[edges[e, 1]]
+        start[own + 1 if own == other else start.size - 1] += 1
+    for g in range(1, start.size):
+        start[g] += start[g - 1]
+
+
+@kernel
+def _stretch_rows(
+    vertices: NDArray[np.float32],
+    edges: NDArray[np.int32],
+    scales: NDArray[np.float32],
+    rest: float,
+    local: NDArray[np.float64],
+    group: NDArray[np.int32],
+    parameters: NDArray[np.int64],
+    place: NDArray[np.int64],
+    residual: NDArray[np.float64],
+    rows: NDArray[np.float64],
+    across: NDArray[np.float64],
+) -> None:
+    """Length times scale of every edge, less what it is at rest, and its derivatives, sorted as `place` says.
+
+    Args:
+        vertices, edges: (3, n) [m] and (edges, 2).
+        scales, rest: per length at rest (edges,) [1/m], and what that makes of the length at rest.
+        local, group, parameters: as in `Moves`.
+        place: where the first edge within each group, and the first between groups, go.
+        residual: (edges,).
+        rows: of the edges within a group, by its parameters.
+        across: of those between groups by all parameters (edges, dim), zeros before.
+    """
+    between = place.size - 1
+    for e in range(edges.shape[0]):
+        i, j = edges[e, 0], edges[e, 1]
+        x = np.float64(vertices[0, i]) - vertices[0, j]
+        y = np.float64(vertices[1, i]) - vertices[1, j]
+        z = np.float64(vertices[2, i]) - vertices[2, j]
+        length = np.sqrt(x * x + y * y + z * z)
+        g = group[i] if group[i] == group[j] else between
+        to = place[g]
+        place[g] += 1
+        residual[to] = length * scales[e] - rest
+        x, y, z = x * scales[e] / length, y * scales[e] / length, z * scales[e] / length
+        if g < between:
+            for d in range(local.shape[2]):
+                rows[to, d] = (
+                    x * (local[i, 0, d] - local[j, 0, d])
+                    + y * (local[i, 1, d] - local[j, 1, d])
+                    + z * (local[i, 2, d] - local[j, 2, d])
+                )
+        else:
+            row = across[to - rows.shape[0]]
+            for d in range(local.shape[2]):
+                row[parameters[group[i], d]] += x * local[i, 0, d] + y * local[i, 1, d] + z * local[i, 2, d]
+                row[parameters[group[j], d]] -= x * local[j, 0, d] + y * local[j, 1, d] + z * local[j, 2, d]

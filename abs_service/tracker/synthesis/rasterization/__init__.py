@@ -1,0 +1,1 @@
+"""Triangle rasterisation into a z-buffer."""

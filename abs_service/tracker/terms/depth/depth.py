@@ -1,0 +1,184 @@
+"""A depth sensor's measurements against synthesised distances."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import DepthImage, Image
+from abs_service.tracker.fused_cost import Step, both
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.depth.depth_cost import (
+    FREE_SCALE_M,
+    depth_cost,
+    distances,
+    judge,
+    normalize,
+    usual_cost,
+    write_constants,
+)
+from abs_service.tracker.terms.depth.outline import Outline, Unknown
+from abs_service.tracker.terms.depth.visibility import Visibility, classify
+from abs_service.tracker.terms.gradients import color_rows, depth_rows
+from abs_service.tracker.terms.linearization import PointLinearization, Together
+from calib import pose
+from calib.camera import Camera
+from calib.jit import composed
+from calib.noise.base import DepthNoise, write_texture
+
+#: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
+LEAST_FREE_M = 0.005
+
+
+class DepthTerm:
+    """−log φ of eqs. 18 and 19, summed over the samples.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        vertices: int,
+        noise: DepthNoise,
+        bounds: Bounds,
+        outline: Callable[[Camera], Outline] = lambda camera: Unknown(),
+    ):
+        self.sensor = sensor
+        self._noise = noise
+        self._bounds = bounds
+        self._synthesizer = synthesizer
+        self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
+        self._outline = outline(self._view.camera)
+        # Unbounded and without a measurement, so that the search gains nothing where nobody has looked.
+        beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
+        self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
+        self._texture = np.zeros((0, 8), np.float32)
+        self._obscured = np.zeros(0, np.bool_)
+        self._doubtful = np.zeros(0, np.bool_)
+        self._free_m = np.zeros((0, 0), np.float32)
+        self._window = WHOLE
+        self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
+
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+        """Renders the noise model over a depth image; what is hidden is left out of this frame."""
+        if not isinstance(image, DepthImage):
+            raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        texture = self._synthesizer.texture(self.sensor, self._render(image, window))
+        texels = within(texture, window)
+        self._view.look(predicted)
+        distance = np.empty(texels.shape[:2], np.float32)
+        distances(texels, distance)
+        seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
+        doubtful = self._outline.observe(distance, seen, predicted, window)
+        self._window, self._distance, self._foreground = window, distance, seen.foreground
+        height, width = texture.shape[0] - 2, texture.shape[1] - 2
+        self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
+        self._doubtful = placed(window, doubtful, height, width).ravel()
+        self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)
+        self._silence(texture, seen, doubtful)
+        self._texture = texture.reshape(-1, 8)
+
+    def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
+        """The noise model over a window of an image (height + 2, width + 2, 8)."""
+        texture = self._image.begin(image.distance.shape, window)
+        write_texture(self._noise, image.distance[window], image.amplitude[window], corner(window), texture)
+        return texture
+
+    def foreground(self) -> NDArray[np.float64]:
+        """Points (k, 3) [m] of what stands before the object."""
+        rows, columns = np.nonzero(self._foreground)
+        if not len(rows):
+            return np.zeros((0, 3))
+        camera, (top, left) = self._view.camera, corner(self._window)
+        sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
+        return pose.transform(camera.T_rs, sight * self._distance[rows, columns, None])
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Nothing more: a depth sensor sees for itself what stands before the object."""
+
+    def _silence(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
+        """Puts constants into the texture (height + 2, width + 2, 8) where a pixel says nothing about distances.
+
+        Behind an occluder, where returns are missing, and right beside an outline that has a term of its own, a vertex
+        costs what one that agrees costs on average, so that it has no reason to move there or away. In free space it
+        costs an outlier, and more the farther it is from the object.
+        """
+        silent = seen.foreground | seen.hole | doubtful
+        agreeing = usual_cost(within(texture, self._window), seen.object) if silent.any() else 0.0
+        free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
+        write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log φ (population,) with what the outline says."""
+        return self._measured_cost(surface, self._view.synthesize(surface)) + self._outline.cost(surface)
+
+    def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
+        """Of the measurements; the outlier share is mixed in by the larger of the two densities."""
+        out = np.empty(len(seen.pixel))
+        depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        sight, bounds = self._view.sight(), (self._bounds.inlier, self._bounds.outlier)
+        if sight is None:
+            return None
+        measured = Step(composed(judge, see=sight.see.kernel), (self._texture, *bounds, *sight.see.arguments))
+        return both(measured, self._outline.step())
+
+    def linearize(self, surface: Surface, moves: Moves) -> Together:
+        """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""
+        samples, seen = self._view.follow(surface, moves), self._view.synthesize(surface)
+        parts = (self._linearize_measured(surface, samples, seen), self._linearize_free(surface, samples, seen))
+        return Together((*parts, self._outline.linearize(surface, moves)), moves.dimension)
+
+    def _linearize_measured(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
+        residual, inverse_deviation, cost = self._residuals(seen)
+        use = np.flatnonzero(cost < self._bounds.outlier - self._bounds.inlier)
+        vertices, normals = (
+            self._view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
+        )
+        rows = depth_rows(vertices, normals, self._view.camera.center, use, inverse_deviation)
+        return PointLinearization(residual[use], rows, use, samples)
+
+    def _linearize_free(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
+        """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
+
+        The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
+        """
+        pixel = seen.pixel[0]
+        away = self._free_m.ravel()[pixel].astype(np.float64)
+        out = (pixel > 0) & (away > 0)
+        if not out.any():
+            return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), samples)
+        vertices = self._view.spread(surface, surface.vertices[0].T)[out]
+        distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
+        weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
+        rows = color_rows(distances, self._view.camera, vertices)[:, 0] * weight[:, None]
+        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples)
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        seen = self._view.synthesize(surface)
+        residual, _, cost = self._residuals(seen)
+        measured, pixel = cost < np.inf, seen.pixel[0]
+        free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
+        hidden = (pixel < 0) | self._obscured[pixel]
+        mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
+        size = np.where(free, np.inf, np.abs(residual))
+        return summarize(
+            self.sensor, (pixel > 0) & ~(hidden | self._doubtful[pixel]), hidden, measured | free, size, mean
+        )
+
+    def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""
+        residual, inverse, cost = np.empty((3, seen.pixel.shape[1]))
+        normalize(seen.pixel[0], seen.distance[0], self._texture, residual, inverse, cost)
+        return residual, inverse, cost

@@ -1,0 +1,156 @@
+"""What the pixels of a depth image show where the object is expected: the object, an occluder, nothing, free space.
+
+A vertex may miss its measurement for three reasons, which say different things about the deformation. Something stands
+before it, or the sensor got no return where the object should be: then nothing is known. Or the sensor looks past
+the place where the vertex should be: then the vertex is not there, and the nearest part of the object says how far off
+it is.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.depth_segments import connected_surfaces
+from calib.jit import kernel
+
+#: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].
+AGREEMENT_M = 0.03
+
+#: Neighbouring pixels whose distances differ by more show different surfaces [m].
+LARGEST_STEP_M = 0.04
+
+#: A connected surface is the object if at least this share of what it has on the expected place agrees …
+LEAST_SHARE = 0.3
+#: … and so many pixels do.
+LEAST_PIXELS = 10
+
+#: Missing returns deeper inside the expected outline are holes in the measurement, with what is missing around them up
+#: to twice as far away; elsewhere, the outline itself may have moved [m].
+RIM_M = 0.015
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Visibility:
+    """Masks (height, width) of one depth image.
+
+    Attributes:
+        object: shows the object.
+        foreground: shows something before the object.
+        hole: no return where the object should be.
+        free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
+            the object; 0 elsewhere.
+    """
+
+    object: NDArray[np.bool_]
+    foreground: NDArray[np.bool_]
+    hole: NDArray[np.bool_]
+    free_m: NDArray[np.float32]
+
+
+def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], focal: float) -> Visibility:
+    """Classifies the pixels of one depth image by connected surfaces.
+
+    If no surface agrees with the prediction, it is the prediction that is wrong, and nothing is classified.
+
+    Args:
+        distance: measured radial distances (height, width) [m], NaN without return.
+        predicted: radial distances of the predicted mesh [m], infinite beside it.
+        focal: focal length of the camera [px].
+    """
+    distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
+    labels, count = connected_surfaces(distance, LARGEST_STEP_M)
+    is_object = np.zeros(count, np.bool_)
+    _recognize(distance, predicted, labels, is_object)
+    nothing = np.zeros(distance.shape, np.bool_)
+    if not is_object.any():
+        return Visibility(nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
+    near = _extended(predicted)
+    shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
+    _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
+    foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
+    hole = _inside(missing, np.isfinite(predicted), near / focal) if missing.any() else nothing
+    away = _depth_inside(~shown) * near / np.float32(focal)
+    return Visibility(shown, foreground, hole, np.where(behind, away, np.float32(0)))
+
+
+@kernel
+def _recognize(
+    distance: NDArray[np.float32],
+    predicted: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    is_object: NDArray[np.bool_],
+) -> None:
+    """Which surfaces (count,), of which the first is none, are the object."""
+    inside, agreeing = np.zeros(is_object.size, np.int64), np.zeros(is_object.size, np.int64)
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            expected, label = predicted[row, column], labels[row, column]
+            if np.isfinite(expected):
+                inside[label] += 1
+                agreeing[label] += 1 if abs(distance[row, column] - expected) < AGREEMENT_M else 0
+    for label in range(1, is_object.size):
+        is_object[label] = agreeing[label] >= max(LEAST_PIXELS, LEAST_SHARE * inside[label])
+
+
+@kernel
+def _compare(
+    distance: NDArray[np.float32],
+    near: NDArray[np.float32],
+    labels: NDArray[np.int32],
+    is_object: NDArray[np.bool_],
+    shown: NDArray[np.bool_],
+    before: NDArray[np.bool_],
+    solid: NDArray[np.bool_],
+    behind: NDArray[np.bool_],
+    missing: NDArray[np.bool_],
+) -> None:
+    """Which pixels show the object, something before it, part of a surface before it, something behind it, nothing."""
+    for row in range(distance.shape[0]):
+        for column in range(distance.shape[1]):
+            label, beyond = labels[row, column], distance[row, column] - near[row, column]
+            is_shown = is_object[label]
+            is_before = not is_shown and beyond < -AGREEMENT_M
+            shown[row, column], before[row, column] = is_shown, is_before
+            solid[row, column] = is_before and label > 0
+            behind[row, column] = not is_shown and beyond > AGREEMENT_M
+            missing[row, column] = not np.isfinite(distance[row, column])
+
+
+def _inside(missing: NDArray[np.bool_], expected: NDArray[np.bool_], metres: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Missing returns within the expected outline, and around these, for pixels of a width (height, width) [m]."""
+    with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
+        hole = missing & (_depth_inside(expected) * metres > RIM_M)
+        if hole.any():
+            hole |= missing & (_depth_inside(~hole) * metres < 2 * RIM_M)
+    return hole
+
+
+def _extended(predicted: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Distances [m] of the predicted mesh, beside it those of its nearest pixel."""
+    beside = ~np.isfinite(predicted)
+    labels = cv2.distanceTransformWithLabels(
+        beside.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )[1]
+    values = np.empty(predicted.shape, np.float32)
+    _spread(predicted, np.asarray(labels, np.int32), values)
+    return values
+
+
+@kernel
+def _spread(predicted: NDArray[np.float32], labels: NDArray[np.int32], values: NDArray[np.float32]) -> None:
+    """Gives every pixel what the pixel on the mesh has that is labelled like it; not a number if there is none."""
+    table = np.full(labels.size + 1, np.float32(np.nan))
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            if np.isfinite(predicted[row, column]):
+                table[labels[row, column]] = predicted[row, column]
+    for row in range(labels.shape[0]):
+        for column in range(labels.shape[1]):
+            values[row, column] = table[labels[row, column]]
+
+
+def _depth_inside(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Distance of every pixel of a mask from the mask's edge [px]."""
+    return np.asarray(cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5), np.float32)

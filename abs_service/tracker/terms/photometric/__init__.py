@@ -1,0 +1,1 @@
+"""Terms of sensors that deliver pictures."""

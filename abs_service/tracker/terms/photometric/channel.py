@@ -1,0 +1,169 @@
+"""A sensor whose pixels hold one number each: grey, a Bayer mosaic, amplitudes, infra-red."""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import ChannelImage, Image
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import channel_slopes
+from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.photometric.channel_cost import (
+    CHANNEL,
+    INVERSE,
+    NORMALIZER,
+    VALUE,
+    channel_cost,
+    copy,
+    fill,
+)
+from abs_service.tracker.terms.photometric.illumination import Illumination
+from abs_service.tracker.terms.photometric.photometric_kernel import judging
+from abs_service.tracker.terms.photometric.shadow import Shadow
+from abs_service.tracker.terms.photometric.texture_registration_noise import NO_WIDENING, NOT_AT_ALL, Misplacement
+from calib.noise.base import LOG_SQRT_2PI
+
+#: The texel of no measurement.
+UNKNOWN = np.array([np.nan, 0, 0, 0], np.float32)
+
+
+class ChannelNoise(Protocol):
+    """Gaussian noise of one number per pixel."""
+
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Standard deviation of measured values, in their shape."""
+        ...
+
+
+class ChannelTerm:
+    """−log of the density of the measured number given what the vertex has in the pixel's channel.
+
+    Behind a Bayer mosaic only the channel that the pixel has is compared, and nothing is interpolated (section 4.1).
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        appearance: NDArray[np.float32],
+        noise: ChannelNoise,
+        illumination: Illumination,
+        bounds: Bounds,
+        misplacement: Misplacement = NOT_AT_ALL,
+    ):
+        self.sensor = sensor
+        self._synthesizer = synthesizer
+        self._view = synthesizer.view(sensor, appearance)
+        self._illumination = illumination
+        self._shadow = Shadow(self._view.camera)
+        self._noise = noise
+        self._bounds = bounds
+        self._misplacement = misplacement
+        self._widening = NO_WIDENING
+        self._image = np.zeros((1, 1, 4), np.float32)
+        self._texels = np.zeros((0, 0, 4), np.float32)
+        self._texture = np.zeros((0, 4), np.float32)
+        self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
+
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+        """Takes an image; NaN, which the border is as well, stands for no measurement."""
+        if not isinstance(image, ChannelImage):
+            raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        if self._texels.shape[:2] != image.values.shape:  # new memory takes as long as filling it
+            self._texels = np.full((*image.values.shape, 4), UNKNOWN, np.float32)
+        values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
+        fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
+        self._image = self._synthesizer.image(self.sensor, self._texels)
+        texture = self._bordered.begin(self._image.shape[:2], window)
+        copy(self._image, *limits(window, self._image.shape), texture)
+        self._texture = texture.reshape(-1, 4)
+        self._view.look(predicted)
+        self._widening = NO_WIDENING
+        inverse = self._residuals(predicted)[1]
+        with np.errstate(divide="ignore"):
+            deviation = (1 / inverse)[:, None]
+        self._widening = self._misplacement.widening(self._view, predicted, deviation)
+
+    def foreground(self) -> NDArray[np.float64]:
+        """None: brightness does not tell what is nearer."""
+        return np.zeros((0, 3))
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
+        if len(points):
+            self._bordered.inside[self._shadow.mask(points)[self._bordered.window], VALUE] = np.inf
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log of the density of the measured values (population,)."""
+        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        out = np.empty(len(seen.pixel))
+        channel_cost(seen.pixel, seen.attributes, *self._measured, out)
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        sight = self._view.sight()
+        return judging(sight, channel_cost, self._measured, self._illumination.step()) if sight else None
+
+    @property
+    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
+        uniform = self._bounds.inlier + self._bounds.uniform
+        return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
+
+    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
+        """Normalised residuals of all but outliers, and how they change with the parameters.
+
+        What light makes of a turning surface changes slower than its texture, and is left to the search.
+        """
+        residual, inverse, normalizer = self._residuals(surface)
+        use = 0.5 * residual**2 + normalizer < self._bounds.outlier
+        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
+        slopes = self._slopes(surface)[use] * inverse[use, None]
+        rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices))[:, 0]
+        return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, moves))
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        residual = self._residuals(surface)[0]
+        pixel = self._view.synthesize(surface).pixel[0]
+        hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
+        mean = -float(self.cost(surface)[0]) / len(residual)
+        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean)
+
+    def _slopes(self, surface: Surface) -> NDArray[np.float64]:
+        """How the channel of each sample's pixel changes there per pixel to the right and down (m, 2).
+
+        A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
+        the surface's own where that is known, which is also exactly how a residual changes within a pixel.
+        """
+        seen = self._view.synthesize(surface)
+        channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
+        own = self._view.slopes(surface)[np.arange(len(channel)), channel]
+        slopes = self._illumination.shine(replace(seen, attributes=own[None]), surface, self._view).attributes[0]
+        slopes, unknown = slopes.astype(np.float64), np.isnan(own).any(axis=1)
+        samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
+        slopes[unknown] = channel_slopes(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples)
+        return slopes
+
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""
+        seen = self._illumination.shine(self._view.synthesize(surface), surface, self._view)
+        texels = self._texture[seen.pixel[0]].astype(np.float64)
+        each, channel = np.arange(len(texels)), texels[:, CHANNEL].astype(int)
+        widening = self._widening
+        # One widening may stand for all samples, or for all channels.
+        of = each % len(widening.factor), channel % widening.factor.shape[1]
+        inverse = texels[:, INVERSE] / widening.factor[of]
+        residual = (texels[:, VALUE] - seen.attributes[0][each, channel]) * inverse
+        measured = (seen.pixel[0] > 0) & np.isfinite(residual)
+        return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]

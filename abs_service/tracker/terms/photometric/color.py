@@ -1,0 +1,160 @@
+"""A colour sensor's pixels against the colours of the vertices."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import ColorImage, Image
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
+from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.gradients import color_rows
+from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.photometric.photometric_kernel import judging
+from abs_service.tracker.terms.photometric.shadow import Shadow
+from abs_service.tracker.terms.photometric.texture_registration_noise import NOT_AT_ALL, Misplacement
+from calib.jit import kernel, prange
+from calib.noise.base import LOG_SQRT_2PI
+from calib.noise.color import GaussianColor
+
+
+class ColorTerm:
+    """−log of the density of the measured colour given the vertex's own, summed over the samples.
+
+    Attributes:
+        sensor: name of the sensor.
+    """
+
+    def __init__(
+        self,
+        sensor: str,
+        synthesizer: Synthesizer,
+        colors: NDArray[np.float32],
+        noise: GaussianColor,
+        bounds: Bounds,
+        misplacement: Misplacement = NOT_AT_ALL,
+    ):
+        self.sensor = sensor
+        self._synthesizer = synthesizer
+        self._view = synthesizer.view(sensor, colors)
+        self._shadow = Shadow(self._view.camera)
+        self._bounds = bounds
+        self._sigma = np.array([[noise.sigma]], np.float32)
+        self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
+        self._misplacement = misplacement
+        self._inverse = np.zeros((0, 3), np.float32)
+        self._normalizer = np.zeros(0, np.float32)
+        self._texture = np.zeros((0, 3), np.float32)
+        self._image = np.zeros((1, 1, 3), np.float32)
+        self._levels = np.zeros((0, 0, 3), np.float32)
+        self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
+
+    def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
+        """Takes a colour image; the border is NaN, which stands for no measurement."""
+        if not isinstance(image, ColorImage):
+            raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
+        window = self._synthesizer.window(self.sensor, predicted, reach_m)
+        if self._levels.shape != image.rgb.shape:
+            self._levels = np.zeros(image.rgb.shape, np.float32)
+        self._levels[window] = image.rgb[window]
+        self._image = self._synthesizer.image(self.sensor, self._levels)
+        texture = self._bordered.begin(self._image.shape[:2], window)
+        self._bordered.inside[:] = self._image[window]
+        self._texture = texture.reshape(-1, 3)
+        self._view.look(predicted)
+        widening = self._misplacement.widening(self._view, predicted, self._sigma)
+        self._inverse = np.repeat(
+            np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
+        )
+        self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
+
+    def foreground(self) -> NDArray[np.float64]:
+        """None: colours do not tell what is nearer."""
+        return np.zeros((0, 3))
+
+    def hide(self, points: NDArray[np.float64]) -> None:
+        """Marks the pixels that show points (k, 3) [m] before the object: their colours say nothing."""
+        if len(points):
+            self._bordered.inside[self._shadow.mask(points)[self._bordered.window]] = np.inf
+
+    def cost(self, surface: Surface) -> NDArray[np.float64]:
+        """−Σ_v log of the density of the measured colours (population,)."""
+        seen = self._view.synthesize(surface)
+        out = np.empty(len(seen.pixel))
+        _color_cost(seen.pixel, seen.attributes, *self._measured, out)
+        return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
+
+    def step(self) -> Step | None:
+        """The same for one candidate of a chain."""
+        sight = self._view.sight()
+        return judging(sight, _color_cost, self._measured) if sight else None
+
+    @property
+    def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:
+        uniform = self._bounds.inlier + self._bounds.uniform
+        return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
+
+    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
+        """Normalised residuals of all but outliers, three channels each, and how they change with the parameters."""
+        residual, measured = self._residuals(surface)
+        use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
+        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
+        inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
+        rows = color_rows(self._image, self._view.camera, vertices) * inverse
+        points = np.repeat(np.flatnonzero(use), residual.shape[1])
+        return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, self._view.follow(surface, moves))
+
+    def fit(self, surface: Surface) -> SensorFit:
+        """How the sensor agrees with a population of one."""
+        residual, measured = self._residuals(surface)
+        pixel = self._view.synthesize(surface).pixel[0]
+        hidden = (pixel < 0) | np.isinf(self._texture[pixel, 0])
+        mean = -float(self.cost(surface)[0]) / len(residual)
+        size = np.sqrt(np.mean(residual**2, axis=1))
+        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, size, mean, channels=3)
+
+    def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Normalised residuals (n, 3) and whether there is a measurement (n,)."""
+        seen = self._view.synthesize(surface)
+        colors = seen.attributes[0].astype(np.float64)
+        residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
+        measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
+        return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
+
+
+@kernel
+def _color_cost(
+    pixel: NDArray[np.int32],
+    colors: NDArray[np.float32],
+    texture: NDArray[np.float32],
+    inverse: NDArray[np.float32],
+    normalizer: NDArray[np.float32],
+    outlier: float,
+    uniform: float,
+    out: NDArray[np.float64],
+) -> None:
+    """Sum over samples of min(normaliser + ½e², outlier), of as many samples as have noise of their own, or of all.
+
+    Where either colour is unknown (NaN) of `uniform`, and where something stands before the object (∞) of what an
+    agreeing colour costs on average.
+    """
+    half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
+    farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums
+    shared = inverse.shape[0] == 1
+    # No branches on what is measured, see `depth_cost._cost_of`.
+    for k in prange(pixel.shape[0]):
+        total, pixels, looks = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
+        for v in range(np.uintp(pixels.size)):
+            i = pixels[v]
+            measured, color = texture[np.uintp(max(i, 0))], looks[v]
+            row = np.uintp(0) if shared else v
+            red = (measured[0] - color[0]) * inverse[row, 0]
+            green = (measured[1] - color[1]) * inverse[row, 1]
+            blue = (measured[2] - color[2]) * inverse[row, 2]
+            square = red * red + green * green + blue * blue
+            explained = min(normalizer[row] + half * square, most)
+            cost = average + normalizer[row] if square > farthest else explained
+            cost = unknown if np.isnan(square) else cost
+            total += cost if i >= 0 else np.float32(0)
+        out[k] = total

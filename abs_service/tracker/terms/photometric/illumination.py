@@ -1,0 +1,106 @@
+"""What light makes of a surface's reflectivity, one class for each kind of light."""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.base import Synthesis, View
+from calib.jit import kernel
+
+
+class Illumination(Protocol):
+    """Turns reflectivities into what a sensor sees."""
+
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+        """The synthesis of a population with its attributes as they look in this light."""
+        ...
+
+    def step(self) -> Step:
+        """From attributes, vertices and normals of one candidate of a chain to attributes."""
+        ...
+
+
+class Passive:
+    """The light of the room: a vertex looks the same wherever it is."""
+
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+        """The synthesis itself."""
+        return seen
+
+    def step(self) -> Step:
+        """The attributes themselves."""
+        return AS_IT_IS
+
+
+class Active:
+    """A lamp beside the sensor: reflectivity · cosine of incidence / distance² (Lambert).
+
+    Args:
+        center: of the camera (3,) [m].
+    """
+
+    def __init__(self, center: NDArray[np.float64]):
+        self._center = center.astype(np.float32)
+
+    def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
+        """The synthesis with reflectivities as bright as they look on each member of the population."""
+        shade = lambert(surface, self._center)
+        return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[..., None])
+
+    def step(self) -> Step:
+        """The same for one candidate of a chain, whose samples are its vertices."""
+        return Step(_shine, (self._center,))
+
+
+def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float32]:
+    """Cosine of incidence over squared distance (population, n) [1/m²] of vertices lit from `center` (3,) [m]."""
+    population, _, n = surface.vertices.shape
+    shade = np.empty((population, n), np.float32)
+    _lambert(surface.vertices, surface.normals, center.astype(np.float32), shade)
+    return shade
+
+
+@kernel
+def _lambert(
+    vertices: NDArray[np.float32], normals: NDArray[np.float32], center: NDArray[np.float32], shade: NDArray[np.float32]
+) -> None:
+    """Lambert's law with the lamp at the centre; what faces away is dark."""
+    x, y, z = center
+    for k in range(vertices.shape[0]):
+        for v in range(vertices.shape[2]):
+            a, b, c = x - vertices[k, 0, v], y - vertices[k, 1, v], z - vertices[k, 2, v]
+            square = a * a + b * b + c * c
+            along = a * normals[k, 0, v] + b * normals[k, 1, v] + c * normals[k, 2, v]
+            shade[k, v] = max(along, np.float32(0)) / (square * np.sqrt(square))
+
+
+@kernel
+def as_it_is(
+    attributes: NDArray[np.float32], vertices: NDArray[np.float32], normals: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """The attributes themselves."""
+    return attributes
+
+
+#: The step of a light in which everything looks as it is.
+AS_IT_IS = Step(as_it_is)
+
+
+@kernel
+def _shine(
+    attributes: NDArray[np.float32],
+    vertices: NDArray[np.float32],
+    normals: NDArray[np.float32],
+    center: NDArray[np.float32],
+) -> NDArray[np.float32]:
+    """Attributes (1, n, channels) times Lambert's law."""
+    shade, lit = np.empty((1, attributes.shape[1]), np.float32), np.empty(attributes.shape, np.float32)
+    _lambert(vertices, normals, center, shade)
+    for v in range(attributes.shape[1]):
+        for channel in range(attributes.shape[2]):
+            lit[0, v, channel] = attributes[0, v, channel] * shade[0, v]
+    return lit

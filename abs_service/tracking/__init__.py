@@ -1,0 +1,1 @@
+"""A tracker over time: session, live process, replay, warm-up, monitors."""

@@ -1,0 +1,110 @@
+"""A recording of a strip that hangs from a gripper, tracked from beginning to end."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.observation import Observer
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.detection.elastica import heavy_elastica
+from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.models.gravity import Gravity
+from abs_service.tracking.session import Plan, Tracking
+from abs_service.tracking.stiffness import Hanging, Stiffness, StiffnessError, hanging, predicted_tip
+from calib.rig import Rig
+from drivers.contract.frame import Frame, FrameSet
+from drivers.replay import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """One frame.
+
+    Attributes:
+        measured: depth pixels, horizontal distance from the gripper and drop below it (k, 2) [m].
+        tracked: the same of the tracked vertices (n, 2) [m].
+        predicted: the same of nodes of the elastica (m, 2) [m].
+        along: ends of the segments (s + 1,), distance from the gripper [m].
+        inclination, deviation: tracked angles there and their standard deviation (s + 1,) [rad].
+        predicted_along, predicted_inclination: the elastica's (m,) [m], [rad].
+    """
+
+    measured: NDArray[np.float64]
+    tracked: NDArray[np.float64]
+    predicted: NDArray[np.float64]
+    along: NDArray[np.float64]
+    inclination: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    predicted_along: NDArray[np.float64]
+    predicted_inclination: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class HangingStrip:
+    """What was tracked.
+
+    Attributes:
+        model: of the strip.
+        hangings: of all frames in which it was tracked.
+        passed_over: frame sets in which it was not, or not yet.
+        shown: an estimate from the middle of the recording, to be drawn.
+        pixels: of that moment, what the reference sensor saw of the strip (k, 3) [m].
+    """
+
+    model: Gravity
+    hangings: list[Hanging]
+    passed_over: int
+    shown: Estimate
+    pixels: NDArray[np.float64]
+
+    def profiles(self, found: Stiffness) -> Profiles:
+        """What there is to be drawn of the frame that is shown."""
+        model, theta, length = self.model, self.shown.theta, self.model.strip.length
+        here = hanging(model, theta, self.shown.covariance)
+        tip = predicted_tip(found.load, here)
+        shape = heavy_elastica(tip, found.load)
+        return Profiles(
+            measured=model.side_view(theta, self.pixels),
+            tracked=model.side_view(theta, self.shown.vertices.astype(np.float64)),
+            predicted=length * shape.points[0],
+            along=np.linspace(0, length, model.segments + 1),
+            inclination=here.inclination,
+            deviation=np.sqrt(np.diag(here.covariance)),
+            predicted_along=np.linspace(0, length, len(shape.inclination[0])),
+            predicted_inclination=shape.inclination[0],
+        )
+
+
+def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Plan) -> HangingStrip:
+    """Tracks a recording with a gravity model.
+
+    Of a strip that was lost and found again, the mesh that was tracked longest counts.
+
+    Raises:
+        StiffnessError: no strip was ever tracked.
+    """
+    tracking, observer = Tracking(rig, plan), Observer(rig)
+    tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
+    sets = 0
+    for frames in _frame_sets(recording, synchroniser):
+        sets += 1
+        estimate, model = tracking.track(frames, lambda: True), tracking.model
+        if isinstance(model, Gravity) and estimate.status == Status.TRACKING:
+            tracked.setdefault(tracking.mesh_version, []).append((model, estimate, frames))
+    if not tracked:
+        raise StiffnessError(f"{recording.path}: no strip was tracked in {sets} frame sets")
+    longest = max(tracked.values(), key=len)
+    model, shown, frames = longest[len(longest) // 2]
+    seen = sight(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
+    hangings = [hanging(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
+    return HangingStrip(model, hangings, sets - len(longest), shown, seen.points)
+
+
+def _frame_sets(recording: Recording, synchroniser: Synchroniser) -> Iterator[FrameSet]:
+    for item in recording.frames():
+        if isinstance(item, Frame):
+            yield from synchroniser.add(item)
+    yield from synchroniser.flush()

@@ -1,0 +1,196 @@
+"""A tracker in a running rig: takes frame sets, publishes estimates."""
+
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from statistics import median
+
+from abs_service.bus import keys
+from abs_service.bus.contract import MESH, STATE, Bus
+from abs_service.bus.frames import DEPTH, FrameSubscriber
+from abs_service.bus.health import Health, Level
+from abs_service.bus.stamps import Speaker
+from abs_service.pairing.observation import ObservationError
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.session import Tracking
+from abs_service.wire import estimate_messages
+from abs_service.wire.estimate_messages import Effort, Identity
+from drivers.contract.frame import FrameSet
+
+#: How long one turn waits for a frame [s]; a reader that is told to stop notices within this time.
+TURN_S = 0.05
+#: Turns of which the median says how fast the tracker is: a few slow ones, as after a stall, say nothing.
+TURNS = 9
+
+
+class WaitingSets:
+    """The frame sets that a tracker has still to take.
+
+    A tracker that is faster than the cameras gets all of them, in order: what a stall of the machine has left waiting
+    is worked off within a few frames. A slower one gets the newest, or it would fall back more and more; the others are
+    counted.
+
+    Args:
+        frames: where frames come from.
+        synchroniser: what makes sets of them.
+        clock: CLOCK_MONOTONIC [ns].
+
+    Attributes:
+        skipped: frame sets passed over.
+    """
+
+    def __init__(self, frames: FrameSubscriber, synchroniser: Synchroniser, clock: Callable[[], int]):
+        self.skipped = 0
+        self._frames = frames
+        self._synchroniser = synchroniser
+        self._clock = clock
+        self._waiting: deque[FrameSet] = deque()
+        self._turns_ns: deque[int] = deque(maxlen=TURNS)
+        self._taken_ns: int | None = None  # when the set was taken that is being worked on
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """What became no estimate.
+
+        `skipped` frame sets; by topic, frames `dropped` unseen and `malformed` messages; by stream and cause, frames
+        that are in no set and so `unused`.
+        """
+        counters = {"skipped": self.skipped}
+        counters |= {f"dropped.{topic}": number for topic, number in self._frames.dropped.items()}
+        counters |= {f"malformed.{topic}": number for topic, number in self._frames.malformed.items()}
+        counters |= {f"unused.{stream}": number for stream, number in self._synchroniser.counters.items()}
+        return counters
+
+    @property
+    def dropped(self) -> Mapping[str, int]:
+        """Frames so far that are in no set, by sensor, whatever the cause."""
+        total: Counter[str] = Counter()
+        for counts in (self._frames.dropped, self._frames.malformed, self._synchroniser.counters):
+            for name, number in counts.items():
+                total[name.partition("/")[0]] += number
+        return total
+
+    @property
+    def last_error(self) -> str:
+        """Why the last malformed message was one; "" if there was none."""
+        return self._frames.last_error
+
+    def take(self) -> FrameSet | None:
+        """The next set; None if there is none yet. Whoever calls is done with the last one."""
+        if self._taken_ns is not None:
+            self._turns_ns.append(self._clock() - self._taken_ns)
+        self._collect()
+        allowed = DEPTH if self._keeps_up() else 1
+        while len(self._waiting) > allowed:
+            self._waiting.popleft()
+            self.skipped += 1
+        self._taken_ns = self._clock() if self._waiting else None
+        return self._waiting.popleft() if self._waiting else None
+
+    def _collect(self) -> None:
+        frame = self._frames.take(0 if self._waiting else TURN_S)
+        while frame is not None:
+            self._waiting.extend(self._synchroniser.add(frame))
+            frame = self._frames.take(0)
+        self._waiting.extend(self._synchroniser.poll(self._clock()))
+
+    def _keeps_up(self) -> bool:
+        """Whether a turn usually takes less time than lies between the sets that wait."""
+        if len(self._waiting) < 2 or not self._turns_ns:
+            return False
+        interval_ns = (self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns) / (len(self._waiting) - 1)
+        return median(self._turns_ns) < interval_ns
+
+
+class EstimatePublisher:
+    """Publishes the estimates of one tracker, its meshes, and each new mesh's topology."""
+
+    def __init__(self, bus: Bus, speaker: Speaker, tracker: str, model: str, calib_id: str):
+        self._speaker = speaker
+        self._state = bus.publisher(keys.state(tracker), estimate_messages.STATE, STATE)
+        self._mesh = bus.publisher(keys.mesh(tracker), estimate_messages.MESH, MESH)
+        self._topology = bus.announce(keys.topology(tracker), estimate_messages.TOPOLOGY)
+        self._identity = Identity(tracker, model, "", calib_id, 0)
+        self._seq = 0
+
+    def publish(self, estimate: Estimate, tracking: Tracking, effort: Effort) -> None:
+        """Publishes an estimate, after the topology of its mesh if that is new."""
+        if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
+            self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
+            # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
+            header = self._speaker.header(tracking.made_ns, tracking.mesh_version, keys.RIG_FRAME)
+            self._topology.put(estimate_messages.topology(header, tracking.mesh, self._identity).SerializeToString())
+        header = self._speaker.header(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
+        self._state.put(estimate_messages.state(header, estimate, self._identity, effort).SerializeToString())
+        self._mesh.put(estimate_messages.mesh(header, estimate, self._identity).SerializeToString())
+        self._seq += 1
+
+
+class LiveTracker:
+    """One tracker on a bus.
+
+    Args:
+        tracking: the tracker.
+        sets: where its frame sets come from.
+        publisher: where its estimates go.
+        health: what others learn about it.
+        residuals: tells health which noise model is wrong.
+        clock: CLOCK_MONOTONIC [ns].
+        budget_ms: time that the search may take per frame set; the rest of the interval is for everything else.
+    """
+
+    def __init__(
+        self,
+        tracking: Tracking,
+        sets: WaitingSets,
+        publisher: EstimatePublisher,
+        health: Health,
+        residuals: ResidualWatch,
+        clock: Callable[[], int],
+        budget_ms: float,
+    ):
+        self._tracking = tracking
+        self._sets = sets
+        self._publisher = publisher
+        self._health = health
+        self._residuals = residuals
+        self._clock = clock
+        self._budget_ns = round(budget_ms * 1e6)
+        self._reported = 0
+
+    def turn(self) -> None:
+        """Handles the next frame set, if there is one."""
+        frames = self._sets.take()
+        if frames is None:
+            return
+        begin_ns = self._clock()
+        try:
+            estimate = self._tracking.track(frames, lambda: self._clock() - begin_ns < self._budget_ns)
+        except ObservationError as error:
+            self._health.count("rejected")
+            self._health.report("observation", Level.ERROR, str(error))
+            return
+        solve_ms = (self._clock() - begin_ns) * 1e-6
+        skipped = self._sets.skipped - self._reported
+        self._reported = self._sets.skipped
+        age_ms = (self._clock() - estimate.t_host_ns) * 1e-6
+        effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, skipped, self._sets.dropped)
+        self._publisher.publish(estimate, self._tracking, effort)
+        self._report(estimate, solve_ms)
+
+    def report(self) -> None:
+        """Enters what was lost on the way into health, also if nothing arrives; call it before `Health.tick`."""
+        self._health.count_up_to(self._sets.counters)
+        if self._sets.last_error:
+            self._health.label("malformed", self._sets.last_error)
+
+    def _report(self, estimate: Estimate, solve_ms: float) -> None:
+        self._health.count("estimates")
+        self._health.gauge("solve_ms", solve_ms)
+        self._health.label("phase", estimate.status.lower())
+        level = Level.OK if estimate.status in (Status.TRACKING, Status.INITIALIZING) else Level.WARNING
+        message = "" if level == Level.OK else f"{estimate.status}: {'; '.join(estimate.reasons)}"
+        self._health.report("observation", Level.OK)
+        self._health.report("status", level, message)
+        self._residuals.take(estimate)

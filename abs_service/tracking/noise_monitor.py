@@ -1,0 +1,82 @@
+"""Whether the sensors err as their noise models say: what a tracker's health tells about it, once a second."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service.bus.health import Health, Level
+from abs_service.tracker.estimate import Estimate
+
+#: Time over which residuals are averaged [ns]; at 30 Hz and 300 vertices, their variance is then known to 2 %.
+WINDOW_NS = 1_000_000_000
+
+#: With a smaller share of inliers it is not the noise that is wrong: the object is lost, hidden, or bends as its model
+#: cannot.
+EXPLAINED = 0.6
+
+#: Fewer residuals than this in a window are no evidence.
+LEAST_RESIDUALS = 200
+
+#: The variance of residuals over deviations is 1 if the noise model is right. A warning begins outside the wider limits
+#: and ends within the narrower ones, so that what lies on a limit does not flicker.
+ALLOWED = (0.5, 2.0)
+SETTLED = (0.6, 1.7)
+
+
+@dataclass(slots=True)
+class _Sum:
+    """Residuals of one sensor in one window."""
+
+    number: int = 0
+    squares: float = 0.0
+
+
+class ResidualWatch:
+    """Enters into health the gauge `residual_variance.<sensor>`, and a warning where a sensor's noise model is wrong.
+
+    A deviation that is too small rejects good measurements; one that is too large gives the sensor too little weight
+    beside the others, and makes the covariance of Θ depend on what the priors allow.
+
+    Args:
+        health: of the tracker.
+    """
+
+    def __init__(self, health: Health):
+        self._health = health
+        self._begin_ns = 0
+        self._sums: dict[str, _Sum] = {}
+        self._warned: set[str] = set()
+
+    def take(self, estimate: Estimate) -> None:
+        """Adds an estimate's residuals, if it explains what the sensors see."""
+        if estimate.inlier_share < EXPLAINED:
+            return
+        if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:
+            for sensor, total in self._sums.items():
+                if total.number >= LEAST_RESIDUALS:
+                    self._judge(sensor, total.squares / total.number)
+            self._begin_ns = estimate.t_host_ns
+            self._sums = {}
+        for fit in estimate.fits:
+            if np.isfinite(fit.normalized_residual):
+                total = self._sums.setdefault(fit.sensor, _Sum())
+                total.number += fit.inliers
+                total.squares += fit.inliers * fit.normalized_residual**2
+
+    def _judge(self, sensor: str, variance: float) -> None:
+        self._health.gauge(f"residual_variance.{sensor}", variance)
+        low, high = SETTLED if sensor in self._warned else ALLOWED
+        wrong = not low <= variance <= high
+        (self._warned.add if wrong else self._warned.discard)(sensor)
+        level = Level.WARNING if wrong else Level.OK
+        self._health.report(f"noise of {sensor}", level, _advice(sensor, variance) if wrong else "")
+
+
+def _advice(sensor: str, variance: float) -> str:
+    head, texture, _ = sensor.partition("/")
+    key = f"sensors.{head}.texture" if texture else f"sensors.{head}.noise"
+    factor, change = np.sqrt(variance), "larger" if variance > 1 else "smaller"
+    return (
+        f"{sensor} errs {factor:.1f} times as much as its noise model says (variance of its residuals {variance:.1f} "
+        f"instead of 1): make the deviation in {key} {change}, or fit it (docs/noise.md)"
+    )

@@ -1,0 +1,136 @@
+"""A recording through the trackers: every frame set, no clock, the same Θ each time."""
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import chain, count
+from pathlib import Path
+from typing import Any
+
+from abs_service.bus import keys
+from abs_service.bus.stamps import Speaker
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.estimate import Estimate
+from abs_service.tracking.session import Tracking
+from abs_service.tracking.tracker_log import Report, TrackerLog
+from abs_service.wire import estimate_messages
+from abs_service.wire.estimate_messages import Effort, Identity
+from drivers.contract.device import Truth
+from drivers.contract.frame import Frame, FrameSet
+from drivers.encoding.mcap_file import McapFile
+from drivers.replay import Recording
+
+#: Offline there is no exposure to be late for.
+NO_AGE = float("nan")
+#: And no time that the search must not exceed.
+NO_BUDGET_MS = 0.0
+
+
+class OfflineTracker:
+    """One tracker that takes every frame set, writes its estimates to a file and reports them.
+
+    Args:
+        name: of the tracker.
+        tracking: the tracker.
+        synchroniser: makes its frame sets.
+        model: type of its deformation model.
+        calib_id: hash of its rig's calibration.
+        speaker: writes the headers.
+        file: takes the messages.
+        clock: measures the time of a search [ns]; nothing depends on it.
+
+    Attributes:
+        log: what it said so far.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        tracking: Tracking,
+        synchroniser: Synchroniser,
+        model: str,
+        calib_id: str,
+        speaker: Speaker,
+        file: McapFile,
+        clock: Callable[[], int],
+    ):
+        self.log = TrackerLog()
+        self.synchroniser = synchroniser
+        self._name = name
+        self._tracking = tracking
+        self._identity = Identity(name, model, "", calib_id, 0)
+        self._speaker = speaker
+        self._file = file
+        self._clock = clock
+
+    def add_truth(self, truth: Truth) -> None:
+        """Takes what the simulated device knew."""
+        self.log.truth.add_truth(truth.t_host_ns, truth.points_r, truth.surface)
+
+    def add_frame(self, frame: Frame) -> Iterator[Report]:
+        """Takes a frame and reports the estimates that it makes possible."""
+        for frames in self.synchroniser.add(frame):
+            yield from self._track(frames)
+
+    def finish(self) -> Iterator[Report]:
+        """Reports the estimates of the frame sets that still wait for something."""
+        for frames in self.synchroniser.flush():
+            yield from self._track(frames)
+
+    def _track(self, frames: FrameSet) -> Iterator[Report]:
+        begin_ns = self._clock()
+        estimate = self._tracking.track(frames, _always)
+        solve_ms = (self._clock() - begin_ns) * 1e-6
+        self._write_new_topology()
+        header = self._speaker.header(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
+        state = estimate_messages.state(header, estimate, self._identity, Effort(solve_ms, NO_BUDGET_MS, NO_AGE, 0, {}))
+        mesh = estimate_messages.mesh(header, estimate, self._identity)
+        self._write(keys.state(self._name), estimate_messages.STATE, state, estimate)
+        self._write(keys.mesh(self._name), estimate_messages.MESH, mesh, estimate)
+        yield from self.log.take_state(state)
+        yield from self.log.take_mesh(mesh)
+
+    def _write_new_topology(self) -> None:
+        mesh, version = self._tracking.mesh, self._tracking.mesh_version
+        if mesh is None or version == self._identity.mesh_version:
+            return
+        self._identity = estimate_messages.with_mesh(self._identity, mesh, version)
+        header = self._speaker.header(self._tracking.made_ns, version, keys.RIG_FRAME)
+        topology = estimate_messages.topology(header, mesh, self._identity)
+        topic = f"/{keys.topology(self._name)}"
+        wall_ns = self._speaker.clock.wall(self._tracking.made_ns)
+        self._file.write(topic, estimate_messages.TOPOLOGY, topology.SerializeToString(), wall_ns, version)
+        self.log.truth.add_topology(mesh.vertices, self._tracking.made_ns)
+
+    def _write(self, topic: str, message: str, content: Any, estimate: Estimate) -> None:
+        wall_ns = self._speaker.clock.wall(estimate.t_host_ns)
+        self._file.write(f"/{topic}", message, content.SerializeToString(), wall_ns, estimate.seq)
+
+
+def replay(recording: Recording, trackers: Mapping[str, OfflineTracker]) -> Iterator[tuple[str, Report | None]]:
+    """Runs a recording through the trackers.
+
+    Yields:
+        For every frame that was read, its stream's topic and no report; for every estimate, its tracker and the report.
+    """
+    for item in recording.frames():
+        if isinstance(item, Truth):
+            for tracker in trackers.values():
+                tracker.add_truth(item)
+            continue
+        yield keys.image(item.sensor, item.stream), None
+        for name, tracker in trackers.items():
+            for report in tracker.add_frame(item):
+                yield name, report
+    for name, tracker in trackers.items():
+        for report in tracker.finish():
+            yield name, report
+
+
+def free_path(recording: Path) -> Path:
+    """A file beside the recording that does not exist yet: `x_replay.mcap`, `x_replay_2.mcap`, …."""
+    suffixes = chain(["_replay"], (f"_replay_{number}" for number in count(2)))
+    paths = (recording.with_name(f"{recording.stem}{suffix}.mcap") for suffix in suffixes)
+    return next(path for path in paths if not path.exists())
+
+
+def _always() -> bool:
+    return True

@@ -1,0 +1,65 @@
+"""Makes every kernel ready before the first real frame: compiled once per installation, then read from the cache."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from abs_service.tracker.detection.regions import nearest
+from abs_service.tracking.session import Plan, Tracking, streams
+from calib.camera import Camera
+from calib.fisheye import KannalaBrandt
+from calib.lens import Lens
+from calib.noise.base import DepthNoise
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.rig import Noise, Rig, Sensor
+from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
+
+#: Stand for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
+_CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
+_DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
+_FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
+#: Stands for every noise of depth: kernels see its texture only, and a map of pixels would not fit the camera.
+_NOISE = GaussianPolynomial(((0.01,),))
+
+
+def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
+    """Tracks and loses a flat board that no sensor ever saw, with every kind of lens, with the parts of the plan.
+
+    Args:
+        noises: noise model of every sensor that the tracker uses, by name; tells what kind of image it takes.
+        plan: of the tracker.
+    """
+    for camera in (_CAMERA, _DISTORTED, _FISHEYE):
+        rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
+        frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
+        tracking = Tracking(rig, replace(plan, region=nearest.Settings()))
+        for seq, seen in enumerate((frames, [_without_object(frame) for frame in frames])):
+            tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
+
+
+def _sensor(name: str, camera: Camera, noise: Noise) -> Sensor:
+    return Sensor(name, camera, _NOISE if isinstance(noise, DepthNoise) else noise)
+
+
+def _without_object(frame: Frame) -> Frame:
+    return replace(frame, data=np.full_like(frame.data, np.nan)) if frame.kind == Kind.DEPTH else frame
+
+
+def _board(head: str, kind: Kind, size: tuple[float, float]) -> Frame:
+    """What a head sees of a flat board [m] that fills half its image; grey pictures, and a beam that is free."""
+    height, width = _CAMERA.height, _CAMERA.width
+    match kind:
+        case Kind.DEPTH:
+            z = np.full((height, width), np.nan, np.float32)
+            away = 2 * max(size[0] * _CAMERA.fx / width, size[1] * _CAMERA.fy / height)
+            right, down = round(size[0] * _CAMERA.fx / away / 2), round(size[1] * _CAMERA.fy / away / 2)
+            z[height // 2 - down : height // 2 + down, width // 2 - right : width // 2 + right] = away
+            return Frame(head, kind.value, kind, z, "32FC1", 0, 0, 0, geometry=Geometry.Z)
+        case Kind.COLOR:
+            return Frame(head, kind.value, kind, np.full((height, width, 3), 128, np.uint8), "rgb8", 0, 0, 0)
+        case Kind.BAYER:
+            return Frame(head, kind.value, kind, np.full((height, width), 128, np.uint8), "bayer_rggb8", 0, 0, 0)
+        case Kind.BINARY:
+            return Frame(head, kind.value, kind, np.zeros((height, width), np.uint8), "mono8", 0, 0, 0)
+    return Frame(head, kind.value, kind, np.full((height, width), 3000, "<u2"), "16UC1", 0, 0, 0)

@@ -1,0 +1,1 @@
+"""Messages of the service: headers and estimates."""

@@ -1,0 +1,167 @@
+"""What a tracker tells the world: its estimates and its mesh as messages."""
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from absmsg.v1 import common_pb2, deformation_state_pb2, deformed_mesh_pb2
+from numpy.typing import NDArray
+
+from abs_service.pairing.observation import Source
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.optimizers.base import Stop
+
+State = deformation_state_pb2.DeformationState
+
+STATE = State.DESCRIPTOR.full_name
+MESH = deformed_mesh_pb2.DeformedMesh.DESCRIPTOR.full_name
+TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
+
+_STATUS = {
+    Status.INITIALIZING: State.STATUS_INITIALIZING,
+    Status.TRACKING: State.STATUS_TRACKING,
+    Status.DEGRADED: State.STATUS_DEGRADED,
+    Status.LOST: State.STATUS_LOST,
+}
+_STOP = {
+    Stop.NOTHING: State.STOP_UNSPECIFIED,
+    Stop.CONVERGED: State.STOP_CONVERGED,
+    Stop.GENERATIONS: State.STOP_GENERATIONS,
+    Stop.EVALUATIONS: State.STOP_EVALUATIONS,
+    Stop.TIME: State.STOP_TIME,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who made an estimate, and with what.
+
+    Attributes:
+        tracker: name of the tracker.
+        model: type of its deformation model.
+        model_id: hash of model and mesh.
+        calib_id: hash of the rig's calibration.
+        mesh_version: counts the tracker's meshes.
+    """
+
+    tracker: str
+    model: str
+    model_id: str
+    calib_id: str
+    mesh_version: int
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What an estimate cost.
+
+    Attributes:
+        solve_ms: time from frame set to Θ [ms].
+        budget_ms: time that the search was allowed [ms]; 0 if it was in no hurry.
+        age_ms: time from exposure to now [ms].
+        skipped: frame sets passed over since the last estimate.
+        dropped: frames so far that are in no estimate, by sensor.
+    """
+
+    solve_ms: float
+    budget_ms: float
+    age_ms: float
+    skipped: int
+    dropped: Mapping[str, int]
+
+
+def with_mesh(identity: Identity, mesh: Mesh, version: int) -> Identity:
+    """The identity with a new mesh; `model_id` is equal where Θ means the same: same model, same undeformed mesh."""
+    digest = hashlib.sha256(identity.model.encode())
+    digest.update(mesh.vertices.astype("<f8").tobytes())
+    digest.update(mesh.faces.astype("<i4").tobytes())
+    return replace(identity, model_id=digest.hexdigest()[:16], mesh_version=version)
+
+
+def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, effort: Effort) -> State:
+    """An estimate as a message."""
+    return State(
+        header=header,
+        tracker=identity.tracker,
+        status=_STATUS[estimate.status],
+        reasons=estimate.reasons,
+        model=identity.model,
+        model_id=identity.model_id,
+        calib_id=identity.calib_id,
+        theta=estimate.theta.tolist(),
+        log_likelihood=-estimate.cost,
+        search_deviation=estimate.deviation,
+        generations=estimate.generations,
+        evaluations=estimate.evaluations,
+        searcher=estimate.searcher,
+        stop=_STOP[estimate.stop],
+        budget_evaluations=estimate.budget,
+        budget_ms=effort.budget_ms,
+        solve_ms=effort.solve_ms,
+        age_ms=effort.age_ms,
+        skipped=effort.skipped,
+        mesh_version=identity.mesh_version,
+        inlier_share=estimate.inlier_share,
+        covariance=estimate.covariance[np.triu_indices(len(estimate.theta))].tolist(),
+        covariance_valid=_is_known(estimate),
+        samples=sum(fit.samples for fit in estimate.fits),
+        clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
+        sensors=_sensors(estimate, effort.dropped),
+    )
+
+
+def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.Sensor]:
+    """How every sensor contributed, and which ones did not."""
+    for fit in estimate.fits:
+        source = estimate.sources.get(fit.sensor, Source(0, 0))
+        yield State.Sensor(
+            sensor=fit.sensor,
+            seq=source.seq,
+            t_host_ns=source.t_host_ns,
+            samples=fit.samples,
+            visible=fit.visible,
+            hidden=fit.hidden,
+            mean_log_likelihood=fit.mean_log_likelihood,
+            normalized_residual=fit.normalized_residual,
+            dropped=dropped.get(fit.sensor, 0),
+        )
+    for sensor in estimate.missing:
+        yield State.Sensor(sensor=sensor, missing=True, dropped=dropped.get(sensor, 0))
+
+
+def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> deformed_mesh_pb2.DeformedMesh:
+    """The deformed vertices of an estimate as a message."""
+    return deformed_mesh_pb2.DeformedMesh(
+        header=header,
+        tracker=identity.tracker,
+        mesh_version=identity.mesh_version,
+        vertices_f32=estimate.vertices.astype("<f4").tobytes(),
+        covariance_f32=_upper(estimate.vertex_covariance) if _is_known(estimate) else b"",
+    )
+
+
+def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) -> deformed_mesh_pb2.MeshTopology:
+    """The undeformed mesh as a message; the header tells the moment of the frames that it was made from."""
+    colored = np.isfinite(undeformed.colors).any()
+    colors = np.nan_to_num(undeformed.colors).astype(np.uint8).tobytes() if colored else b""
+    return deformed_mesh_pb2.MeshTopology(
+        header=header,
+        tracker=identity.tracker,
+        mesh_version=identity.mesh_version,
+        rest_vertices_f32=undeformed.vertices.astype("<f4").tobytes(),
+        faces_u32=undeformed.faces.astype("<u4").tobytes(),
+        colors_u8=colors,
+    )
+
+
+def _is_known(estimate: Estimate) -> bool:
+    """Whether the covariances say anything: what is lost has a curvature like everything else."""
+    return estimate.status in (Status.TRACKING, Status.DEGRADED)
+
+
+def _upper(covariance: NDArray[np.float64]) -> bytes:
+    """The six different entries of symmetric matrices (n, 3, 3), row by row."""
+    rows, columns = np.triu_indices(3)
+    return covariance[:, rows, columns].astype("<f4").tobytes()

@@ -1,0 +1,100 @@
+"""When a message on the bus happened and what number it has, read from its bytes."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from absmsg.v1 import (
+    deformation_state_pb2,
+    deformed_mesh_pb2,
+    frame_info_pb2,
+    health_pb2,
+    sensor_model_pb2,
+    surface_truth_pb2,
+)
+from foxglove_schemas_protobuf import CameraCalibration_pb2, FrameTransforms_pb2, RawImage_pb2
+from google.protobuf.message import DecodeError, Message
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from abs_service.bus.contract import Sample
+
+
+class EnvelopeError(ValueError):
+    """A message that is none of this service's, or none at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """When and which: wall-clock time [ns], 0 if the message does not say, and the sender's number."""
+
+    stamp_ns: int
+    seq: int
+
+
+_WITH_HEADER = (
+    deformation_state_pb2.DeformationState,
+    deformed_mesh_pb2.DeformedMesh,
+    deformed_mesh_pb2.MeshTopology,
+    health_pb2.Health,
+    sensor_model_pb2.SensorModel,
+    sensor_model_pb2.Config,
+    surface_truth_pb2.SurfaceTruth,
+)
+
+
+def _ns(stamp: Timestamp) -> int:
+    # Not `ToNanoseconds`, which raises for years that nobody will record.
+    return stamp.seconds * 1_000_000_000 + stamp.nanos
+
+
+def _of_header(message: Any) -> Envelope:
+    return Envelope(_ns(message.header.stamp), message.header.seq)
+
+
+def _of_calibration(message: Any) -> Envelope:
+    return Envelope(_ns(message.timestamp), 0)
+
+
+def _of_transforms(message: Any) -> Envelope:
+    stamps = [_ns(transform.timestamp) for transform in message.transforms]
+    return Envelope(max(stamps, default=0), 0)
+
+
+_READERS: Mapping[str, tuple[type[Message], Callable[[Any], Envelope]]] = {
+    **{message.DESCRIPTOR.full_name: (message, _of_header) for message in _WITH_HEADER},
+    CameraCalibration_pb2.CameraCalibration.DESCRIPTOR.full_name: (
+        CameraCalibration_pb2.CameraCalibration,
+        _of_calibration,
+    ),
+    FrameTransforms_pb2.FrameTransforms.DESCRIPTOR.full_name: (FrameTransforms_pb2.FrameTransforms, _of_transforms),
+}
+
+IMAGE = RawImage_pb2.RawImage.DESCRIPTOR.full_name
+INFO = frame_info_pb2.FrameInfo.DESCRIPTOR.full_name
+
+CALIBRATION = CameraCalibration_pb2.CameraCalibration.DESCRIPTOR.full_name
+TRANSFORMS = FrameTransforms_pb2.FrameTransforms.DESCRIPTOR.full_name
+MODEL = sensor_model_pb2.SensorModel.DESCRIPTOR.full_name
+CONFIG = sensor_model_pb2.Config.DESCRIPTOR.full_name
+TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
+
+#: Full names of all messages that a rig publishes.
+MESSAGES = frozenset(_READERS) | {IMAGE, INFO}
+
+
+def read(sample: Sample) -> Envelope:
+    """The envelope of a message; that of an image is in its attachment, so that the pixels need not be parsed.
+
+    Raises:
+        EnvelopeError: the type is none of `MESSAGES`, or the bytes are not of that type.
+    """
+    try:
+        if sample.message == IMAGE:
+            info = frame_info_pb2.FrameInfo.FromString(sample.attachment)
+            return Envelope(_ns(info.header.stamp), info.seq)
+        message, envelope = _READERS[sample.message]
+        return envelope(message.FromString(sample.payload))
+    except KeyError:
+        raise EnvelopeError(f"{sample.topic}: {sample.message!r} is none of {sorted(MESSAGES)}") from None
+    except DecodeError as error:
+        raise EnvelopeError(f"{sample.topic}: {len(sample.payload)} bytes are no {sample.message}: {error}") from None

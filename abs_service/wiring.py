@@ -1,0 +1,151 @@
+"""From the configuration to what a tracker is made of."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from abs_service.config import ServiceConfig, plugins
+from abs_service.pairing.image_decoders import kinds
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.models import nurbs
+from abs_service.tracking.session import Plan, streams
+from calib.camera import Camera
+from calib.noise.base import DepthNoise
+from calib.noise.per_pixel import PerPixel
+from calib.noise.pixel_polynomial import PixelPolynomial
+from calib.noise.region_polynomial import RegionPolynomial
+from calib.rig import Noise, PictureNoise, Rig, Sensor
+
+
+class PlanError(Exception):
+    """A tracker that cannot be made from this configuration and these sensors."""
+
+
+def plan(config: ServiceConfig, tracker: str) -> Plan:
+    """The plan of one tracker.
+
+    Raises:
+        PlanError: the configuration has no such tracker, or its reference is none of its sensors.
+    """
+    if tracker not in config.trackers:
+        raise PlanError(
+            f'there is no tracker "{tracker}"; the configuration has: {", ".join(config.trackers) or "none"}'
+        )
+    table = config.trackers[tracker]
+    reference = config.reference(tracker)[0]
+    if reference not in table.sensors:
+        raise PlanError(
+            f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
+            f'the sensor of the tracker\'s reference, "{reference}"'
+        )
+    if table.relief.drift and not isinstance(table.model, nurbs.Settings):
+        raise PlanError(
+            f"trackers.{tracker}.relief.drift = {table.relief.drift:g} needs a model whose vertices have offsets: "
+            f'"nurbs", not "{model_name(config, tracker)}"; leave it out or set it to 0'
+        )
+    return Plan(
+        reference=reference,
+        model=table.model,
+        region=table.region,
+        synthesis=table.synthesis,
+        objective=table.objective,
+        optimizer=table.optimizer,
+        evaluations=table.budget_evaluations,
+        vertices=table.mesh.vertices,
+        priors=table.priors,
+        status=table.status,
+        reinitialization=table.reinitialization,
+        relief=table.relief,
+    )
+
+
+def model_name(config: ServiceConfig, tracker: str) -> str:
+    """`type` of a tracker's deformation model."""
+    return plugins.table(config.trackers[tracker].model)["type"]
+
+
+def noises(config: ServiceConfig, tracker: str) -> dict[str, Noise]:
+    """The noise model of everything that the sensors of one tracker measure.
+
+    A texture is called by its sensor and stream: `tof/amplitude`.
+
+    Raises:
+        PlanError: a sensor has none, or one that does not fit its other keys.
+        NoiseError: one cannot be made.
+    """
+    models: dict[str, Noise] = {}
+    for name in config.trackers[tracker].sensors:
+        table = config.sensors[name]
+        if table.noise is None:
+            raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no noise model')
+        models[name] = noise(table.noise, table.range_m)
+        if table.texture is not None:
+            made = texture(table.texture)
+            models[f"{name}/{kinds(made)[0]}"] = made
+    return models
+
+
+def noise(settings: Any, range_m: float | None) -> Noise:
+    """The noise model of one sensor, from the `Settings` of a module of `calib.noise`.
+
+    Raises:
+        PlanError: the sensor is said to have a range of distances, but measures none.
+        NoiseError: the model cannot be made.
+    """
+    made = settings.build()
+    if range_m is not None and not isinstance(made, DepthNoise):
+        raise PlanError(f"range_m = {range_m:g} is for sensors that measure distances")
+    return made
+
+
+def texture(settings: Any) -> PictureNoise:
+    """The noise model of what a depth sensor sees of the surface besides its distance.
+
+    Raises:
+        PlanError: it is one of distances or of light barriers.
+    """
+    made = settings.build()
+    if not isinstance(made, PictureNoise):
+        kind = plugins.table(settings)["type"]
+        raise PlanError(f'type "{kind}" is no texture: intensity, color, grey and bayer are')
+    return made
+
+
+def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> Rig:
+    """The sensors of one tracker with their cameras and noise models.
+
+    Raises:
+        PlanError: a sensor has no camera or no noise model, or the two are of different size.
+        NoiseError: a noise model cannot be made.
+    """
+    sensors: dict[str, Sensor] = {}
+    for name, model in noises(config, tracker).items():
+        head = name.partition("/")[0]
+        if head not in cameras:
+            raise PlanError(f'sensor "{head}" of tracker "{tracker}" has no camera model')
+        _check_size(head, model, cameras[head])
+        table = config.sensors[head]
+        depth = (table.depth.offset, table.depth.scale) if isinstance(model, DepthNoise) else ()
+        sensors[name] = Sensor(name, cameras[head], model, table.outlier_share, table.range_m, *depth)
+    return Rig(config.name, sensors)
+
+
+def synchroniser(config: ServiceConfig, tracker: str, sensors: Iterable[Sensor]) -> Synchroniser:
+    """What makes frame sets for one tracker, from the sensors that it uses."""
+    return Synchroniser(
+        config.reference(tracker),
+        streams(sensors),
+        round(config.synchronisation.tolerance_ms * 1e6),
+        offsets_ns={name: round(table.time_offset_ms * 1e6) for name, table in config.sensors.items()},
+    )
+
+
+def _check_size(sensor: str, noise: Noise, camera: Camera) -> None:
+    if isinstance(noise, (PerPixel, PixelPolynomial, RegionPolynomial)) and noise.shape != (
+        camera.height,
+        camera.width,
+    ):
+        height, width = noise.shape
+        raise PlanError(
+            f"sensors.{sensor}.noise.file: its maps are for {width} × {height} pixels, "
+            f"the camera has {camera.width} × {camera.height}"
+        )

@@ -1,0 +1,62 @@
+"""Which of the points that were found is which, for the kinds of boards that look the same when turned."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from calib.board.corners.to_8bit import Grey
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
+
+Lattice = NDArray[np.float64]
+
+
+def ordered(target: Target, pixels: NDArray[np.float64], levels: Grey) -> NDArray[np.float64]:
+    """All points (n, 2) of a board in the order of `target.points()`, from an order that OpenCV chose.
+
+    x × y points into the image as it does on the board. Of the ways to turn a board that this leaves, squares decide
+    by their colours, and otherwise x points as far to the right as it can.
+    """
+    if isinstance(target, Charuco):
+        return pixels
+    lattice = pixels.reshape(target.grid[1], target.grid[0], 2)
+    match target:
+        case AsymmetricCircles():
+            # Rows counted from the other end are the same pattern; columns are not.
+            return (lattice if is_right_handed(lattice) else lattice[::-1]).reshape(-1, 2)
+        case Circles():
+            ways = _ways(lattice)
+        case Chessboard():
+            ways = [way for way in _ways(lattice) if _first_is_black(way, levels)] or _ways(lattice)
+    return max(ways, key=_rightwards).reshape(-1, 2)
+
+
+def is_right_handed(lattice: Lattice) -> bool:
+    """Whether points (rows, columns, 2) are arranged in the image as on a board that is seen from its printed side."""
+    along, down = lattice[0, -1] - lattice[0, 0], lattice[-1, 0] - lattice[0, 0]
+    return bool(along[0] * down[1] - along[1] * down[0] > 0)
+
+
+def cells(lattice: Lattice) -> Lattice:
+    """Centres (rows - 1, columns - 1, 2) of the squares between four corners each."""
+    return 0.25 * (lattice[1:, 1:] + lattice[:-1, 1:] + lattice[1:, :-1] + lattice[:-1, :-1])
+
+
+def _ways(lattice: Lattice) -> list[Lattice]:
+    """The orders that a board of this size may have been found in, all right-handed."""
+    seen = lattice if is_right_handed(lattice) else lattice[:, ::-1]
+    square = seen.shape[0] == seen.shape[1]
+    return [np.rot90(seen, quarter) for quarter in (range(4) if square else (0, 2))]
+
+
+def _first_is_black(lattice: Lattice, levels: Grey) -> bool:
+    """Whether the square after the first corner is black, as is the one in the board's corner, diagonally before it."""
+    u, v = np.moveaxis(cells(lattice), -1, 0)
+    brightness = map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
+    black = np.indices(brightness.shape).sum(axis=0) % 2 == 0
+    return bool(brightness[black].mean() < brightness[~black].mean())
+
+
+def _rightwards(lattice: Lattice) -> float:
+    """Cosine of the angle between the image's rows and the board's."""
+    along = lattice[:, -1].mean(axis=0) - lattice[:, 0].mean(axis=0)
+    return float(along[0] / np.linalg.norm(along))

@@ -1,0 +1,51 @@
+"""Corners to a few hundredths of a pixel: around one, brightness is a saddle."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates, spline_filter
+
+from calib.board.corners.to_8bit import Grey
+
+#: Steps of the iteration; each halves what is left at the very least.
+_STEPS = 5
+
+
+def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
+    """Corners (n, 2) where a paraboloid fitted to the brightness around each has its saddle.
+
+    L. Lucchese and S. K. Mitra, Using saddle points for subpixel feature detection in camera calibration targets,
+    APCCAS 2002. On rendered boards its errors are a third of those of OpenCV's corners. Where the fit is no saddle
+    within `radius` of the corner, the corner stays as it is.
+
+    Args:
+        levels: the image.
+        pixels: corners to begin with [px].
+        radius: of the neighbourhood that is fitted [px].
+    """
+    v, u = (part.ravel() for part in np.mgrid[-radius : radius + 1, -radius : radius + 1])
+    weight = 1 - (u**2 + v**2) / (radius + 1) ** 2
+    u, v, weight = u[weight > 0], v[weight > 0], np.sqrt(weight[weight > 0])
+    basis = np.stack([u * u, u * v, v * v, u, v, np.ones_like(u)], axis=1) * weight[:, None]
+    fit = np.linalg.pinv(basis)
+    spline, at = _around(levels, pixels, radius)
+    first, is_saddle = at, np.ones(len(at), np.bool_)
+    for _ in range(_STEPS):
+        brightness = map_coordinates(spline, [at[:, 1:] + v, at[:, :1] + u], order=3, mode="nearest", prefilter=False)
+        uu, uv, vv, du, dv, _ = fit @ (brightness * weight).T
+        curvature = 4 * uu * vv - uv**2
+        is_saddle = curvature < 0
+        safe = np.where(is_saddle, curvature, -1.0)
+        step = np.stack([uv * dv - 2 * vv * du, uv * du - 2 * uu * dv], axis=1) / safe[:, None]
+        at = at + np.where(is_saddle[:, None], np.clip(step, -1, 1), 0)
+    moved = at - first
+    kept = is_saddle & (np.linalg.norm(moved, axis=1) < radius)
+    return pixels + np.where(kept[:, None], moved, 0)
+
+
+def _around(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Spline coefficients of the part of the image around all corners, and the corners in it."""
+    margin = 2 * radius + 12
+    low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - margin, 0)
+    high = np.ceil(pixels.max(axis=0)).astype(int) + margin
+    part = levels[low[1] : high[1], low[0] : high[0]]
+    return spline_filter(part.astype(np.float64), order=3, mode="nearest"), pixels - low

@@ -1,0 +1,121 @@
+"""Where OpenCV finds the points of a board, before anything is checked or put in order."""
+
+from collections.abc import Iterator
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.board.corners.to_8bit import Grey, local_contrast
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
+
+Found = tuple[NDArray[np.intp], NDArray[np.float64]]
+
+#: Larger images are searched at half, a third … of their size [px]; what is found is refined later.
+_LARGEST = 2000
+#: Smaller ones are enlarged if nothing is found: squares, and discs, have to have some ten pixels [px].
+_SMALLEST, _SMALLEST_OF_DISCS = 400, 1000
+
+#: Blobs per disc of the board above which the search for a grid among them would take minutes.
+_MOST_BLOBS = 3
+
+_NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
+
+
+def find(target: Target, levels: Grey) -> Found:
+    """Numbers (n,) of the points that are seen and their pixels (n, 2), in the order that OpenCV counts them.
+
+    All kinds but ChArUco are found whole or not at all; then n is 0.
+    """
+    for attempt in (levels, local_contrast(levels)):
+        for scale in _scales(target, levels):
+            ids, pixels = _find(target, _scaled(attempt, scale))
+            if len(ids):
+                # Both images cover the same area, and pixel centres are integers in both.
+                return ids, (pixels + 0.5) / scale - 0.5
+    return _NOTHING
+
+
+def _scales(target: Target, levels: Grey) -> Iterator[float]:
+    size = max(levels.shape)
+    if size > _LARGEST and not isinstance(target, Charuco):
+        yield 1 / int(np.ceil(size / _LARGEST))
+        return
+    yield 1
+    if size < (_SMALLEST_OF_DISCS if isinstance(target, Circles | AsymmetricCircles) else _SMALLEST):
+        yield 2
+        yield 4
+
+
+def _scaled(levels: Grey, scale: float) -> Grey:
+    if scale == 1:
+        return levels
+    method = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    return cv2.resize(levels, None, fx=scale, fy=scale, interpolation=method).astype(np.uint8, copy=False)
+
+
+def _find(target: Target, levels: Grey) -> Found:
+    match target:
+        case Chessboard():
+            flags = cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
+            found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=flags)
+        case Charuco():
+            return _find_charuco(target, levels)
+        case Circles():
+            found, corners = _find_circles(target, levels, cv2.CALIB_CB_SYMMETRIC_GRID)
+        case AsymmetricCircles():
+            found, corners = _find_circles(target, levels, cv2.CALIB_CB_ASYMMETRIC_GRID)
+    return (np.arange(len(corners)), corners.reshape(-1, 2).astype(np.float64)) if found else _NOTHING
+
+
+def is_cut_off(target: Target, levels: Grey) -> bool:
+    """Whether an image in which the board was not found shows a part of one that goes on beyond the image's end."""
+    match target:
+        case Chessboard():
+            flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
+            found, corners, _ = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
+            part = corners.reshape(-1, 2) if found else np.zeros((0, 2))
+        case Charuco():
+            return False
+        case _:
+            blobs = _disc_detector(target, levels).detect(levels)
+            part = np.array([blob.pt for blob in blobs]).reshape(-1, 2)
+    if not 9 <= len(part) <= _MOST_BLOBS * len(target.points()):
+        return False
+    between = np.linalg.norm(part[:, None] - part[None], axis=-1)
+    between[np.diag_indices(len(part))] = np.inf
+    closest = between.min(axis=1)
+    regular = closest.std() < 0.3 * np.median(closest)  # what looks like discs may be anything
+    to_end = np.minimum(part, np.array(levels.shape[::-1]) - 1 - part).min()
+    return bool(regular and to_end < 1.5 * np.median(closest))
+
+
+def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) -> tuple[bool, NDArray[np.floating]]:
+    nothing = False, np.zeros((0, 2))
+    discs = target.columns * target.rows
+    detector = _disc_detector(target, levels)
+    if not discs <= len(detector.detect(levels)) <= _MOST_BLOBS * discs:
+        return nothing
+    for how in (kind, kind | cv2.CALIB_CB_CLUSTERING):
+        found, centers = cv2.findCirclesGrid(levels, target.grid, flags=how, blobDetector=detector)
+        if found:
+            return True, np.asarray(centers, np.float64)
+    return nothing
+
+
+def _disc_detector(target: Circles | AsymmetricCircles, levels: Grey) -> cv2.SimpleBlobDetector:
+    parameters = cv2.SimpleBlobDetector.Params()
+    # The default takes nothing above 5000 pixels, and thresholds so far apart that centres jump.
+    parameters.maxArea = levels.size / (target.columns * target.rows)
+    parameters.minArea = 12
+    parameters.minDistBetweenBlobs = 4
+    parameters.thresholdStep = 5
+    return cv2.SimpleBlobDetector.create(parameters)
+
+
+def _find_charuco(target: Charuco, levels: Grey) -> Found:
+    layout = cv2.aruco.CharucoBoard((target.columns, target.rows), target.square, target.marker, target.markers())
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(layout).detectBoard(levels)
+    if ids is None or corners is None:
+        return _NOTHING
+    return ids.ravel().astype(np.intp), corners.reshape(-1, 2).astype(np.float64)

@@ -1,0 +1,127 @@
+"""By how much pairs of sensors moved relative to each other, and how sure that is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from calib import pose
+from calib.calibration_check.board_poses import solve
+from calib.calibration_check.stored import Stored, Views
+from calib.camera import Camera
+from calib.pose import Pose
+from calib.solve.bundle import rotations
+from calib.solve.bundle.layout import POSE
+
+#: Fewest shots that two sensors are compared in.
+LEAST_SHOTS = 3
+
+#: A change that chance makes in one check of a thousand is none.
+QUANTILE = float(stats.chi2.ppf(0.999, 6))
+
+
+@dataclass(frozen=True)
+class PairChange:
+    """How a sensor moved relative to another since the calibration.
+
+    Attributes:
+        first, second: the sensors.
+        shots: number of shots that both saw.
+        turn: rotation vector about the rig's axes (3,) [rad].
+        move: displacement (3,) [m].
+        shift_px: how far it moves what the second sensor sees [px], root mean square.
+        sigma_px: one deviation of that by chance, in the stored and the new calibration together [px].
+        squared: squared Mahalanobis distance of turn and move; chi-squared with 6 degrees of freedom by chance.
+    """
+
+    first: str
+    second: str
+    shots: int
+    turn: NDArray[np.float64]
+    move: NDArray[np.float64]
+    shift_px: float
+    sigma_px: float
+    squared: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether chance does not explain it."""
+        return self.squared > QUANTILE
+
+
+def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
+    """Of all pairs that saw the board together in enough shots, and of which one at least sees corners."""
+    shots = views.shots
+    seeing = {view.sensor for view in views.corners}
+    present = [name for name in stored.sensors if name in shots]
+    pairs = [(a, b) for a, b in combinations(present, 2) if {a, b} & seeing]
+    common = {pair: shots[pair[0]] & shots[pair[1]] for pair in pairs}
+    return [
+        _change(stored, views.of(pair, both), pair, len(both))
+        for pair, both in common.items()
+        if len(both) >= LEAST_SHOTS
+    ]
+
+
+def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> PairChange:
+    second = pair[1]
+    adjusted = solve(stored, views, (second,))
+    before, after = stored.sensors[second].camera, adjusted.state.sensors[second].camera
+    turn = rotations.logarithm((after.T_rs[:3, :3] @ before.T_rs[:3, :3].T)[None])[0]
+    move = after.T_rs[:3, 3] - before.T_rs[:3, 3]
+    columns = adjusted.layout.columns(second, POSE)
+    covariance = adjusted.covariance[np.ix_(columns, columns)] + _relative_covariance(stored, *pair)
+    change = np.concatenate([turn, move])
+    points = _points(adjusted.state.boards, before, views, second)
+    spread = [_shift(before, points, column) for column in np.linalg.cholesky(covariance).T]
+    return PairChange(
+        *pair,
+        shots,
+        turn,
+        move,
+        _shift(before, points, change),
+        float(np.sqrt(np.sum(np.square(spread)))),
+        float(change @ np.linalg.solve(covariance, change)),
+    )
+
+
+def _relative_covariance(stored: Stored, first: str, second: str) -> NDArray[np.float64]:
+    """Stored covariance (6, 6) of the second sensor's pose as seen from the first; zero where nothing is known.
+
+    A turn of the first sensor about itself carries the second along.
+    """
+    if stored.covariance is None:
+        return np.zeros((6, 6))
+    lever = stored.sensors[second].camera.center - stored.sensors[first].camera.center
+    carried = np.eye(6)
+    carried[3:, :3] = -rotations.cross(lever[None])[0]
+    rows, blocks = [], []
+    for sensor, block in ((first, -carried), (second, np.eye(6))):
+        own = stored.of_pose(sensor)
+        rows += own
+        blocks += [block] if own else []
+    if not rows:
+        return np.zeros((6, 6))
+    change = np.concatenate(blocks, axis=1)
+    return change @ stored.covariance[np.ix_(rows, rows)] @ change.T
+
+
+def _points(boards: Mapping[int, Pose], camera: Camera, views: Views, sensor: str) -> NDArray[np.float64]:
+    """Points (n, 3) that a sensor saw, in the rig."""
+    found = [pose.transform(boards[view.shot], view.points_b) for view in views.corners if view.sensor == sensor]
+    for view in views.planes:
+        if view.sensor == sensor:
+            found.append(pose.transform(camera.T_rs, camera.directions(view.pixels) * view.distances[:, None]))
+    return np.concatenate(found)
+
+
+def _shift(camera: Camera, points_r: NDArray[np.float64], change: NDArray[np.float64]) -> float:
+    """Root mean square of the pixels by which a small turn and displacement (6,) of a camera moves points [px]."""
+    T_rs = camera.T_rs.copy()
+    T_rs[:3, :3] = rotations.exponential(change[None, :3])[0] @ T_rs[:3, :3]
+    T_rs[:3, 3] += change[3:]
+    shifts = replace(camera, T_rs=T_rs).project(points_r) - camera.project(points_r)
+    return float(np.sqrt(np.nanmean(np.sum(shifts**2, axis=1))))

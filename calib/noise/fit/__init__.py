@@ -1,0 +1,1 @@
+"""Fitting of noise models, and function families that several models share."""

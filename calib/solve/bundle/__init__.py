@@ -1,0 +1,1 @@
+"""Bundle adjustment: parameters, equations, solver."""

@@ -1,0 +1,126 @@
+"""Which numbers of a state are free, what they are called, and how increments of them change it.
+
+Every parameter is an increment on the state that the search started from. Poses are turned about the axes of the rig:
+R ← exp(δ) R, t ← t + δt, so that no rotation is near a singularity and deviations read as angles about those axes.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import pose
+from calib.camera import Camera
+from calib.pose import Pose
+from calib.solve.bundle.lens_parameters import MATRIX, LensKind
+from calib.solve.bundle.state import SensorState, State
+
+POSE = ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
+DEPTH_TERMS = ("depth_offset", "depth_scale")
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What is free of one sensor.
+
+    Attributes:
+        kind: of its lens.
+        intrinsics: names of the free intrinsics, a leading part of the camera matrix and the kind's coefficients.
+        moves: whether its pose is free; that of the rig's reference is not.
+        depth: free ones of `DEPTH_TERMS`.
+        runs_free: whether its clock has an unknown offset.
+    """
+
+    kind: LensKind
+    intrinsics: tuple[str, ...] = ()
+    moves: bool = True
+    depth: tuple[str, ...] = ()
+    runs_free: bool = False
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Free parameters that are held near zero."""
+        return tuple(name for name in self.kind.held if name in self.intrinsics)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All free parameters of the sensor, in the order of the vector."""
+        return (
+            self.intrinsics + (POSE if self.moves else ()) + self.depth + (("time_offset",) if self.runs_free else ())
+        )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The vector of parameters: sensors first, each with its free parameters, then six of every shot's board."""
+
+    freedoms: Mapping[str, Freedom]
+    shots: Sequence[int]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Name of every parameter, such as `tof.fx`, `color.rotation_x` or `board 3.z`."""
+        sensors = [f"{sensor}.{name}" for sensor, freedom in self.freedoms.items() for name in freedom.names]
+        return (*sensors, *(f"board {shot}.{name}" for shot in self.shots for name in POSE))
+
+    @cached_property
+    def starts(self) -> Mapping[str, int]:
+        """First column of every sensor."""
+        counts = [len(freedom.names) for freedom in self.freedoms.values()]
+        return dict(zip(self.freedoms, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
+
+    @property
+    def board_start(self) -> int:
+        """First column of the boards."""
+        return sum(len(freedom.names) for freedom in self.freedoms.values())
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return self.board_start + 6 * len(self.shots)
+
+    def columns(self, sensor: str, names: Sequence[str]) -> NDArray[np.intp]:
+        """Columns of some free parameters of a sensor."""
+        own = self.freedoms[sensor].names
+        return np.array([self.starts[sensor] + own.index(name) for name in names], np.intp)
+
+    def move(self, state: State, increments: NDArray[np.float64]) -> State:
+        """The state after increments (size,)."""
+        boards = increments[self.board_start :].reshape(-1, 6)
+        return State(
+            {name: self._moved(name, sensor, increments) for name, sensor in state.sensors.items()},
+            {shot: turned(state.boards[shot], step) for shot, step in zip(self.shots, boards, strict=True)},
+        )
+
+    def _moved(self, name: str, sensor: SensorState, increments: NDArray[np.float64]) -> SensorState:
+        freedom = self.freedoms[name]
+        start = self.starts[name]
+        steps = dict(zip(freedom.names, increments[start : start + len(freedom.names)].tolist(), strict=True))
+        camera = _refitted(sensor.camera, freedom.kind, steps)
+        if freedom.moves:
+            camera = replace(camera, T_rs=turned(camera.T_rs, np.array([steps[name] for name in POSE])))
+        return SensorState(
+            camera,
+            sensor.depth_offset + steps.get("depth_offset", 0.0),
+            sensor.depth_scale + steps.get("depth_scale", 0.0),
+            sensor.time_offset + steps.get("time_offset", 0.0),
+        )
+
+
+def turned(T_ab: Pose, increments: NDArray[np.float64]) -> Pose:
+    """A pose after increments (6,): turned by the first three about the axes of a, moved by the others."""
+    turn = pose.from_rotation_vector(increments[:3], np.zeros(3))
+    moved = T_ab.copy()
+    moved[:3, :3] = turn[:3, :3] @ T_ab[:3, :3]
+    moved[:3, 3] += increments[3:]
+    return moved
+
+
+def _refitted(camera: Camera, kind: LensKind, steps: Mapping[str, float]) -> Camera:
+    matrix = {name: float(getattr(camera, name)) + steps.get(name, 0.0) for name in MATRIX}
+    bends = np.array([steps.get(name, 0.0) for name in kind.every])
+    if not np.any(bends):
+        return replace(camera, **matrix)
+    return replace(camera, **matrix, lens=kind.make(camera.lens.coefficients + bends))

@@ -1,0 +1,81 @@
+"""Where the board is in front of one camera: both answers that a flat board allows; a focal length to begin with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import pose
+from calib.camera import Camera
+from calib.lens import LensError
+from calib.pose import Pose
+from calib.solve.bundle.lens_parameters import LensKind
+from calib.views import CornerView
+
+#: Focal lengths that are tried, as shares of the image's width: from a wide fisheye to a telephoto.
+FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)
+
+#: Views that focal lengths are tried on.
+TRIED = 6
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A board seen by a camera.
+
+    Attributes:
+        T_sb: pose of the board in the camera's frame.
+        rms_px: of the corners' distances from where they should be [px].
+    """
+
+    T_sb: Pose
+    rms_px: float
+
+
+def sightings(camera: Camera, view: CornerView) -> list[Sighting]:
+    """Poses of the board that may explain a view, best first.
+
+    A small or distant board looks nearly the same tilted one way and the other, so there may be two.
+    Source: T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 2014 (OpenCV's IPPE).
+    """
+    alone = Camera(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
+    try:
+        directions = alone.directions(view.pixels)
+    except LensError:
+        return []
+    ideal = directions[:, :2] / directions[:, 2:]
+    _, turns, moves, _ = cv2.solvePnPGeneric(
+        view.points_b.astype(float), ideal, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_IPPE
+    )
+    poses = [pose.from_rotation_vector(turn[:, 0], move[:, 0]) for turn, move in zip(turns, moves, strict=True)]
+    found = [Sighting(T_sb, _rms(alone, view, T_sb)) for T_sb in poses]
+    return sorted((each for each in found if np.isfinite(each.rms_px)), key=lambda each: each.rms_px)
+
+
+def guess(width: int, height: int, kind: LensKind, views: Sequence[CornerView]) -> Camera:
+    """A camera with no distortion and the focal length for which the boards look most like boards.
+
+    Each focal length is tried on some views. It need not be exact, since the solve begins with every camera alone.
+    """
+    tried = views[:: max(1, len(views) // TRIED)]
+    cameras = [_plain(width, height, kind, share * width) for share in FOCAL_LENGTHS]
+    return min(cameras, key=lambda camera: _badness(camera, tried))
+
+
+def _plain(width: int, height: int, kind: LensKind, focal: float) -> Camera:
+    lens = kind.make(np.zeros(len(kind.every)))
+    return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, lens)
+
+
+def _badness(camera: Camera, views: Sequence[CornerView]) -> float:
+    """Root mean square over the views, without those that fit worst."""
+    squares = [found[0].rms_px ** 2 if (found := sightings(camera, view)) else np.inf for view in views]
+    kept = np.sort(squares)[: max(1, 3 * len(squares) // 4)]
+    return float(np.mean(kept))
+
+
+def _rms(camera: Camera, view: CornerView, T_sb: Pose) -> float:
+    misses: NDArray[np.float64] = camera.project(pose.transform(T_sb, view.points_b)) - view.pixels
+    return float(np.sqrt(np.mean(np.sum(misses**2, axis=1))))

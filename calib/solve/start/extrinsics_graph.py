@@ -1,0 +1,87 @@
+"""How sensors stand to each other, from shots that two of them share: a spanning tree from the reference."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import pose
+from calib.pose import Pose
+from calib.solve.start.board_poses import Sighting
+
+#: Answers of two shots count as the same within this angle [rad] and this share of the distance to the board.
+SAME_ANGLE = 0.15
+SAME_SHARE = 0.15
+
+#: Sightings of all sensors: by name and shot, best first.
+Sightings = Mapping[str, Mapping[int, Sequence[Sighting]]]
+
+
+class NotConnectedError(ValueError):
+    """Sensors of which no chain of common shots leads to the reference."""
+
+
+class ContradictionError(ValueError):
+    """Two sensors whose common shots say different things about where they stand."""
+
+
+def poses(seen: Sightings, reference: str) -> dict[str, Pose]:
+    """Pose `T_0s` of every sensor in the frame of the reference.
+
+    Args:
+        seen: sightings of the sensors that see corners, none of them empty.
+        reference: name of one of them.
+
+    Raises:
+        NotConnectedError: naming the sensors that share no shot with the others.
+        ContradictionError: if two sensors' shots do not belong together.
+    """
+    found = {reference: pose.identity()}
+    while len(found) < len(seen):
+        edges = [(len(set(seen[old]) & set(seen[new])), old, new) for old in found for new in seen if new not in found]
+        shared, old, new = max(edges, key=lambda edge: edge[0])
+        if shared == 0:
+            lost = ", ".join(name for name in seen if name not in found)
+            raise NotConnectedError(
+                f"{lost}: no shot shows the board to one of them and to one of {', '.join(found)} at the same time; "
+                "take shots in which both see it, or calibrate them apart"
+            )
+        found[new] = found[old] @ between(seen, old, new)
+    return found
+
+
+def between(seen: Sightings, a: str, b: str) -> Pose:
+    """The pose `T_ab` that most of the shots of both agree on.
+
+    A flat board allows two poses in each image; of the four combinations only the true one repeats from shot to shot.
+
+    Raises:
+        ContradictionError: if fewer than half of the shots agree.
+    """
+    shots = sorted(set(seen[a]) & set(seen[b]))
+    candidates = np.stack(
+        [one.T_sb @ pose.inverse(other.T_sb) for shot in shots for one in seen[a][shot] for other in seen[b][shot]]
+    )
+    owners = np.repeat(np.arange(len(shots)), [len(seen[a][shot]) * len(seen[b][shot]) for shot in shots])
+    reach = np.median([np.linalg.norm(seen[a][shot][0].T_sb[:3, 3]) for shot in shots])
+    costs = np.stack([_costs(candidate, candidates, owners, float(reach)) for candidate in candidates])
+    best = costs.sum(axis=1).argmin()
+    agreeing = int(np.sum(costs[best] < 1))
+    if len(shots) >= 4 and agreeing * 2 < len(shots):
+        raise ContradictionError(
+            f"{a} and {b}: only {agreeing} of their {len(shots)} common shots agree on where they stand to each other; "
+            "their images are not of the same moments, one of them moved, or names are mixed up"
+        )
+    return candidates[best]
+
+
+def _costs(
+    candidate: Pose, candidates: NDArray[np.float64], owners: NDArray[np.intp], reach: float
+) -> NDArray[np.float64]:
+    """How far each shot (shots,) is from agreeing with a candidate, at most 1."""
+    cosines = (np.einsum("nij,ij->n", candidates[:, :3, :3], candidate[:3, :3]) - 1) / 2
+    angles = np.arccos(np.clip(cosines, -1, 1)) / SAME_ANGLE
+    moves = np.linalg.norm(candidates[:, :3, 3] - candidate[:3, 3], axis=1) / (SAME_SHARE * reach)
+    costs = np.ones(owners[-1] + 1)
+    np.minimum.at(costs, owners, np.maximum(angles, moves))
+    return costs

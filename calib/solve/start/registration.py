@@ -1,0 +1,57 @@
+"""Where a depth sensor stands that saw the board's plane, but no corner of it."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from calib.pose import Pose
+from calib.solve.start.extrinsics_graph import NotConnectedError
+from calib.views import PlaneView
+
+#: Normals whose least singular value, over the largest, is below this span no space.
+SPANNING = 0.03
+
+
+def plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
+    """Normal n (3,), away from the sensor, and distance h [m] of the plane n · p = h, in the sensor's frame."""
+    points = camera.directions(view.pixels) * view.distances[:, None]
+    center = np.median(points, axis=0)
+    kept = np.ones(len(points), np.bool_)
+    normal = center
+    for _ in range(3):  # without what is not on the board
+        _, _, axes = np.linalg.svd(points[kept] - points[kept].mean(axis=0), full_matrices=False)
+        normal, center = axes[2], points[kept].mean(axis=0)
+        away = np.abs((points - center) @ normal)
+        kept = away <= 3 * np.median(away) + 1e-9
+    normal = normal * np.sign(normal @ center)
+    return normal, float(normal @ center)
+
+
+def register(name: str, camera: Camera, views: Sequence[PlaneView], boards: Mapping[int, Pose]) -> Pose:
+    """The pose `T_rs` of a sensor whose planes are those of boards at known poses: normals first, then distances.
+
+    Raises:
+        NotConnectedError: if the boards' normals do not span the space.
+    """
+    shared = [view for view in views if view.shot in boards]
+    if len(shared) < 3:
+        raise NotConnectedError(
+            f"{name}: sees no corners, and the board's plane in {len(shared)} shots; at least 3 needed"
+        )
+    found = [plane(camera, view) for view in shared]
+    normals_s = np.stack([normal for normal, _ in found])
+    normals_r = np.stack([boards[view.shot][:3, 2] for view in shared])
+    left, strengths, right = np.linalg.svd(normals_r.T @ normals_s)
+    if strengths[2] < SPANNING**2 * strengths[0]:
+        raise NotConnectedError(
+            f"{name}: sees no corners, and the board was tilted too little for its plane alone to say where {name} is; "
+            "tilt it up, down, left and right by 30 degrees"
+        )
+    T_rs = np.eye(4)
+    T_rs[:3, :3] = left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right
+    heights_r = np.array([boards[view.shot][:3, 2] @ boards[view.shot][:3, 3] for view in shared])
+    heights_s = np.array([height for _, height in found])
+    T_rs[:3, 3] = np.linalg.lstsq(normals_r, heights_r - heights_s, rcond=None)[0]
+    return T_rs

@@ -1,0 +1,122 @@
+"""A first guess of everything: every camera alone, then the chains between them, then the boards."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from calib import pose
+from calib.camera import Camera
+from calib.pose import Pose
+from calib.solve.bundle.adjustment import NotSolvedError, search
+from calib.solve.bundle.formulation import formulate
+from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.start import extrinsics_graph, registration
+from calib.solve.start.board_poses import Sighting, guess, sightings
+from calib.views import CornerView
+
+#: Misses of a corner beyond this [px] count no more when poses of a board are compared.
+FAR_PX = 20.0
+
+
+def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
+    """A state to begin with, and the task without views that say nothing or that no pose explains.
+
+    Raises:
+        NotConnectedError, ContradictionError: see `chains`.
+        NotSolvedError: if a sensor's views show no board that its camera could have seen.
+    """
+    cameras: dict[str, Camera] = {}
+    seen: dict[str, dict[int, list[Sighting]]] = {}
+    for name, sensor in task.sensors.items():
+        views = [view for view in task.corners if view.sensor == name]
+        cameras[name] = _camera(name, sensor, views, note)
+        found = {view.shot: sightings(cameras[name], view) for view in views}
+        if views and not any(found.values()):
+            raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
+        if views:
+            seen[name] = {shot: each for shot, each in found.items() if each}
+    placed = _placed(task, cameras, seen)
+    return _usable(task, seen), placed
+
+
+def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Callable[[str], None]) -> Camera:
+    if sensor.keeps_intrinsics or (sensor.factory and not views):
+        return sensor.factory[0]
+    if not views:
+        raise NotSolvedError(f"{name}: sees no corners, so its intrinsics have to be given and kept")
+    known = sensor.factory or (guess(sensor.width, sensor.height, sensor.lens, views),)
+    note(f"{name}: {len(views)} views, focal length about {known[0].fx:.0f} px to begin with")
+    return alone(name, sensor, views, known[0])
+
+
+def alone(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:
+    """The camera that explains a sensor's corners best, whatever was asked to be kept; in its own frame.
+
+    Args:
+        name, sensor, views: whose.
+        first: camera to begin with.
+
+    Raises:
+        NotSolvedError: if no view shows a board that such a camera could have seen.
+    """
+    for simpler in sensor.lens.simpler:  # a rational lens without distortion says everything twice
+        if first.lens.is_pinhole:
+            first = alone(name, replace(sensor, lens=simpler), views, first)
+    boards = {view.shot: found[0].T_sb for view in views if (found := sightings(first, view))}
+    if not boards:
+        raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
+    free = replace(sensor, keeps_intrinsics=False, runs_free=False, depth_terms=())
+    task = Task({name: free}, views, (), name).of_shots([*boards])
+    state = State({name: SensorState(replace(first, T_rs=pose.identity()))}, boards)
+    return search(formulate(task)(state, (1.0,))).sensors[name].camera
+
+
+def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.Sightings) -> State:
+    T_r0 = pose.identity()
+    if task.sensors[task.reference].factory:
+        T_r0 = task.sensors[task.reference].factory[0].T_rs
+    root = task.reference if task.reference in seen else next(iter(seen))
+    poses = extrinsics_graph.poses(seen, root)
+    boards = {shot: _board(shot, task, cameras, poses, seen) for shot in _shots(seen)}
+    for name in task.sensors:
+        if name not in poses:
+            views = [view for view in task.planes if view.sensor == name]
+            poses[name] = registration.register(name, cameras[name], views, boards)
+    # Until here everything is in the frame of a sensor that sees corners.
+    T_rx = T_r0 @ pose.inverse(poses[task.reference])
+    sensors = {name: SensorState(replace(cameras[name], T_rs=T_rx @ poses[name])) for name in task.sensors}
+    return State(sensors, {shot: T_rx @ board for shot, board in boards.items()})
+
+
+def _board(
+    shot: int, task: Task, cameras: Mapping[str, Camera], poses: Mapping[str, Pose], seen: extrinsics_graph.Sightings
+) -> Pose:
+    """Of all poses that some sensor would allow, the one with which all agree best."""
+    allowed = [poses[name] @ each.T_sb for name in seen for each in seen[name].get(shot, ())]
+    views = [view for view in task.corners if view.shot == shot]
+    placed = {view.sensor: replace(cameras[view.sensor], T_rs=poses[view.sensor]) for view in views}
+
+    def misfit(board: Pose) -> float:
+        total = 0.0
+        for view in views:
+            misses = placed[view.sensor].project(pose.transform(board, view.points_b)) - view.pixels
+            total += float(np.sum(np.minimum(np.nan_to_num(np.hypot(*misses.T), nan=FAR_PX), FAR_PX) ** 2))
+        return total
+
+    return min(allowed, key=misfit)
+
+
+def _shots(seen: extrinsics_graph.Sightings) -> list[int]:
+    return sorted({shot for found in seen.values() for shot in found})
+
+
+def _usable(task: Task, seen: extrinsics_graph.Sightings) -> Task:
+    """The task without views of corners that no pose explains, and without planes in shots that show no corners."""
+    shots = set(_shots(seen))
+    return replace(
+        task,
+        corners=[view for view in task.corners if view.shot in seen.get(view.sensor, {})],
+        planes=[view for view in task.planes if view.shot in shots],
+    )

@@ -1,0 +1,1 @@
+"""Uncertainty, cross-validation and verdict of a solution."""

@@ -1,0 +1,1 @@
+"""The device contract: frames, controls, capabilities, clocks, errors."""

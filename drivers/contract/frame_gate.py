@@ -1,0 +1,135 @@
+"""What lies between a driver's threads and the sink: lets through what fits, counts the rest, and ends when it is told.
+
+Every driver has one; the contract's promises about counting, states and the end of delivery are kept here.
+"""
+
+import threading
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from drivers.contract.capabilities import StreamInfo
+from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
+from drivers.contract.frame import Frame
+
+#: States in which nothing comes until the device is started again.
+_OVER = frozenset({DeviceState.CLOSED, DeviceState.FAILED})
+
+
+class Delivery:
+    """The way from one device to its sink. Every method may be called from any thread.
+
+    Args:
+        streams: what the device has promised; a frame that contradicts them is dropped and counted.
+        causes: reasons for dropping frames that the driver knows of; they are counted from 0 on.
+    """
+
+    def __init__(self, streams: Iterable[StreamInfo], causes: Iterable[str] = ()) -> None:
+        self._streams = {stream.key: stream for stream in streams}
+        self._counters = Counter({"frames": 0, **dict.fromkeys(causes, 0)})
+        # Reentrant, because the sink may stop the device from within `on_frame`.
+        self._lock = threading.RLock()
+        self._sink: Sink | None = None
+        self._state = DeviceState.CLOSED
+        self._ended = threading.Event()
+        self._released = False
+        self._epoch = -1
+
+    @property
+    def state(self) -> DeviceState:
+        """What was reported last."""
+        return self._state
+
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`frames` delivered, and dropped ones by cause."""
+        with self._lock:
+            return dict(self._counters)
+
+    @property
+    def epoch(self) -> int:
+        """The epoch of the frames that are delivered now; 0 after the first start."""
+        return self._epoch
+
+    def begin(self, sink: Sink, reason: str) -> threading.Event | None:
+        """Begins a new epoch, in the state OPENING; None, and nothing happens, if it delivers already.
+
+        Returns:
+            What will be set as soon as delivery ends: the sign for the driver's thread to stop.
+
+        Raises:
+            DeviceError: the device was closed.
+        """
+        with self._lock:
+            if self._released:
+                raise DeviceError("the device was closed; it has to be opened anew")
+            if self._sink is not None and self._state not in _OVER:
+                return None
+            self._sink = sink
+            self._epoch += 1
+            self._ended = ended = threading.Event()
+            self.report(DeviceState.OPENING, reason)
+            return ended
+
+    def end(self, reason: str) -> None:
+        """Reports CLOSED, unless the end was reported already, and lets nothing through any more once it returns."""
+        with self._lock:
+            if self._state not in _OVER:
+                self.report(DeviceState.CLOSED, reason)
+            self._state = DeviceState.CLOSED
+            self._sink = None
+            self._ended.set()
+
+    def release(self) -> None:
+        """Ends for good: `begin` raises from now on."""
+        with self._lock:
+            self._released = True
+            self.end("closed")
+
+    def begin_epoch(self) -> None:
+        """Begins a new epoch without a pause, because the device's clock has jumped."""
+        with self._lock:
+            self._epoch += 1
+
+    def report(self, state: DeviceState, reason: str) -> None:
+        """Reports a state; ignored when nothing is being delivered, so that a late thread cannot revive a device."""
+        with self._lock:
+            if self._sink is not None:
+                self._state = state
+                self._sink.on_state(state, reason)
+
+    def warn(self, condition: str, message: str) -> None:
+        """See `drivers.contract.device.Sink.on_warning`."""
+        with self._lock:
+            if self._sink is not None:
+                self._sink.on_warning(condition, message)
+
+    def truth(self, truth: Truth) -> None:
+        """Delivers what a simulated device knows."""
+        with self._lock:
+            if self._sink is not None:
+                self._sink.on_truth(truth)
+
+    def frame(self, frame: Frame) -> None:
+        """Delivers a frame, or counts it as dropped: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
+        with self._lock:
+            obstacle = self._obstacle(frame)
+            if obstacle:
+                self._counters[obstacle] += 1
+            elif self._sink is not None:
+                self._counters["frames"] += 1
+                self._sink.on_frame(frame)
+
+    def drop(self, cause: str, number: int = 1) -> None:
+        """Counts frames that the driver could not deliver."""
+        with self._lock:
+            self._counters[cause] += number
+
+    def _obstacle(self, frame: Frame) -> str:
+        stream = self._streams.get(frame.key)
+        if self._sink is None:
+            return "after_stop"
+        if stream is None:
+            return "unknown_stream"
+        if frame.data.shape[:2] != (stream.height, stream.width):
+            return "wrong_size"
+        return "wrong_encoding" if frame.encoding != stream.encoding else ""

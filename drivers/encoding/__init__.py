@@ -1,0 +1,1 @@
+"""Frames and sensor models as messages and MCAP files."""

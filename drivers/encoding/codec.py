@@ -1,0 +1,237 @@
+"""Frames and truths as bytes, and back: `foxglove.RawImage`, `absmsg.v1.FrameInfo` and `absmsg.v1.SurfaceTruth`.
+
+An image travels as two messages: what every viewer understands (RawImage) and what only we need (FrameInfo). Decoding
+trusts nothing: whatever the bytes are, the result is a valid frame or a `CodecError` that names what is wrong.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import TypeVar
+
+import numpy as np
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.surface_truth_pb2 import SurfaceTruth
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from google.protobuf.message import DecodeError, Message
+
+from drivers.contract.device import Truth
+from drivers.contract.frame import ENCODINGS, Frame, FrameError, Geometry, Kind, Reference
+
+IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name
+INFO_SCHEMA = FrameInfo.DESCRIPTOR.full_name
+TRUTH_SCHEMA = SurfaceTruth.DESCRIPTOR.full_name
+
+_GEOMETRIES = {
+    Geometry.NONE: FrameInfo.GEOMETRY_NONE,
+    Geometry.Z: FrameInfo.GEOMETRY_Z,
+    Geometry.RADIAL: FrameInfo.GEOMETRY_RADIAL,
+}
+_REFERENCES = {
+    Reference.START: FrameInfo.REFERENCE_START,
+    Reference.MIDDLE: FrameInfo.REFERENCE_MIDDLE,
+    Reference.END: FrameInfo.REFERENCE_END,
+}
+_GEOMETRY_OF: Mapping[int, Geometry] = {number: geometry for geometry, number in _GEOMETRIES.items()}
+_REFERENCE_OF: Mapping[int, Reference] = {number: reference for reference, number in _REFERENCES.items()}
+
+_AnyMessage = TypeVar("_AnyMessage", bound=Message)
+
+
+class CodecError(ValueError):
+    """Bytes that are no frame or truth; the message names what is wrong."""
+
+
+def encode_image(frame: Frame, wall_ns: int) -> bytes:
+    """The pixels of a frame as foxglove.RawImage.
+
+    Args:
+        frame: what to encode.
+        wall_ns: wall-clock time of the exposure [ns since the Unix epoch]; viewers show it.
+    """
+    height, width = frame.data.shape[:2]
+    image = RawImage(
+        frame_id=frame.sensor,
+        width=width,
+        height=height,
+        encoding=frame.encoding,
+        step=width * _bytes_per_pixel(frame.encoding),
+        data=frame.data.tobytes(),
+    )
+    image.timestamp.FromNanoseconds(wall_ns)
+    return image.SerializeToString()
+
+
+def encode_info(frame: Frame, header: Header) -> bytes:
+    """Everything about a frame but its pixels as absmsg.v1.FrameInfo.
+
+    Args:
+        frame: what to describe.
+        header: who speaks and when in wall-clock time; its `t_host_ns` and `frame_id` are taken from the frame.
+    """
+    info = FrameInfo(
+        header=header,
+        sensor=frame.sensor,
+        stream=frame.stream,
+        kind=frame.kind.value,
+        seq=frame.seq,
+        epoch=frame.epoch,
+        scale=frame.scale,
+        unit=frame.unit,
+        geometry=_GEOMETRIES[frame.geometry],
+        invalid=frame.invalid,
+        t_device_ticks=frame.t_device_ticks,
+        tick_hz=frame.tick_hz,
+        clock_domain=frame.clock_domain,
+        t_sigma_ns=frame.t_sigma_ns,
+        t_reference=_REFERENCES[frame.t_reference],
+        t_arrival_ns=frame.t_arrival_ns,
+        exposure_s=frame.exposure_s,
+        gain=frame.gain,
+        temperature_c=frame.temperature_c,
+        modulation=frame.modulation,
+        calib_id=frame.calib_id,
+        undistorted=frame.undistorted,
+        aligned_to=frame.aligned_to,
+        filters=frame.filters,
+        incomplete=frame.incomplete,
+        saturated=frame.saturated,
+    )
+    info.header.t_host_ns = frame.t_host_ns
+    info.header.frame_id = frame.sensor
+    return info.SerializeToString()
+
+
+def decode(image: bytes, info: bytes) -> Frame:
+    """The frame of a serialized foxglove.RawImage and its absmsg.v1.FrameInfo; pixels are not copied.
+
+    Raises:
+        CodecError: the bytes are no such messages, contradict each other or themselves.
+    """
+    picture, about = _parse(RawImage, image), _parse(FrameInfo, info)
+    name = f"{about.sensor}/{about.stream}"
+    if not about.sensor or not about.stream:
+        raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
+    _check(name, picture, about)
+    try:
+        return Frame(
+            sensor=about.sensor,
+            stream=about.stream,
+            kind=_kind(name, about.kind),
+            data=_pixels(name, picture),
+            encoding=picture.encoding,
+            t_host_ns=about.header.t_host_ns,
+            t_arrival_ns=about.t_arrival_ns,
+            seq=about.seq,
+            epoch=about.epoch,
+            scale=about.scale,
+            unit=about.unit,
+            geometry=_member(name, "geometry", _GEOMETRY_OF, about.geometry),
+            invalid=about.invalid if about.HasField("invalid") else None,
+            t_device_ticks=about.t_device_ticks,
+            tick_hz=about.tick_hz,
+            clock_domain=about.clock_domain,
+            t_sigma_ns=about.t_sigma_ns,
+            t_reference=_member(name, "t_reference", _REFERENCE_OF, about.t_reference),
+            exposure_s=about.exposure_s,
+            gain=about.gain,
+            temperature_c=about.temperature_c,
+            modulation=about.modulation,
+            calib_id=about.calib_id,
+            undistorted=about.undistorted,
+            aligned_to=about.aligned_to,
+            filters=tuple(about.filters),
+            incomplete=about.incomplete,
+            saturated=about.saturated,
+        )
+    except FrameError as error:
+        raise CodecError(str(error)) from error
+
+
+def encode_truth(truth: Truth, header: Header) -> bytes:
+    """A truth as absmsg.v1.SurfaceTruth; `header.t_host_ns` is taken from the truth."""
+    rows, columns = truth.points_r.shape[:2]
+    message = SurfaceTruth(
+        header=header,
+        seq=truth.seq,
+        rows=rows,
+        columns=columns,
+        points_f32=truth.points_r.astype("<f4").tobytes(),
+        surface=truth.surface,
+    )
+    message.header.t_host_ns = truth.t_host_ns
+    return message.SerializeToString()
+
+
+def decode_truth(payload: bytes) -> Truth:
+    """The truth in a serialized absmsg.v1.SurfaceTruth.
+
+    Raises:
+        CodecError: the bytes are no such message or hold another number of points than they declare.
+    """
+    message = _parse(SurfaceTruth, payload)
+    expected = message.rows * message.columns * 3 * 4
+    if expected == 0 or len(message.points_f32) != expected:
+        raise CodecError(
+            f"SurfaceTruth of {message.rows} × {message.columns} points needs {expected} bytes (more than 0), "
+            f"has {len(message.points_f32)}"
+        )
+    points_r = np.frombuffer(message.points_f32, "<f4").reshape(message.rows, message.columns, 3)
+    return Truth(message.seq, message.header.t_host_ns, points_r, message.surface)
+
+
+def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
+    try:
+        return schema.FromString(payload)
+    except DecodeError as error:
+        raise CodecError(f"{len(payload)} bytes are no {schema.DESCRIPTOR.full_name}: {error}") from error
+
+
+def _bytes_per_pixel(encoding: str) -> int:
+    dtype, channels = ENCODINGS[encoding]
+    return dtype.itemsize * channels
+
+
+def _pixels(name: str, image: RawImage) -> np.ndarray:
+    if image.encoding not in ENCODINGS:
+        raise CodecError(f"{name}: encoding {image.encoding!r} is none of {sorted(ENCODINGS)}")
+    dtype, channels = ENCODINGS[image.encoding]
+    step = image.width * _bytes_per_pixel(image.encoding)
+    if image.step != step:
+        raise CodecError(
+            f"{name}: a row of {image.width} {image.encoding} pixels has {step} bytes, step is {image.step}"
+        )
+    if len(image.data) != step * image.height or not image.data:
+        raise CodecError(
+            f"{name}: {image.width} × {image.height} {image.encoding} needs {step * image.height} bytes (more than 0), "
+            f"has {len(image.data)}"
+        )
+    shape = (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
+    return np.frombuffer(image.data, dtype).reshape(shape)
+
+
+def _kind(name: str, value: str) -> Kind:
+    try:
+        return Kind(value)
+    except ValueError:
+        raise CodecError(f"{name}: kind {value!r} is none of {[kind.value for kind in Kind]}") from None
+
+
+_Member = TypeVar("_Member", Geometry, Reference)
+
+
+def _member(name: str, field: str, members: Mapping[int, _Member], number: int) -> _Member:
+    if number not in members:
+        raise CodecError(f"{name}: {field} {number} is none of {sorted(members)}")
+    return members[number]
+
+
+def _check(name: str, image: RawImage, info: FrameInfo) -> None:
+    if image.frame_id != info.sensor:
+        raise CodecError(f"{name}: the image is of sensor {image.frame_id!r}, its info of {info.sensor!r}")
+    if not (info.scale > 0 and math.isfinite(info.scale)):
+        raise CodecError(f"{name}: scale must be positive and finite, not {info.scale}")
+    if not (info.tick_hz >= 0 and math.isfinite(info.tick_hz)):
+        raise CodecError(f"{name}: tick_hz must be finite and 0 or more, not {info.tick_hz}")
+    if info.t_sigma_ns < 0:
+        raise CodecError(f"{name}: t_sigma_ns must be 0 or more, not {info.t_sigma_ns}")

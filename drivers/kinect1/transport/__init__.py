@@ -1,0 +1,1 @@
+"""USB transfers of the Kinect v1."""

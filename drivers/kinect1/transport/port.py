@@ -1,0 +1,172 @@
+"""One camera on the USB: opening it against the kernel's resistance, its control pipe, its streams."""
+
+import errno
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import usb.core
+import usb.util
+
+from drivers.contract.device import DeviceError
+from drivers.kinect1 import udev
+from drivers.kinect1.transport.transfer import GoneError, Reader
+
+#: Makes the reader of a device's streams.
+Streaming = Callable[[usb.core.Device, Sequence[int], Callable[[], int]], Reader]
+
+_OUT, _IN = 0x40, 0xC0
+_CONTROL_MS = 1000
+_INTERFACE = 0
+
+#: What a camera carries; the alternate setting of its interface that has these is the one to use.
+_PIPES = frozenset({0x81, 0x82})
+
+
+class Port:
+    """An opened camera.
+
+    Args:
+        device: as pyusb found it.
+        backend: what found it; must outlive it.
+        streaming: makes readers of its streams.
+        clock: CLOCK_MONOTONIC [ns].
+
+    Raises:
+        DeviceError: it cannot be opened; says what to do.
+    """
+
+    def __init__(
+        self, device: usb.core.Device, backend: object, streaming: Streaming, clock: Callable[[], int]
+    ) -> None:
+        self._device = device
+        self._backend = backend
+        self._streaming = streaming
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._readers = 0
+        self._closing = False
+        try:
+            self._claim()
+        except DeviceError:
+            usb.util.dispose_resources(device)
+            raise
+
+    def write(self, data: bytes) -> None:
+        """See `drivers.kinect1.transport.commands.Control`."""
+        with self._opened(), plain_errors():
+            self._device.ctrl_transfer(_OUT, 0, 0, 0, data, _CONTROL_MS)
+
+    def read(self, size: int) -> bytes:
+        """See `drivers.kinect1.transport.commands.Control`."""
+        with self._opened(), plain_errors():
+            return bytes(self._device.ctrl_transfer(_IN, 0, 0, 0, size, _CONTROL_MS))
+
+    @contextmanager
+    def reading(self, endpoints: Sequence[int]) -> Iterator[Reader]:
+        """A reader of pipes.
+
+        Raises:
+            DeviceError: the host cannot carry them, or the port was closed.
+        """
+        with self._opened():
+            self._refuse_if(self._closing)
+            reader = self._streaming(self._device, endpoints, self._clock)
+            self._readers += 1
+        try:
+            yield reader
+        finally:
+            reader.close()
+            with self._lock:
+                self._readers -= 1
+                self._dispose()
+
+    def close(self) -> None:
+        """Lets go of the camera, as soon as nobody reads any more; may be called again."""
+        with self._lock:
+            self._closing = True
+            self._dispose()
+
+    @contextmanager
+    def _opened(self) -> Iterator[None]:
+        with self._lock:
+            self._refuse_if(self._closing and self._readers == 0)
+            yield
+
+    def _refuse_if(self, closed: bool) -> None:
+        if closed:
+            raise DeviceError("the camera was closed")
+
+    def _dispose(self) -> None:
+        if self._closing and self._readers == 0:
+            usb.util.dispose_resources(self._device)
+
+    def _claim(self) -> None:
+        with plain_errors():
+            self._detach_kernel()
+            if not self._is_configured():
+                self._device.set_configuration()
+            usb.util.claim_interface(self._device, _INTERFACE)
+            setting = self._setting()
+            if setting > 0:
+                self._device.set_interface_altsetting(_INTERFACE, setting)
+
+    def _is_configured(self) -> bool:
+        """Usually the kernel has configured it; to do so again would reset it, which late models do not survive."""
+        try:
+            self._device.get_active_configuration()
+        except usb.core.USBError as error:
+            if error.errno is not None:
+                raise
+            return False
+        return True
+
+    def _detach_kernel(self) -> None:
+        try:
+            if self._device.is_kernel_driver_active(_INTERFACE):
+                self._device.detach_kernel_driver(_INTERFACE)
+        except NotImplementedError:
+            return  # only Linux has drivers that hold a camera
+        except usb.core.USBError as error:
+            if error.errno in {errno.ENODEV, errno.EACCES}:
+                raise
+            raise DeviceError(
+                f"the kernel's webcam driver holds the camera and does not let go ({error.strerror}):  "
+                f"{udev.KERNEL_REMEDY}"
+            ) from error
+
+    def _setting(self) -> int:
+        """The alternate setting with both pipes, the widest of them."""
+        fitting: list[tuple[int, int]] = []
+        configuration: Any = self._device.get_active_configuration()
+        for interface in configuration:
+            pipes = {end.bEndpointAddress: end.wMaxPacketSize for end in interface}
+            if interface.bInterfaceNumber == _INTERFACE and set(pipes) >= _PIPES:
+                fitting.append((min(pipes[address] for address in _PIPES), interface.bAlternateSetting))
+        if not fitting:
+            raise DeviceError("the camera has no streams; plug it in again, and check its power supply")
+        return max(fitting)[1]
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Turns pyusb's errors into `DeviceError`s that say what to do."""
+    try:
+        yield
+    except usb.core.USBError as error:
+        raise explain(error) from error
+
+
+def explain(error: usb.core.USBError) -> DeviceError:
+    """A pyusb error in plain words."""
+    match error.errno:
+        case errno.ENODEV | errno.ENOENT | errno.ESHUTDOWN:
+            return GoneError("the camera was unplugged")
+        case errno.EACCES | errno.EPERM:
+            return DeviceError(f"you may not open the camera; {udev.PERMISSION_REMEDY}")
+        case errno.EBUSY:
+            return DeviceError("another program uses the camera; end it")
+        case errno.ETIMEDOUT:
+            return DeviceError("the camera does not answer; check its power supply")
+    return DeviceError(f"the camera does not work: {error}; plug it in again")

@@ -1,0 +1,1 @@
+"""Simulated scenes: bodies, motion, texture."""

@@ -1,0 +1,75 @@
+"""How somebody shows a board to the sensors: held still, brought to another pose, held still again."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from calib import pose
+from calib.pose import Pose
+from drivers.simulated.scene.motion import Placement, smooth_step
+
+#: Time from one pose to the next [s].
+MOVE_S = 1.0
+#: Distances from the rig's origin that a board is held at [m], and the largest tilt and roll [rad].
+NEAREST, FARTHEST = 0.55, 0.95
+TILT, ROLL = np.deg2rad(40), np.deg2rad(20)
+#: Half the width and height that the time-of-flight head sees at a distance of 1 m, less a rim [m].
+_SEEN = (0.37, 0.29)
+
+
+@dataclass(frozen=True)
+class Handling:
+    """A flat board in one pose after another; see `drivers.simulated.scene.motion.Motion`.
+
+    The first pose faces the rig from 0.7 m. The others are drawn so that the board is turned by up to 40° about an axis
+    in its plane, rolled by up to 20°, and with `reach` 1 inside the view of the time-of-flight head if it faces it.
+
+    Attributes:
+        seed: of the poses.
+        width, height: of the board [m].
+        hold_s: how long it is still in each pose [s].
+        reach: how far to the sides it is held: 1 is within the view of the time-of-flight head.
+        speed: factor on time; with 0 it stays in its first pose.
+    """
+
+    seed: int
+    width: float
+    height: float
+    hold_s: float = 1.0
+    reach: float = 1.0
+    speed: float = 1.0
+
+    def at(self, t: float) -> Placement:
+        """The placement at time `t` [s] after the start."""
+        number, since = divmod(max(t * self.speed, 0.0), self.hold_s + MOVE_S)
+        part = smooth_step((since - self.hold_s) / MOVE_S)
+        return Placement(_between(self.held(int(number)), self.held(int(number) + 1), part))
+
+    def held(self, number: int) -> Pose:
+        """The pose `T_rp` of the board's middle that is held after `number` moves."""
+        return _held(self, number)
+
+
+@lru_cache(maxsize=256)
+def _held(handling: Handling, number: int) -> Pose:
+    if number == 0:
+        return pose.from_rotation_vector((0, 0, 0), (0, 0, 0.7))
+    generator = np.random.default_rng([handling.seed, 5, number])
+    distance = generator.uniform(NEAREST, FARTHEST)
+    axis, angle = generator.uniform(0, 2 * np.pi), TILT * np.sqrt(generator.uniform(0.05, 1))
+    roll = Rotation.from_rotvec([0, 0, generator.uniform(-ROLL, ROLL)])
+    turned = Rotation.from_rotvec(angle * np.array([np.cos(axis), np.sin(axis), 0])) * roll
+    room = handling.reach * np.array(_SEEN) * distance - 0.5 * np.array([handling.width, handling.height])
+    x, y = np.maximum(room, 0) * generator.uniform(-1, 1, 2)
+    return pose.from_rotation_vector(turned.as_rotvec(), (x, y, distance))
+
+
+def _between(first: Pose, second: Pose, part: float) -> Pose:
+    """A pose on the straight way from one to another, `part` from 0 to 1; the rotation is about one axis."""
+    turn = Rotation.from_matrix(second[:3, :3] @ first[:3, :3].T).as_rotvec()
+    T = np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec(part * turn).as_matrix() @ first[:3, :3]
+    T[:3, 3] = (1 - part) * first[:3, 3] + part * second[:3, 3]
+    return T

@@ -1,0 +1,166 @@
+"""The scenes there are, each before a textured wall; what an address chooses of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from calib import pose
+from drivers.simulated.scene.body import Surface
+from drivers.simulated.scene.excursion import Excursion
+from drivers.simulated.scene.handling import Handling
+from drivers.simulated.scene.motion import Motion
+from drivers.simulated.scene.scene import REST_Z, Scene
+from drivers.simulated.scene.texture import Texture, checkerboard, fine_pattern, smooth_pattern
+from drivers.simulated.shapes.hand import Hand
+from drivers.simulated.shapes.printed import TARGETS, paper, printed
+from drivers.simulated.shapes.rectangle import Rectangle
+from drivers.simulated.shapes.strip import Strip
+
+#: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
+_WALL = (4.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What can be chosen of a scene.
+
+    Attributes:
+        seed: of motion and texture.
+        bend: largest bend of a sheet from end to end [rad].
+        speed: factor on the speed of all motion.
+        excursion: what happens to the surfaces on top of their motion.
+        hand: whether a hand crosses the view.
+        fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
+        stiffness: bending stiffness of the strip per width [N·m].
+        weight: mass of the strip per area [kg/m²].
+        distance, reflectivity, tilt: of the bare wall [m], [rad].
+        printed: what is printed on the calibration board, one of `TARGETS`.
+        hold_s: how long it is still in each pose [s].
+        reach: how far to the sides it is held.
+    """
+
+    seed: int = 1
+    bend: float = np.deg2rad(60)
+    speed: float = 1.0
+    excursion: Excursion = field(default_factory=Excursion)
+    hand: bool = False
+    fine: bool = False
+    stiffness: float = 0.01
+    weight: float = 0.3
+    distance: float = 1.0
+    reflectivity: float = 0.5
+    tilt: float = 0.0
+    printed: str = "chessboard"
+    hold_s: float = 1.0
+    reach: float = 1.0
+
+
+def sheet(choices: Choices) -> Scene:
+    """A sheet of 0.30 × 0.20 m that bends by up to `choices.bend` while it moves and turns."""
+    width, height = 0.30, 0.20
+    motion = Motion(
+        seed=choices.seed,
+        rest=(0.0, 0.0, REST_Z),
+        translation=(0.04, 0.03, 0.05),
+        rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)),
+        bend=choices.bend,
+        width=width,
+        height=height,
+        turn=np.deg2rad(35),
+        shift=0.02,
+        speed=choices.speed,
+    )
+    pattern = _print(choices, choices.seed, width, height)
+    return _scene(choices, Rectangle(width, height, motion, pattern, choices.excursion))
+
+
+def board(choices: Choices) -> Scene:
+    """A rigid checker board of 0.30 × 0.20 m, squares of 50 mm, that moves and turns; nothing bends it."""
+    width, height = 0.30, 0.20
+    motion = Motion(
+        seed=choices.seed,
+        rest=(0.0, 0.0, REST_Z),
+        translation=(0.06, 0.05, 0.08),
+        rotation=(np.deg2rad(20), np.deg2rad(20), np.deg2rad(15)),
+        bend=0.0,
+        width=width,
+        height=height,
+        turn=0.0,
+        shift=0.0,
+        speed=choices.speed,
+    )
+    return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05), choices.excursion))
+
+
+def strip(choices: Choices) -> Scene:
+    """A strip of 0.30 × 0.05 m that hangs from a gripper towards the viewer and sags under its weight."""
+    length, width = 0.30, 0.05
+    pattern = smooth_pattern(choices.seed, length, width, (0.015, 0.006, 0.003), 1000.0, (0.1, 0.95), (0.5, 0.95))
+    elastic = (choices.stiffness, choices.weight)
+    return _scene(choices, Strip(choices.seed, length, width, *elastic, pattern, choices.speed, choices.excursion))
+
+
+def pair(choices: Choices) -> Scene:
+    """Two sheets of 0.20 × 0.15 m side by side, at rest 8 cm apart; each has a motion and a print of its own."""
+    width, height, middle = 0.20, 0.15, 0.14
+    motions = [
+        Motion(
+            seed=choices.seed + number,
+            rest=(side * middle, 0.0, REST_Z),
+            translation=(0.015, 0.03, 0.05),
+            rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(8)),
+            bend=choices.bend,
+            width=width,
+            height=height,
+            turn=np.deg2rad(35),
+            shift=0.015,
+            speed=choices.speed,
+        )
+        for number, side in enumerate((-1, 1))
+    ]
+    patterns = [_print(choices, motion.seed, width, height) for motion in motions]
+    sheets = [Rectangle(width, height, *of_one, choices.excursion) for of_one in zip(motions, patterns)]
+    return _scene(choices, *sheets)
+
+
+def wall(choices: Choices) -> Scene:
+    """Nothing but a wall of one brightness, for static sequences: `choices.distance` away and turned about y."""
+    T_rw = pose.from_rotation_vector((0, choices.tilt, 0), (0, 0, choices.distance))
+    return Scene((), Texture(np.full((2, 2, 4), choices.reflectivity, np.float32), 1.0), T_rw=T_rw)
+
+
+def target(choices: Choices) -> Scene:
+    """A calibration board, `choices.printed`, that is held still in one pose after another."""
+    board_ = TARGETS[choices.printed]
+    width, height = paper(board_)
+    handling = Handling(choices.seed, width, height, choices.hold_s, choices.reach, choices.speed)
+    return _scene(choices, Rectangle(width, height, handling, printed(board_), choices.excursion))
+
+
+#: The scenes by the name that an address calls them.
+SCENES: Mapping[str, Callable[[Choices], Scene]] = {
+    "sheet": sheet,
+    "board": board,
+    "strip": strip,
+    "pair": pair,
+    "wall": wall,
+    "target": target,
+}
+
+
+def _scene(choices: Choices, *surfaces: Surface) -> Scene:
+    hands = (Hand(choices.seed, surfaces, choices.speed),) if choices.hand else ()
+    return Scene(surfaces, _wall(choices.seed), hands)
+
+
+def _print(choices: Choices, seed: int, width: float, height: float) -> Texture:
+    color, infrared = (0.1, 0.95), (0.35, 0.9)
+    if choices.fine:
+        return fine_pattern(seed, width, height, color, infrared)
+    return smooth_pattern(seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
+
+
+def _wall(seed: int) -> Texture:
+    """Paler than the sheet, and so dark in places that a time-of-flight sensor gets no return."""
+    return smooth_pattern(seed + 1, *_WALL, (0.2, 0.05), 100.0, color=(0.3, 0.6), infrared=(0.12, 0.7))

@@ -1,0 +1,99 @@
+"""What covers the simulated surfaces: colour and infra-red reflectivity over material coordinates."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from drivers.simulated.shapes.raycast import lookup
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Reflectivities on a regular grid that is centred on a rectangle.
+
+    Attributes:
+        texels: (rows, columns, 4): red, green, blue and infra-red reflectivity, 0 to 1.
+        density: texels per metre.
+    """
+
+    texels: NDArray[np.float32]
+    density: float
+
+    def at(self, a: NDArray[np.float32], b: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Reflectivities (height, width, 4) at material coordinates (height, width) [m]; zero where they are NaN."""
+        rows, columns = self.texels.shape[:2]
+        density = np.float32(self.density)
+        return lookup(
+            self.texels, a * density + np.float32((columns - 1) / 2), b * density + np.float32((rows - 1) / 2)
+        )
+
+
+def smooth_pattern(
+    seed: int,
+    width: float,
+    height: float,
+    scales: tuple[float, ...],
+    density: float,
+    color: Range,
+    infrared: Range,
+) -> Texture:
+    """A random pattern without edges: noise of several sizes, independent in every channel.
+
+    Args:
+        seed: of the noise.
+        width, height: of the rectangle that is covered [m].
+        scales: deviations of the Gaussians that smooth the noise [m]; each counts half as much as the one before.
+        density: texels per metre.
+        color, infrared: lowest and highest reflectivity of red, green and blue, and of infra-red.
+    """
+    shape = (round(height * density) + 1, round(width * density) + 1)
+    generator = np.random.default_rng([seed, 3])
+    texels = np.empty((*shape, 4), np.float32)
+    for channel, (low, high) in enumerate((color, color, color, infrared)):
+        pattern = np.zeros(shape, np.float32)
+        for i, scale in enumerate(scales):
+            noise = gaussian_filter(generator.standard_normal(shape, np.float32), scale * density, mode="wrap")
+            pattern += 0.5**i * noise / noise.std()
+        texels[..., channel] = low + (high - low) * (0.5 + 0.5 * np.tanh(pattern))
+    return Texture(texels, density)
+
+
+def fine_pattern(
+    seed: int, width: float, height: float, color: Range, infrared: Range, density: float = 2500.0
+) -> Texture:
+    """A print with details of the size of a pixel: like most prints it varies more in brightness than in hue.
+
+    Noise smoothed by σ changes between dark and bright every 4.4 σ on average. The two sizes of detail here do so every
+    4.4 and 2.2 mm; an image of 640 pixels that is as wide as the simulated colour head's has one pixel for 1.8 mm at a
+    distance of 1 m. Two thirds of a channel's variance are common to all channels, which is what demosaicing relies on.
+
+    Args:
+        seed: of the noise.
+        width, height: of the rectangle that is covered [m].
+        color, infrared: lowest and highest reflectivity of red, green and blue, and of infra-red.
+        density: texels per metre.
+    """
+    shape = (round(height * density) + 1, round(width * density) + 1)
+    generator = np.random.default_rng([seed, 3])
+    planes = np.zeros((5, *shape), np.float32)  # what all channels share, and what each has for its own
+    for scale, part in ((0.001, 1.0), (0.0005, 0.7), (0.01, 0.7)):
+        for i in range(len(planes)):
+            noise = gaussian_filter(generator.standard_normal(shape, np.float32), scale * density, mode="wrap")
+            planes[i] += part * noise / noise.std()
+    patterns = np.tanh(np.sqrt(2 / 3) * planes[0] + np.sqrt(1 / 3) * planes[1:])
+    low, high = np.array([color, color, color, infrared], np.float32).T[:, :, None, None]
+    texels = np.moveaxis(low + (high - low) * (0.5 + 0.5 * patterns), 0, -1)
+    return Texture(np.ascontiguousarray(texels), density)
+
+
+def checkerboard(width: float, height: float, square: float, density: float = 1600.0) -> Texture:
+    """Squares of edge `square` [m] with reflectivities 0.25 and 0.85, blurred by 1 mm."""
+    shape = (round(height * density) + 1, round(width * density) + 1)
+    b, a = np.indices(shape) / density
+    black = (np.floor(a / square) + np.floor(b / square)) % 2 == 0
+    plane = gaussian_filter(np.where(black, 0.25, 0.85), 0.001 * density, mode="nearest").astype(np.float32)
+    return Texture(np.repeat(plane[..., None], 4, axis=-1), density)

@@ -1,0 +1,1 @@
+"""Simulated sensors: optics, exposure, noise."""

@@ -1,0 +1,63 @@
+"""A colour head that delivers the mosaic its sensor measured: of each pixel the channel behind its own filter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from drivers.contract.frame import Frame, Kind
+from drivers.simulated.sensors.color import SIGMA, Picture, digitize
+from drivers.simulated.sensors.exposure import Exposure, stream_of
+
+#: The arrangements of the filters there are: first row left and right, second row left and right.
+ORDERS = ("rggb", "bggr", "grbg", "gbrg")
+
+
+@dataclass(frozen=True)
+class Mosaic:
+    """What happens to light between the lens and the numbers.
+
+    Attributes:
+        order: of the filters, one of `ORDERS`.
+        blur_px: defocus: standard deviation of the Gaussian that each point of the scene becomes before the filters.
+        crosstalk: share c of what a pixel collects that its four neighbours read, a quarter each. Where the scene is
+            smooth, red pixels then read (1 − c) R + c G, blue ones alike, and green ones (1 − c) G + c (R + B) / 2.
+    """
+
+    order: str = "grbg"
+    blur_px: float = 0.0
+    crosstalk: float = 0.0
+
+    def expose(self, levels: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the pixels (height, width) collect of colours (height, width, 3)."""
+        if self.blur_px > 0:
+            levels = np.asarray(gaussian_filter(levels, (self.blur_px, self.blur_px, 0), mode="nearest"), np.float32)
+        mosaic = np.empty(levels.shape[:2], np.float32)
+        for place, letter in enumerate(self.order):
+            row, column = divmod(place, 2)
+            mosaic[row::2, column::2] = levels[row::2, column::2, "rgb".index(letter)]
+        return self._leak(mosaic) if self.crosstalk > 0 else mosaic
+
+    def _leak(self, mosaic: NDArray[np.float32]) -> NDArray[np.float32]:
+        framed = np.pad(mosaic, 1, mode="reflect")  # across the border the filters go on alternating
+        around = framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]
+        return ((1 - self.crosstalk) * mosaic + 0.25 * self.crosstalk * around).astype(np.float32)
+
+
+class Bayer:
+    """Stream `bayer` (bayer_<order>8)."""
+
+    def __init__(
+        self, name: str, picture: Picture, rate_hz: float, sigma: float = SIGMA, mosaic: Mosaic = Mosaic()
+    ) -> None:
+        self.camera = picture.camera
+        self.streams = (stream_of(name, "bayer", Kind.BAYER, f"bayer_{mosaic.order}8", picture.camera, rate_hz),)
+        self._picture = picture
+        self._sigma = sigma
+        self._mosaic = mosaic
+
+    def expose(self, exposure: Exposure) -> list[Frame]:
+        """Takes the mosaic of one exposure."""
+        levels = self._mosaic.expose(self._picture.take(exposure.moment))
+        return [exposure.frame(self.streams[0], self.camera, digitize(levels, self._sigma, exposure.generator))]

@@ -1,0 +1,88 @@
+"""One exposure: the moment that all heads of the simulated device see at once."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib.camera import Camera
+from drivers.contract.capabilities import ClockInfo, StreamInfo
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.simulated.scene.scene import Moment
+
+#: The simulated device's own clock; it counts from the first exposure.
+CLOCK = ClockInfo("simulated", 1e9)
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """What a head needs to take its frames.
+
+    Attributes:
+        seq: number of the exposure.
+        moment: what is where.
+        generator: source of this head's noise in this exposure.
+        t_ns: time since the first exposure [ns].
+        jitter_ns: what the stamp errs by [ns].
+        t_sigma_ns: standard deviation of that error [ns].
+    """
+
+    seq: int
+    moment: Moment
+    generator: np.random.Generator
+    t_ns: int
+    jitter_ns: int = 0
+    t_sigma_ns: int = 0
+
+    def frame(
+        self,
+        stream: StreamInfo,
+        camera: Camera,
+        data: NDArray[np.generic],
+        scale: float = 1.0,
+        geometry: Geometry = Geometry.NONE,
+        invalid: float | None = None,
+    ) -> Frame:
+        """A frame of this exposure; times count from the first exposure, as the device's ticks do."""
+        return Frame(
+            sensor=stream.sensor,
+            stream=stream.stream,
+            kind=stream.kind,
+            data=data,
+            encoding=stream.encoding,
+            t_host_ns=self.t_ns + self.jitter_ns,
+            t_arrival_ns=self.t_ns,
+            seq=self.seq,
+            scale=scale,
+            geometry=geometry,
+            invalid=invalid,
+            t_device_ticks=self.t_ns,
+            tick_hz=CLOCK.tick_hz,
+            clock_domain=CLOCK.domain,
+            t_sigma_ns=self.t_sigma_ns,
+            calib_id=camera.calib_id,
+        )
+
+
+class Head(Protocol):
+    """One optical head of the simulated device."""
+
+    @property
+    def camera(self) -> Camera:
+        """Its true camera model, which is also its factory calibration."""
+        ...
+
+    @property
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """What it delivers."""
+        ...
+
+    def expose(self, exposure: Exposure) -> list[Frame]:
+        """The frames of one exposure; a pure function of it."""
+        ...
+
+
+def stream_of(sensor: str, stream: str, kind: Kind, encoding: str, camera: Camera, rate_hz: float) -> StreamInfo:
+    """The stream of a head whose images have the camera's size."""
+    return StreamInfo(sensor, stream, kind, encoding, camera.width, camera.height, rate_hz, CLOCK)

@@ -1,0 +1,33 @@
+"""An infra-red head: how bright the scene is in the sensor's own light."""
+
+import numpy as np
+
+from calib.camera import Camera
+from drivers.contract.frame import Frame, Kind
+from drivers.simulated.scene.scene import Scene
+from drivers.simulated.sensors.active_light import returned
+from drivers.simulated.sensors.exposure import Exposure, stream_of
+from drivers.simulated.sensors.view import View
+
+#: Standard deviation of a pixel, in the unit of `active_light.WHITE`.
+SIGMA = 50.0
+
+
+class Infrared:
+    """Stream `ir` (mono16): what of the sensor's own light comes back, as the time-of-flight head's amplitude is."""
+
+    def __init__(self, name: str, camera: Camera, scene: Scene, rate_hz: float, sigma: float = SIGMA) -> None:
+        self.camera = camera
+        self.streams = (stream_of(name, "ir", Kind.IR, "mono16", camera, rate_hz),)
+        self._sigma = sigma
+        self._view = View(scene, camera)
+        self._wall = np.nan_to_num(returned(self._view.wall))
+
+    def expose(self, exposure: Exposure) -> list[Frame]:
+        """Takes the infra-red image of one exposure; a pixel at a rim holds the mean of what it sees."""
+        levels = self._wall.copy()
+        for sight in self._view.look(exposure.moment):
+            levels[sight.region] += sight.share * (np.nan_to_num(returned(sight)) - levels[sight.region])
+        levels += np.float32(self._sigma) * exposure.generator.standard_normal(levels.shape, np.float32)
+        pixels = np.clip(np.rint(levels), 0, 65535).astype("<u2")
+        return [exposure.frame(self.streams[0], self.camera, pixels)]

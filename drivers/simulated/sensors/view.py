@@ -1,0 +1,92 @@
+"""What one camera sees of a scene: the wall once for all, the bodies before it anew for every exposure."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calib import pose
+from calib.camera import Camera
+from drivers.simulated.scene.body import Appearance, Body
+from drivers.simulated.scene.scene import Moment, Scene
+
+#: What a body's outline may miss of it [px].
+_MARGIN = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Sight(Appearance):
+    """What a region of an image sees of one body.
+
+    Attributes:
+        region: rows and columns of the image; outside there is nothing of the body.
+    """
+
+    region: tuple[slice, slice]
+
+
+class View:
+    """A scene through one camera.
+
+    Attributes:
+        rays: unit direction of every pixel in the sensor frame, (height, width, 3).
+        wall: what the camera would see without any body: a `Sight` of the whole image, its `share` 1.
+    """
+
+    def __init__(self, scene: Scene, camera: Camera) -> None:
+        self._camera = camera
+        self.rays = np.ascontiguousarray(camera.rays())
+        self.wall = self._look_at_wall(scene)
+
+    def look(self, moment: Moment) -> tuple[Sight, ...]:
+        """What the camera sees of each body; whatever hides another comes after it."""
+        return tuple(self._look_at(body) for body in moment.bodies)
+
+    def shadow(
+        self,
+        body: Body,
+        distance: NDArray[np.float32],
+        region: tuple[slice, slice],
+        light_s: tuple[float, float, float],
+    ) -> NDArray[np.bool_]:
+        """Where in a region (height, width) a body keeps a light from what the pixels see.
+
+        Args:
+            body: what may be in between.
+            distance: radial distance that the pixels of the region see [m].
+            region: rows and columns of the image.
+            light_s: position of the light in the sensor frame [m].
+        """
+        points_s = self.rays[region] * distance[..., None].astype(np.float64)
+        return body.shadowed(points_s, np.asarray(light_s), self._camera.T_rs)
+
+    def _look_at(self, body: Body) -> Sight:
+        region = self._region(body)
+        seen = body.cast(np.ascontiguousarray(self.rays[region]), self._camera.T_rs)
+        return Sight(seen.share, seen.distance, seen.cosine, seen.albedo, region)
+
+    def _look_at_wall(self, scene: Scene) -> Sight:
+        T_ws = pose.inverse(scene.T_rw) @ self._camera.T_rs
+        directions_w = self.rays @ T_ws[:3, :3].T
+        with np.errstate(divide="ignore"):
+            distance = -T_ws[2, 3] / directions_w[..., 2]
+        distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
+        points_w = (T_ws[:3, 3] + directions_w * distance[..., None]).astype(np.float32)
+        return Sight(
+            share=np.ones_like(distance, np.float32),
+            distance=distance.astype(np.float32),
+            cosine=np.abs(directions_w[..., 2]).astype(np.float32),
+            albedo=scene.wall.at(points_w[..., 0], points_w[..., 1]),
+            region=(slice(0, self._camera.height), slice(0, self._camera.width)),
+        )
+
+    def _region(self, body: Body) -> tuple[slice, slice]:
+        """Rows and columns that contain a body, empty when it is out of sight."""
+        pixels = self._camera.project(body.outline()).reshape(-1, 2)
+        pixels = pixels[np.isfinite(pixels).all(axis=1)]
+        if not pixels.size:
+            return slice(0, 0), slice(0, 0)
+        size = np.array([self._camera.width, self._camera.height])
+        low = np.clip(np.floor(pixels.min(axis=0)) - _MARGIN, 0, size).astype(int)
+        high = np.clip(np.ceil(pixels.max(axis=0)) + _MARGIN + 1, 0, size).astype(int)
+        return slice(low[1], high[1]), slice(low[0], high[0])

@@ -1,0 +1,1 @@
+"""Analytic shapes and their ray casters."""

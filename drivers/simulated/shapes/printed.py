@@ -1,0 +1,54 @@
+"""Calibration boards as the simulated device knows them: their print, and where they are."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+
+from calib.board.artwork import raster
+from calib.board.target import Charuco, Chessboard, Circles, Target
+from calib.pose import Pose
+from drivers.simulated.scene.body import Surface
+from drivers.simulated.scene.texture import Texture
+
+#: The boards by the name that an address calls them; all about 0.36 × 0.24 m.
+TARGETS: Mapping[str, Target] = {
+    "chessboard": Chessboard(8, 5, 0.04),
+    "charuco": Charuco(9, 6, 0.04, 0.03, "4x4_50"),
+    "circles": Circles(8, 5, 0.04, 0.02),
+}
+
+#: Texels per metre, and the deviation of the blur [m] that stands for lenses: heads see points, not areas.
+_DENSITY, _BLUR = 2000.0, 0.0012
+#: Reflectivities of ink and paper, in all light: black ink is not black in infra-red.
+_INK, _PAPER = 0.15, 0.85
+
+
+def printed(target: Target) -> Texture:
+    """The print with its white rim, centred on the paper."""
+    white = gaussian_filter(raster(target, _DENSITY)[0], _BLUR * _DENSITY, mode="nearest")
+    texels = np.repeat((_INK + (_PAPER - _INK) * white)[..., None], 4, axis=-1)
+    return Texture(texels.astype(np.float32), _DENSITY)
+
+
+def paper(target: Target) -> tuple[float, float]:
+    """Width and height of the paper [m]."""
+    rows, columns = raster(target, _DENSITY)[0].shape
+    return columns / _DENSITY, rows / _DENSITY
+
+
+def board_pose(surface: Surface, target: Target, t: float) -> Pose:
+    """The true `T_rb` of a board at time `t` [s]: its frame b is that of `calib.views`, r is the rig.
+
+    Args:
+        surface: of the scene `target`: `parse(uri).build().scene.surfaces[0]`.
+        target: what is printed on it, one of `TARGETS`.
+        t: after the first exposure; of exposure k it is k divided by the rate.
+    """
+    corners = surface.at(t).grid(2, 2)
+    along, down = corners[0, 1] - corners[0, 0], corners[1, 0] - corners[0, 0]
+    x, y = along / np.linalg.norm(along), down / np.linalg.norm(down)
+    T_rb = np.eye(4)
+    T_rb[:3, :3] = np.stack([x, y, np.cross(x, y)], axis=1)
+    T_rb[:3, 3] = corners.mean(axis=(0, 1)) - T_rb[:3, :3] @ target.points().mean(axis=0)
+    return T_rb

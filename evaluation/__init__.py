@@ -1,0 +1,1 @@
+"""Measures the product: experiments, benchmarks, and scenes of their own; not part of the wheel."""

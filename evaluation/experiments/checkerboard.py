@@ -1,0 +1,29 @@
+"""E4 and E5 on a checker board: black and white are everywhere, so that the bias of the black nearly cancels."""
+
+import numpy as np
+
+from evaluation.experiments import flat_boards
+from evaluation.experiments.base import Context, Findings
+from evaluation.experiments.flat_board_report import Published
+from evaluation.experiments.flat_boards import QUICK, Board, Settings, places, squared_print
+
+__all__ = ["QUICK", "TITLE", "Settings", "run"]
+
+TITLE = "E4 and E5: a flat checker board under a bias that depends on the amplitude"
+
+#: Edge of a square [m].
+SQUARE_M = 0.05
+
+_ACROSS, _DOWN = places()
+
+BOARD = Board(
+    "checker board",
+    squared_print((np.floor(_ACROSS / SQUARE_M) + np.floor(_DOWN / SQUARE_M)) % 2 == 0),
+    Published((0.16, 0.11), (0.12, 0.09)),
+    {"FlexPad": 0.16 / 0.12, "NURBS": 1.0},
+)
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Tracks the board with NURBS and FlexPad, with the Euclidean fitness and the likelihood."""
+    return flat_boards.run(BOARD, settings, context)

@@ -1,0 +1,73 @@
+"""Searches that do not begin where the last frame ended: what ablations put in the place of a warm start."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Problem
+from abs_service.tracking.session import OptimizerSettings
+
+
+@dataclass(frozen=True)
+class Forgetful:
+    """A search that begins every frame where the motion prior says, but as if it had never searched before.
+
+    Attributes:
+        search: the search, of which step size and covariance are forgotten.
+    """
+
+    search: OptimizerSettings
+
+    def build(self, dimension: int, generator: np.random.Generator) -> "FromPrediction":
+        """A search in `dimension` dimensions that draws from `generator`."""
+        return FromPrediction(partial(self.search.build, dimension, generator))
+
+
+@dataclass(frozen=True)
+class Cold:
+    """A search that begins every frame where the first one began.
+
+    Attributes:
+        search: the search.
+    """
+
+    search: OptimizerSettings
+
+    def build(self, dimension: int, generator: np.random.Generator) -> "FromRest":
+        """A search in `dimension` dimensions that draws from `generator`."""
+        return FromRest(partial(self.search.build, dimension, generator))
+
+
+class FromPrediction:
+    """See `Optimizer` for the interface, and `Forgetful`."""
+
+    def __init__(self, make: Callable[[], Optimizer]):
+        self._make = make
+
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        """Searches near start with a search that is made for it."""
+        return self._make().follow(problem, start, budget)
+
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        """Explores with a search that is made for it."""
+        return self._make().explore(problem, start, budget)
+
+
+class FromRest:
+    """See `Optimizer` for the interface, and `Cold`."""
+
+    def __init__(self, make: Callable[[], Optimizer]):
+        self._make = make
+        self._rest: list[NDArray[np.float64]] = []
+
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        """Searches near where the first frame began."""
+        return self._make().follow(problem, self._rest[0], budget)
+
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+        """Explores around start, which is where all frames begin from then on."""
+        self._rest = [start]
+        return self._make().explore(problem, start, budget)
