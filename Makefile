@@ -3,7 +3,6 @@ PYTHON ?= python3
 JSON ?= bench.json
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input install --quiet
-DEVICES := oak kinect realsense import
 COMPILE := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --fork-strategy fewest \
 	--generate-hashes --no-annotate --custom-compile-command "make constraints" $(ARGS)
 
@@ -11,28 +10,25 @@ help: ## list the targets; ARGS="…" is passed on to the command behind a targe
 	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
 run: .venv/.run ## start the service on the simulated camera: make run ARGS="--duration 20", ARGS=my-rig.toml
 	@$(BIN)/abs-service run $(ARGS)
-test: .venv/.dev ## the tests without the slow ones: make test ARGS="tests/calib -x"
+test: .venv/.all ## the tests without the slow ones: make test ARGS="tests/calib -x"
 	@$(BIN)/pytest -m "not slow and not hardware" $(ARGS)
 check: lint test ## everything a change has to pass
-lint: .venv/.dev ## format, style, types, import contracts
+lint: .venv/.all ## format, style, types, import contracts
 	@$(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/basedpyright --pythonpath $(BIN)/python && $(BIN)/lint-imports
-format: .venv/.dev ## rewrite the code in the project's format
+format: .venv/.all ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
-evaluate: .venv/.run ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
+evaluate: .venv/.all ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
 	@$(BIN)/python -m evaluation $(ARGS)
-bench: .venv/.dev ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
+bench: .venv/.all ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
 	@$(BIN)/pytest evaluation/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
-cost: .venv/.dev ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
+cost: .venv/.all ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
 	@$(BIN)/python -m evaluation.benchmarks.growth docs/images/cost.png
-proto: .venv/.dev ## regenerate the wire code from proto/absmsg/v1/*.proto
+proto: .venv/.all ## regenerate the wire code from proto/absmsg/v1/*.proto
 	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/absmsg/v1/*.proto
-constraints: .venv/.dev ## resolve the pinned requirements again: make constraints ARGS=--upgrade
+constraints: .venv/.all ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
-	@$(COMPILE) --group dev --constraints constraints.txt --output-file constraints-dev.txt
-	@$(COMPILE) $(DEVICES:%=--extra %) --constraints constraints-dev.txt --output-file constraints-devices.txt
-	@$(COMPILE) --extra peers --constraints constraints-dev.txt --output-file constraints-peers.txt
-peers: .venv/.peers ## install what `make evaluate ARGS=peers` compares with; without, those rows are left out
-devices: .venv/.devices ## install every device SDK as well; the tests of their drivers are skipped without
+	@$(COMPILE) --group dev --all-extras --constraints constraints.txt --output-file constraints-all.txt
+all: .venv/.all ## install everything: device SDKs, what `make evaluate ARGS=peers` compares with, tools
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -44,10 +40,6 @@ clean: ## remove .venv and every cache
 .venv/.run: .venv/.created constraints.txt pyproject.toml
 	@echo "Installing the pinned requirements, a few minutes the first time"
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
-.venv/.dev: .venv/.run constraints-dev.txt
-	@$(PIP) --require-hashes --only-binary :all: -r constraints-dev.txt && touch $@
-.venv/.devices: .venv/.dev constraints-devices.txt
-	@$(PIP) --require-hashes --only-binary :all: -r constraints-devices.txt && touch $@
-.venv/.peers: .venv/.dev constraints-peers.txt
-	@$(PIP) --require-hashes --only-binary :all: -r constraints-peers.txt && touch $@
-.PHONY: help run test check lint format evaluate bench cost proto constraints devices peers clean
+.venv/.all: .venv/.run constraints-all.txt
+	@$(PIP) --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
+.PHONY: help run test check lint format evaluate bench cost proto constraints all clean

@@ -16,10 +16,10 @@ import abs_service
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("abs_service", "drivers", "calib")
-CONSTRAINTS = ("constraints.txt", "constraints-dev.txt", "constraints-devices.txt", "constraints-peers.txt")
+CONSTRAINTS = ("constraints.txt", "constraints-all.txt")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
-DEVICES = [line for name, extra in EXTRAS.items() if name != "peers" for line in extra]
+OPTIONAL = [line for extra in EXTRAS.values() for line in extra]
 
 # Where a path means the same on every Linux machine.
 STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
@@ -52,9 +52,8 @@ def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
     ("name", "wanted"),
     [
         ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
-        ("constraints-dev.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
-        ("constraints-devices.txt", DEVICES),
-        ("constraints-peers.txt", EXTRAS["peers"]),
+        ("constraints-all.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
+        ("constraints-all.txt", OPTIONAL),
     ],
 )
 def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> None:
@@ -72,10 +71,7 @@ def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
 
 
 def test_running_and_testing_use_the_same_versions() -> None:
-    tested = _pins("constraints-dev.txt")
-    assert _pins("constraints.txt").items() <= tested.items()
-    for more in (_pins("constraints-devices.txt"), _pins("constraints-peers.txt")):
-        assert {pin: version for pin, version in more.items() if tested.get(pin, version) != version} == {}
+    assert _pins("constraints.txt").items() <= _pins("constraints-all.txt").items()
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)
@@ -103,7 +99,7 @@ def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
 
 
 def test_what_the_packages_import_is_required_by_name() -> None:
-    wanted = [*PROJECT["project"]["dependencies"], *DEVICES, *EXTRAS["peers"]]
+    wanted = [*PROJECT["project"]["dependencies"], *OPTIONAL]
     declared = {_normal(Requirement(line).name) for line in wanted}
     distributions = dict(packages_distributions()) | {"pydantic_core": ["pydantic"]}  # pydantic's own, documented by it
     undeclared = {

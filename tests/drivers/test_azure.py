@@ -44,7 +44,7 @@ MODES = {"depth": "NFOV_2X2BINNED", "color": "720P"}
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    av = pytest.importorskip("av", reason="needs PyAV: make devices")
+    av = pytest.importorskip("av", reason="needs PyAV: make all")
     path = tmp_path / "kinect.mkv"
     with av.open(str(path), "w", options={"allow_raw_vfw": "1"}) as file:
         file.metadata.update({"K4A_DEVICE_SERIAL_NUMBER": "0042", "K4A_START_OFFSET_NS": "336000"})
@@ -105,7 +105,7 @@ def test_cameras_are_those_of_the_sdk(recording: Path) -> None:
 
 
 def test_what_is_no_such_recording_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("av", reason="needs PyAV: make devices")
+    pytest.importorskip("av", reason="needs PyAV: make all")
     for name, content in (("nothing.mkv", None), ("text.mkv", b"no MKV")):
         if content is not None:
             (tmp_path / name).write_bytes(content)
@@ -166,7 +166,7 @@ def test_any_bytes_are_an_image_or_refused(content: bytes, encoding: str, begins
 
 
 def test_a_real_recording_has_colours_where_its_depth_says(shared_data: Path) -> None:
-    pytest.importorskip("av", reason="needs PyAV: make devices")
+    pytest.importorskip("av", reason="needs PyAV: make all")
     path = shared_data / "tof_azure_kinect_pyk4a" / "recording.mkv"
     if not path.is_file():
         pytest.skip(f"no file {path}")

@@ -30,7 +30,7 @@ from tests.sample import oak
 try:
     dai = library.load()
 except SdkMissingError as error:
-    pytest.skip(f"{error}, or  make devices", allow_module_level=True)
+    pytest.skip(f"{error}, or  make all", allow_module_level=True)
 
 SAMPLE = Path(__file__).parents[2] / "recordings" / "sample_oak"
 URI = f"oak://?recording={SAMPLE}"

@@ -29,7 +29,7 @@ def bag(tmp_path: Path) -> Path:
 
 
 def write(path: Path, model: str = "Brown Conrady", units: float = 0.0001, with_info: bool = True) -> Path:
-    pytest.importorskip("rosbags", reason="needs rosbags: make devices")
+    pytest.importorskip("rosbags", reason="needs rosbags: make all")
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -133,7 +133,7 @@ def test_the_colour_camera_is_where_the_transform_says(bag: Path) -> None:
 
 
 def test_what_is_no_such_bag_is_named(tmp_path: Path) -> None:
-    pytest.importorskip("rosbags", reason="needs rosbags: make devices")
+    pytest.importorskip("rosbags", reason="needs rosbags: make all")
     (tmp_path / "text.bag").write_bytes(b"no bag")
     with pytest.raises(FootageError, match=r"text.bag: this is no ROS 1 bag"):
         RealsenseBag(tmp_path / "text.bag")
@@ -184,7 +184,7 @@ def test_any_image_message_is_an_image_or_refused(
 
 def test_a_real_bag_puts_depth_where_its_colours_are(shared_data: Path) -> None:
     """The room's corner, 1.9 m away, is at column 326 of the depth image and at column 330 of the colours."""
-    pytest.importorskip("rosbags", reason="needs rosbags: make devices")
+    pytest.importorskip("rosbags", reason="needs rosbags: make all")
     path = shared_data / "realsense_bag" / "single_depth_color_640x480.bag"
     if not path.is_file():
         pytest.skip(f"no file {path}")

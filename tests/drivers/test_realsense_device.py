@@ -32,7 +32,7 @@ from tests.drivers.software_realsense import SIZE, SoftwareCamera
 try:
     rs = library.load()
 except SdkMissingError as error:
-    pytest.skip(f"{error}, or  make devices", allow_module_level=True)
+    pytest.skip(f"{error}, or  make all", allow_module_level=True)
 
 
 @pytest.fixture

@@ -75,7 +75,7 @@ def test_real_recordings_are_tracked(
 ) -> None:
     if not (shared_data / file).is_file():
         pytest.skip(f"no file {shared_data / file}")
-    pytest.importorskip({"azure": "av", "realsense": "rosbags"}.get(layout, "numpy"), reason="make devices")
+    pytest.importorskip({"azure": "av", "realsense": "rosbags"}.get(layout, "numpy"), reason="make all")
     estimates = tracked(tmp_path, shared_data / file, layout)
     assert len(estimates) == exposures
     for theta in estimates:

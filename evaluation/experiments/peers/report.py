@@ -54,7 +54,7 @@ def sections(
         "error: distance of every vertex from its own material; surface error: from the nearest point of the surface."
     ]
     if missing:
-        said.append(f"Not installed here, so left out: {', '.join(missing)} (`make peers`).")
+        said.append(f"Not installed here, so left out: {', '.join(missing)} (`make all`).")
     if slow:
         said.append(f"Followed ten frames of one seed only, because they take so long: {', '.join(slow)}.")
     about = Section("What is compared", tuple(said))

@@ -77,7 +77,7 @@ def bench() -> Iterator[OakBench]:
     try:
         library.load()
     except SdkMissingError as error:
-        pytest.skip(f"{error}, or  make devices")
+        pytest.skip(f"{error}, or  make all")
     with tempfile.TemporaryDirectory() as folder:
         second = shutil.copytree(SAMPLE, Path(folder) / "second")
         yield OakBench(second)

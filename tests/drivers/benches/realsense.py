@@ -53,7 +53,7 @@ def bench() -> Iterator[RealsenseBench]:
     try:
         library.load()
     except SdkMissingError as error:
-        pytest.skip(f"{error}, or  make devices")
+        pytest.skip(f"{error}, or  make all")
     made = RealsenseBench()
     try:
         yield made
