@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 import drivers
 from drivers.contract.device import AddressError, Device, DeviceInfo
 from drivers.contract.discovery import Availability, Found
-from drivers.encoding.foreign_recording import Footage
+from drivers.encoding.foreign_recording import ForeignRecording
 
 #: What a driver may take longer than it was given before it is left behind [s].
 _GRACE_S = 1.0
@@ -37,11 +37,11 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     return driver.open_device(uri, clock)
 
 
-def open_recording(program: str, path: Path) -> Footage:
+def open_recording(program: str, path: Path) -> ForeignRecording:
     """Opens a file that another program recorded with `drivers.<program>.open_recording`; only that driver is imported.
 
     Raises:
-        FootageError: it cannot be read.
+        ForeignRecordingError: it cannot be read.
     """
     return importlib.import_module(f"drivers.{program}").open_recording(path)
 

@@ -10,7 +10,7 @@ from zenoh import ext
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
 from abs_service.bus.session import Role, open_session
-from drivers.contract.callbacks import outside_daemons
+from drivers.contract.callbacks import from_non_daemon_thread
 
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
@@ -75,7 +75,7 @@ class ZenohBus:
         def on_query(query: zenoh.Query) -> None:
             query.reply(key, payload(), encoding=f"{ENCODING};{message}")
 
-        return self._keep(outside_daemons(lambda: self._session.declare_queryable(key, on_query)))
+        return self._keep(from_non_daemon_thread(lambda: self._session.declare_queryable(key, on_query)))
 
     def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.ask`."""
@@ -90,7 +90,7 @@ class ZenohBus:
             on_sample(self._sample(sample))
 
         key = self._key(pattern)
-        return self._keep(outside_daemons(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
+        return self._keep(from_non_daemon_thread(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
 
     def show_alive(self, component: str) -> Subscription:
         """See `contract.Bus.show_alive`."""
@@ -105,7 +105,7 @@ class ZenohBus:
             on_change(component, sample.kind == zenoh.SampleKind.PUT)
 
         tokens, key = self._session.liveliness(), self._key(keys.live("**"))
-        return self._keep(outside_daemons(lambda: tokens.declare_subscriber(key, on_token, history=True)))
+        return self._keep(from_non_daemon_thread(lambda: tokens.declare_subscriber(key, on_token, history=True)))
 
     def close(self) -> None:
         """Ends the session; may be called again."""
@@ -155,7 +155,7 @@ class _Announcement:
         self._key = key
         self._message = message
         self._last: bytes | None = None
-        self._queryable = outside_daemons(lambda: session.declare_queryable(key, self._on_query))
+        self._queryable = from_non_daemon_thread(lambda: session.declare_queryable(key, self._on_query))
 
     def put(self, payload: bytes, attachment: bytes = b"") -> None:
         self._last = payload

@@ -14,38 +14,38 @@ from abs_service.capture import sensor_metadata
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
-from drivers.encoding.foreign_recording import Footage, FootageError
+from drivers.encoding.foreign_recording import ForeignRecording, ForeignRecordingError
 from drivers.encoding.mcap_file import McapFile
 
 
-def write(path: Path, rig: str, footage: Footage, rig_toml: bytes) -> Mapping[tuple[str, str], int]:
+def write(path: Path, rig: str, recording: ForeignRecording, rig_toml: bytes) -> Mapping[tuple[str, str], int]:
     """Writes a recording.
 
     Args:
         path: file to write; one that exists is replaced.
         rig: name of the rig.
-        footage: what it holds.
+        recording: what it holds.
         rig_toml: configuration to attach, empty for none.
 
     Returns:
         Number of images by (sensor, stream).
 
     Raises:
-        FootageError: it cannot be read, or there is nothing in it.
+        ForeignRecordingError: it cannot be read, or there is nothing in it.
         OSError: the file cannot be written.
     """
-    frames = iter(footage.frames())
+    frames = iter(recording.frames())
     first = next(frames, None)
     if first is None:
-        raise FootageError("there is no image in it")
+        raise ForeignRecordingError("there is no image in it")
     counts: Counter[tuple[str, str]] = Counter()
     with path.open("wb") as stream:
         file = McapFile(stream)
         if rig_toml:
             file.attach("rig.toml", "text/toml", rig_toml, first.t_host_ns)
-        _write_cameras(file, rig, footage.cameras, first.t_host_ns)
+        _write_cameras(file, rig, recording.cameras, first.t_host_ns)
         console = Console(stderr=True)
-        for frame in track(chain([first], frames), "importing", footage.total, console=console, transient=True):
+        for frame in track(chain([first], frames), "importing", recording.total, console=console, transient=True):
             _write_frame(file, rig, frame)
             counts[frame.key] += 1
         file.finish()

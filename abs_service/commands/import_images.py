@@ -41,7 +41,7 @@ from abs_service.commands import camera_file, import_file
 from abs_service.commands.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.frame import Geometry
-from drivers.encoding.foreign_recording import Footage
+from drivers.encoding.foreign_recording import ForeignRecording
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 from drivers.opening import open_recording
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Imports; what is wrong with the images or options is raised as an error of this package or of `drivers`."""
     rig_toml = _rig(arguments.rig)
-    footage = _footage(arguments)
+    footage = _foreign_recording(arguments)
     if arguments.out.exists():
         raise ImportOptionError(f"{arguments.out}: exists already; remove it or choose another name")
     partial = arguments.out.with_name(f"{arguments.out.name}.partial")
@@ -94,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def _footage(arguments: argparse.Namespace) -> Footage:
+def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
     if arguments.layout not in RECORDINGS:
         return ImageFolder(_streams(arguments, _cameras(arguments)))
     for option in ("camera", "mask"):

@@ -15,7 +15,7 @@ from calib.camera import Camera
 from drivers.azure import calibration
 from drivers.azure.calibration import CalibrationError
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 
 #: Sensor, stream and kind by the title of a track.
 _TRACKS: Mapping[str, tuple[str, str, Kind]] = {
@@ -36,7 +36,7 @@ class AzureRecording:
         total: None: only reading tells how many images there are.
 
     Raises:
-        FootageError: it cannot be read, has no or a strange calibration, or PyAV is not installed.
+        ForeignRecordingError: it cannot be read, has no or a strange calibration, or PyAV is not installed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -51,14 +51,16 @@ class AzureRecording:
             self._offset_us = int(tags.get("K4A_START_OFFSET_NS", "0")) // 1000
             self._serial = tags.get("K4A_DEVICE_SERIAL_NUMBER", "")
         if not titles or name not in attached:
-            raise FootageError(f"{path}: no recording of an Azure Kinect: it lacks {name if titles else 'every image'}")
+            raise ForeignRecordingError(
+                f"{path}: no recording of an Azure Kinect: it lacks {name if titles else 'every image'}"
+            )
         self._color, _, color = tags.get("K4A_COLOR_MODE", "").partition("_")
         modes = {"color": color} if "COLOR" in titles else {}
         modes |= {"depth": tags.get("K4A_DEPTH_MODE", "PASSIVE_IR")} if titles & {"DEPTH", "IR"} else {}
         try:
             self.cameras: Mapping[str, Camera] = calibration.cameras(bytes(attached[name]), modes)
         except CalibrationError as error:
-            raise FootageError(f"{path}: {error}") from error
+            raise ForeignRecordingError(f"{path}: {error}") from error
 
     def frames(self) -> Iterator[Frame]:
         """Every image, numbered by its time: those of one capture have one number, and what was lost has one, too."""
@@ -78,7 +80,7 @@ class AzureRecording:
         try:
             data = color(self._color, content, camera) if kind == Kind.COLOR else words(content, camera)
         except ValueError as error:
-            raise FootageError(f"{self._path}: {stream} at {time_us} µs: {error}") from error
+            raise ForeignRecordingError(f"{self._path}: {stream} at {time_us} µs: {error}") from error
         is_depth = kind == Kind.DEPTH
         return Frame(
             sensor=sensor,
@@ -159,9 +161,11 @@ def _container(path: Path) -> Iterator[Any]:
         import av  # noqa: PLC0415  an extra
         import av.error  # noqa: PLC0415
     except ImportError as error:
-        raise FootageError(f"{path}: MKV is read by PyAV, which the extra `import` of abs-service installs") from error
+        raise ForeignRecordingError(
+            f"{path}: MKV is read by PyAV, which the extra `import` of abs-service installs"
+        ) from error
     try:
         with av.open(str(path)) as file:
             yield file
     except (OSError, ValueError, av.error.FFmpegError) as error:
-        raise FootageError(f"{path}: cannot be read as MKV: {error}") from error
+        raise ForeignRecordingError(f"{path}: cannot be read as MKV: {error}") from error

@@ -8,7 +8,7 @@ from typing import TypeVar
 T = TypeVar("T")
 
 
-def outside_daemons(declare: Callable[[], T]) -> T:
+def from_non_daemon_thread(declare: Callable[[], T]) -> T:
     """Declares something with a callback to zenoh, from a thread that is no daemon; raises what `declare` raises.
 
     The thread in which zenoh calls back is a daemon if the declaring thread is one. The interpreter does not wait for

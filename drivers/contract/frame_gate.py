@@ -12,10 +12,10 @@ from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
 #: States in which nothing comes until the device is started again.
-_OVER = frozenset({DeviceState.CLOSED, DeviceState.FAILED})
+_ENDED = frozenset({DeviceState.CLOSED, DeviceState.FAILED})
 
 
-class Delivery:
+class FrameGate:
     """The way from one device to its sink. Every method may be called from any thread.
 
     Args:
@@ -62,19 +62,19 @@ class Delivery:
         with self._lock:
             if self._released:
                 raise DeviceError("the device was closed; it has to be opened anew")
-            if self._sink is not None and self._state not in _OVER:
+            if self._sink is not None and self._state not in _ENDED:
                 return None
             self._sink = sink
             self._epoch += 1
             self._ended = ended = threading.Event()
-            self.report(DeviceState.OPENING, reason)
+            self.report_state(DeviceState.OPENING, reason)
             return ended
 
     def end(self, reason: str) -> None:
         """Reports CLOSED, unless the end was reported already, and lets nothing through any more once it returns."""
         with self._lock:
-            if self._state not in _OVER:
-                self.report(DeviceState.CLOSED, reason)
+            if self._state not in _ENDED:
+                self.report_state(DeviceState.CLOSED, reason)
             self._state = DeviceState.CLOSED
             self._sink = None
             self._ended.set()
@@ -90,7 +90,7 @@ class Delivery:
         with self._lock:
             self._epoch += 1
 
-    def report(self, state: DeviceState, reason: str) -> None:
+    def report_state(self, state: DeviceState, reason: str) -> None:
         """Reports a state; ignored when nothing is being delivered, so that a late thread cannot revive a device."""
         with self._lock:
             if self._sink is not None:
@@ -103,18 +103,18 @@ class Delivery:
             if self._sink is not None:
                 self._sink.on_warning(condition, message)
 
-    def truth(self, truth: Truth) -> None:
+    def deliver_truth(self, truth: Truth) -> None:
         """Delivers what a simulated device knows."""
         with self._lock:
             if self._sink is not None:
                 self._sink.on_truth(truth)
 
-    def frame(self, frame: Frame) -> None:
+    def deliver(self, frame: Frame) -> None:
         """Delivers a frame, or counts it as dropped: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
         with self._lock:
-            obstacle = self._obstacle(frame)
-            if obstacle:
-                self._counters[obstacle] += 1
+            cause = self._drop_cause(frame)
+            if cause:
+                self._counters[cause] += 1
             elif self._sink is not None:
                 self._counters["frames"] += 1
                 self._sink.on_frame(frame)
@@ -124,7 +124,7 @@ class Delivery:
         with self._lock:
             self._counters[cause] += number
 
-    def _obstacle(self, frame: Frame) -> str:
+    def _drop_cause(self, frame: Frame) -> str:
         stream = self._streams.get(frame.key)
         if self._sink is None:
             return "after_stop"

@@ -7,11 +7,11 @@ from calib.camera import Camera
 from drivers.contract.frame import Frame
 
 
-class FootageError(Exception):
+class ForeignRecordingError(Exception):
     """A recording of another program that cannot be read; names the file and what is wrong with it."""
 
 
-class Footage(Protocol):
+class ForeignRecording(Protocol):
     """Frames of a few sensors, with what took them. Their host times count from wherever the recording's do."""
 
     @property
@@ -28,6 +28,6 @@ class Footage(Protocol):
         """Every frame in the order of its time, read when it is asked for.
 
         Raises:
-            FootageError: the recording is damaged.
+            ForeignRecordingError: the recording is damaged.
         """
         ...

@@ -8,16 +8,16 @@ from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
-from drivers.contract.frame_gate import Delivery
+from drivers.contract.frame_gate import FrameGate
 from drivers.kinect1.assembly import CAUSES
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
-from drivers.kinect1.channel import Channel, camera_of, describe
+from drivers.kinect1.stream_decoder import StreamDecoder, camera_of, stream_info
 from drivers.kinect1.transport.commands import Commands
-from drivers.kinect1.transport.losses import LossWatch
+from drivers.kinect1.transport.loss_monitor import LossMonitor
 from drivers.kinect1.transport.port import Port
 
 #: The longest that the thread waits for packets before it looks whether it shall stop [s].
-_PATIENCE_S = 0.1
+_READ_TIMEOUT_S = 0.1
 
 
 class Kinect1Device:
@@ -50,30 +50,30 @@ class Kinect1Device:
         self.info = info
         self.controls = _controls(self._camera, streams)
         self.capabilities = Capabilities(
-            tuple(describe(stream, info.serial) for stream in streams), self.controls.infos
+            tuple(stream_info(stream, info.serial) for stream in streams), self.controls.infos
         )
         self.cameras: Mapping[str, Camera] = {
             described.sensor: camera_of(stream, self._plane)
             for stream, described in zip(streams, self.capabilities.streams)
         }
-        self._delivery = Delivery(self.capabilities.streams, CAUSES)
-        self._channels: Mapping[int, Channel] = {}
+        self._gate = FrameGate(self.capabilities.streams, CAUSES)
+        self._decoders: Mapping[int, StreamDecoder] = {}
         self._thread = threading.Thread()
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, and images of all streams that were dropped, by `CAUSES`."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
         """How the clocks of the streams fit, and how many of their packets never came since the last start."""
-        return {name: value for channel in self._channels.values() for name, value in channel.gauges.items()}
+        return {name: value for decoder in self._decoders.values() for name, value in decoder.gauges.items()}
 
     def start(self, sink: Sink) -> None:
         """Begins to deliver in a new epoch; a device that is running goes on as it is.
@@ -81,20 +81,20 @@ class Kinect1Device:
         Raises:
             DeviceError: the device was closed.
         """
-        if stop := self._delivery.begin(sink, "beginning the camera's streams"):
+        if stop := self._gate.begin(sink, "beginning the camera's streams"):
             arguments = (stop, self._thread)
             self._thread = threading.Thread(target=self._run, args=arguments, name="kinect1", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
         """Ends delivery; after it returns the sink is not called again."""
-        self._delivery.end("stopped")
+        self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
         """Stops and lets go of the camera."""
-        self._delivery.release()
+        self._gate.release()
         self.stop()
         self._port.close()
 
@@ -104,42 +104,44 @@ class Kinect1Device:
         try:
             self._stream(stop)
         except DeviceError as error:
-            self._delivery.report(DeviceState.FAILED, str(error))
+            self._gate.report_state(DeviceState.FAILED, str(error))
         except Exception as error:
-            self._delivery.report(DeviceState.FAILED, f"the driver failed: {error!r}")
+            self._gate.report_state(DeviceState.FAILED, f"the driver failed: {error!r}")
             raise
 
     def _stream(self, stop: threading.Event) -> None:
-        channels = {stream.form.endpoint: Channel(stream, self.info.serial, self._plane) for stream in self._streams}
-        self._channels = channels
+        decoders = {
+            stream.form.endpoint: StreamDecoder(stream, self.info.serial, self._plane) for stream in self._streams
+        }
+        self._decoders = decoders
         counted = dict.fromkeys(CAUSES, 0)
-        losses = LossWatch(self._clock, self._delivery.warn)
+        losses = LossMonitor(self._clock, self._gate.warn)
         delivered = 0
 
         def count() -> None:
             for cause in CAUSES:
-                total = sum(channel.dropped[cause] for channel in channels.values())
-                self._delivery.drop(cause, total - counted[cause])
+                total = sum(decoder.dropped[cause] for decoder in decoders.values())
+                self._gate.drop(cause, total - counted[cause])
                 counted[cause] = total
 
         with ExitStack() as ending:
             ending.callback(count)
-            reader = ending.enter_context(self._port.reading(tuple(channels)))
+            reader = ending.enter_context(self._port.reading(tuple(decoders)))
             for stream in self._streams:
                 ending.callback(self._end, stream)
                 self._camera.start(stream)
-            self._delivery.report(DeviceState.STREAMING, "the camera delivers")
+            self._gate.report_state(DeviceState.STREAMING, "the camera delivers")
             while not stop.is_set():
-                for transfer in reader.read(_PATIENCE_S):
+                for transfer in reader.read(_READ_TIMEOUT_S):
                     if stop.is_set():
                         return
-                    for stamped in channels[transfer.endpoint].take(transfer, self._delivery.epoch):
+                    for stamped in decoders[transfer.endpoint].decode(transfer, self._gate.epoch):
                         if stamped.stepped:
-                            self._delivery.begin_epoch()
-                        self._delivery.frame(stamped.frame)
+                            self._gate.begin_epoch()
+                        self._gate.deliver(stamped.frame)
                         delivered += 1
                 count()
-                losses.see(delivered, sum(counted.values()))
+                losses.update(delivered, sum(counted.values()))
 
     def _end(self, stream: Stream) -> None:
         with suppress(DeviceError):  # it may be gone

@@ -9,21 +9,21 @@ from drivers.contract.device import DeviceError
 from drivers.contract.discovery import Found, choose
 from drivers.kinect1.address import Address
 from drivers.kinect1.device import Kinect1Device
-from drivers.kinect1.transport.attached import Backends, attached, fresh_backend
-from drivers.kinect1.transport.port import Port, Streaming
+from drivers.kinect1.transport.attached import BackendFactory, fresh_backend, list_attached
+from drivers.kinect1.transport.port import Port, ReaderFactory
 from drivers.kinect1.transport.ring import IsochronousRing
 
 
-def find(backends: Backends = fresh_backend) -> list[Found]:
+def find(backends: BackendFactory = fresh_backend) -> list[Found]:
     """All cameras that are attached."""
-    return [one.found for one in attached(backends())]
+    return [one.found for one in list_attached(backends())]
 
 
 def open_camera(
     address: Address,
     clock: Callable[[], int],
-    backends: Backends = fresh_backend,
-    streaming: Streaming = IsochronousRing,
+    backends: BackendFactory = fresh_backend,
+    streaming: ReaderFactory = IsochronousRing,
 ) -> Kinect1Device:
     """Opens the camera that an address means.
 
@@ -37,7 +37,7 @@ def open_camera(
         DeviceError: none is attached, or it cannot be opened; says what to do.
     """
     backend = backends()
-    there_are = attached(backend)
+    there_are = list_attached(backend)
     chosen = choose([one.found for one in there_are], "kinect1", address.serial)
     (device,) = [one.device for one in there_are if one.found is chosen]
     port = Port(device, backend, streaming, clock)

@@ -7,7 +7,7 @@ import numpy as np
 
 from calib.camera import Camera
 from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.o3r import tof_info
 from drivers.o3r.chunks import Chunk, ChunkError, ChunkType, messages
 from drivers.o3r.tof_info import TofInfo
@@ -36,7 +36,7 @@ class O3rBuffers:
         total: number of frames.
 
     Raises:
-        FootageError: it cannot be read, is no such file, or a message lacks distances or calibration.
+        ForeignRecordingError: it cannot be read, is no such file, or a message lacks distances or calibration.
     """
 
     def __init__(self, path: Path) -> None:
@@ -50,9 +50,9 @@ class O3rBuffers:
             distance = first[ChunkType.DISTANCE]
             camera = _info(first).camera(distance.width, distance.height)
         except OSError as error:
-            raise FootageError(f"{path}: cannot be read: {error.strerror}") from error
+            raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror}") from error
         except ChunkError as error:
-            raise FootageError(f"{path}: {error}") from error
+            raise ForeignRecordingError(f"{path}: {error}") from error
         self.cameras: Mapping[str, Camera] = {SENSOR: camera}
         images = {ChunkType.DISTANCE, *(chunk for _, chunk in _STREAMS.values())}
         self.total = sum(len(images & chunks.keys()) for chunks in self._exposures)
@@ -63,7 +63,7 @@ class O3rBuffers:
             for chunks in self._exposures:
                 yield from exposure(chunks, self.cameras[SENSOR].calib_id)
         except ChunkError as error:
-            raise FootageError(f"{self._path}: {error}") from error
+            raise ForeignRecordingError(f"{self._path}: {error}") from error
 
 
 def exposure(chunks: Mapping[int, Chunk], calib_id: str) -> Iterator[Frame]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.device import DeviceError, DeviceState, Sink
-from drivers.contract.frame_gate import Delivery
+from drivers.contract.frame_gate import FrameGate
 from drivers.oak.connection import CLOCK, Connection, HostTimes
 from drivers.oak.eeprom import EepromError
 from drivers.oak.heads import cameras
@@ -54,17 +54,17 @@ class OakDevice:
             self._release()
             raise
         self.capabilities = Capabilities(streams, connection.controls.infos, connection.sync_roles)
-        self._delivery = Delivery(streams, causes=["undecodable"])
+        self._gate = FrameGate(streams, causes=["undecodable"])
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, and messages that were no image of their stream: `undecodable`."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
@@ -78,7 +78,7 @@ class OakDevice:
 
     def start(self, sink: Sink) -> None:
         """See `drivers.contract.device.Device.start`."""
-        stop = self._delivery.begin(sink, "the pipeline runs already")
+        stop = self._gate.begin(sink, "the pipeline runs already")
         if stop is None:
             return
         self._clocks = {role: self._connection.host_times() for role in self._connection.queues}
@@ -90,20 +90,20 @@ class OakDevice:
             for role in self._connection.queues
         ]
         self._flowing = len(self._threads)
-        self._delivery.report(DeviceState.STREAMING, "images follow")
+        self._gate.report_state(DeviceState.STREAMING, "images follow")
         for thread in self._threads:
             thread.start()
 
     def stop(self) -> None:
         """See `drivers.contract.device.Device.stop`."""
-        self._delivery.end("stopped")
+        self._gate.end("stopped")
         # From within the sink it would wait for threads that wait for the sink; they end by themselves.
         if threading.current_thread() not in self._threads:
             _join(self._threads)
 
     def close(self) -> None:
         """See `drivers.contract.device.Device.close`."""
-        self._delivery.release()
+        self._gate.release()
         self.stop()
         self._release()
 
@@ -131,7 +131,7 @@ class OakDevice:
                     if picture is not None and not stop.is_set():
                         self._deliver(role, picture)
                 except PictureError:
-                    self._delivery.drop("undecodable")
+                    self._gate.drop("undecodable")
         except QueueClosed as error:
             with self._lock:
                 self._flowing -= 1
@@ -139,9 +139,9 @@ class OakDevice:
             if is_last:
                 over = self._connection.ended
                 state = DeviceState.CLOSED if over else DeviceState.FAILED
-                self._delivery.report(state, over or f"the device is gone: {error}")
+                self._gate.report_state(state, over or f"the device is gone: {error}")
         except Exception as error:
-            self._delivery.report(DeviceState.FAILED, f"{role.sensor}/{role.stream} broke: {error!r}")
+            self._gate.report_state(DeviceState.FAILED, f"{role.sensor}/{role.stream} broke: {error!r}")
             raise
 
     def _deliver(self, role: Role, picture: Picture) -> None:
@@ -151,9 +151,9 @@ class OakDevice:
         came_ns = self._connection.stamp(picture, t_arrival_ns) - picture.half_exposure_ns
         stamp = self._clocks[role].stamp(made.t_device_ticks, came_ns)
         if stamp.stepped:
-            self._delivery.begin_epoch()
+            self._gate.begin_epoch()
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        self._delivery.frame(replace(made, **times, epoch=self._delivery.epoch))
+        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch))
 
 
 def _join(threads: Sequence[threading.Thread]) -> None:

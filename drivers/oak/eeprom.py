@@ -18,7 +18,7 @@ from calib.pose import Pose
 UNITS_M = (1.0, 0.01, 0.001, 0.0254, 0.3048)
 
 #: The socket that stands for none.
-NOWHERE = -1
+NO_SOCKET = -1
 
 
 class EepromError(ValueError):
@@ -26,7 +26,7 @@ class EepromError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Link:
+class Extrinsics:
     """The pose that maps coordinates of a camera to those of the camera at socket `to` [m]."""
 
     to: int
@@ -38,11 +38,11 @@ class Poses:
     """The cameras of one device.
 
     Attributes:
-        links: by socket.
+        extrinsics: by socket.
         rectifications: by socket, the rotation of a stereo camera's coordinates to its rectified ones.
     """
 
-    links: Mapping[int, Link] = field(default_factory=dict)
+    extrinsics: Mapping[int, Extrinsics] = field(default_factory=dict)
     rectifications: Mapping[int, Pose] = field(default_factory=dict)
 
     def between(self, reference: int, socket: int) -> Pose:
@@ -69,11 +69,11 @@ class Poses:
 
     def _to_root(self, socket: int) -> tuple[int, Pose]:
         T, seen = pose.identity(), {socket}
-        while socket in self.links and self.links[socket].to != NOWHERE:
-            link = self.links[socket]
-            if link.to in seen:
+        while socket in self.extrinsics and self.extrinsics[socket].to != NO_SOCKET:
+            extrinsics = self.extrinsics[socket]
+            if extrinsics.to in seen:
                 raise EepromError(f"the poses of cameras {sorted(seen)} go round in a circle")
-            T, socket = link.T_to_camera @ T, link.to
+            T, socket = extrinsics.T_to_camera @ T, extrinsics.to
             seen.add(socket)
         return socket, T
 
@@ -86,7 +86,7 @@ def parse(content: str | bytes) -> Poses:
     """
     try:
         eeprom = json.loads(content)
-        links = {int(socket): _link(camera["extrinsics"]) for socket, camera in eeprom["cameraData"]}
+        extrinsics = {int(socket): _extrinsics(camera["extrinsics"]) for socket, camera in eeprom["cameraData"]}
         stereo = eeprom.get("stereoRectificationData") or {}
         rotations = {
             int(stereo[f"{side.lower()}CameraSocket"]): pose.from_rotation(
@@ -95,16 +95,16 @@ def parse(content: str | bytes) -> Poses:
             for side in ("Left", "Right")
             if stereo.get(f"rectifiedRotation{side}")
         }
-        return Poses(links, rotations)
+        return Poses(extrinsics, rotations)
     except KeyError as error:
         raise EepromError(f"the calibration lacks {error}") from error
     except (ValueError, TypeError, AttributeError, IndexError, OverflowError, RecursionError) as error:
         raise EepromError(f"the calibration is not understood: {error}") from error
 
 
-def _link(extrinsics: Mapping[str, Any]) -> Link:
+def _extrinsics(extrinsics: Mapping[str, Any]) -> Extrinsics:
     rotation, t = extrinsics["rotationMatrix"], extrinsics["translation"]
     if not rotation:
-        return Link(NOWHERE, pose.identity())
+        return Extrinsics(NO_SOCKET, pose.identity())
     translation = UNITS_M[int(extrinsics.get("lengthUnit", 1))] * np.array([t["x"], t["y"], t["z"]], float)
-    return Link(int(extrinsics["toCameraSocket"]), pose.from_rotation(rotation, translation))
+    return Extrinsics(int(extrinsics["toCameraSocket"]), pose.from_rotation(rotation, translation))

@@ -44,7 +44,7 @@ _USERS_PROTOCOL = os.environ.get("DEPTHAI_PROTOCOL")
 
 
 @contextmanager
-def naming(uri: str) -> Iterator[None]:
+def translated_errors(uri: str) -> Iterator[None]:
     """Turns what depthai raises, plain `RuntimeError`s mostly, into errors that name the device and what to do.
 
     Raises:

@@ -47,10 +47,10 @@ def connect(address: Address) -> Connection:
     dai = library.load(address.network)
     # Without a name, the only device; with one, depthai finds it by itself, on the network as well.
     name = address.name or choose(discover(library.SEARCH_MS / 1000, address.network), "oak", "").info.serial
-    with library.naming(address.uri):
+    with library.translated_errors(address.uri):
         device = dai.Device(dai.DeviceInfo(name))
     try:
-        with library.naming(address.uri):
+        with library.translated_errors(address.uri):
             return _run(dai, device, address)
     except DeviceError:
         device.close()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from drivers.contract.clock import Stamp
 from drivers.contract.device import AddressError, DeviceInfo
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak import library, recording
 from drivers.oak.address import Address
 from drivers.oak.connection import Connection
@@ -21,7 +21,7 @@ _REMEMBERED = 64
 
 
 def connect(address: Address, path: Path) -> Connection:
-    """Starts to play a recording at its own pace.
+    """Starts to play a recording at its own clock.
 
     Raises:
         AddressError: it cannot be played.
@@ -31,10 +31,10 @@ def connect(address: Address, path: Path) -> Connection:
     try:
         files: Mapping[Path, Role] = recording.files(path)
         poses, rate_hz = recording.poses(path), recording.rate_hz(path)
-    except (FootageError, EepromError) as error:
+    except (ForeignRecordingError, EepromError) as error:
         raise AddressError(f"{address.uri}: {error}") from error
     dai = library.load()
-    with library.naming(address.uri):
+    with library.translated_errors(address.uri):
         pipeline = dai.Pipeline(False)
         queues = {}
         for file, role in files.items():
@@ -44,11 +44,11 @@ def connect(address: Address, path: Path) -> Connection:
             queues[role] = OutputQueue(node.out.createOutputQueue(maxSize=_QUEUE, blocking=False))
         pipeline.start()
     info = DeviceInfo(uri=address.uri, model="OAK recording", serial=path.name)
-    pace = Pace()
-    return Connection(info, queues, poses, rate_hz, pipeline.stop, lambda: pace, ended="the recording has ended")
+    clock = PlaybackClock()
+    return Connection(info, queues, poses, rate_hz, pipeline.stop, lambda: clock, ended="the recording has ended")
 
 
-class Pace:
+class PlaybackClock:
     """Host times of what is played: those of the exposure that was played last, wherever its streams have got to.
 
     depthai plays a few per cent too slowly and each stream by itself, which no clock would do.

@@ -20,9 +20,9 @@ from mcap.reader import make_reader
 from calib import pose
 from calib.camera import Camera
 from drivers.contract.frame import Frame
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak import eeprom
-from drivers.oak.eeprom import NOWHERE, UNITS_M, EepromError, Link, Poses
+from drivers.oak.eeprom import NO_SOCKET, UNITS_M, EepromError, Extrinsics, Poses
 from drivers.oak.heads import cameras
 from drivers.oak.picture import Picture, PictureError, frame, number
 from drivers.oak.roles import ROLES, Role
@@ -42,7 +42,7 @@ class OakRecording:
         total: number of images.
 
     Raises:
-        FootageError: a file cannot be read or has another name than the streams have, or a camera is not understood.
+        ForeignRecordingError: a file cannot be read, its name is no stream's, or a camera is not understood.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,7 +52,7 @@ class OakRecording:
             first = {role: picture(_first(file)) for role, file in self._files.items()}
             self.cameras: Mapping[str, Camera] = cameras(first, poses(path))
         except (EepromError, PictureError) as error:
-            raise FootageError(f"{path}: {error}") from error
+            raise ForeignRecordingError(f"{path}: {error}") from error
 
     def frames(self) -> Iterator[Frame]:
         """Every image by its time on the host's clock, which counts from when that host was started."""
@@ -61,20 +61,20 @@ class OakRecording:
             try:
                 yield frame(picture(message), role, self.cameras[role.sensor].calib_id, ())
             except PictureError as error:
-                raise FootageError(f"{self._files[role]}: image {message.sequenceNum}: {error}") from error
+                raise ForeignRecordingError(f"{self._files[role]}: image {message.sequenceNum}: {error}") from error
 
 
 def files(path: Path) -> dict[Path, Role]:
     """The files of a recording and what they hold.
 
     Raises:
-        FootageError: there is none, or its name says nothing.
+        ForeignRecordingError: there is none, or its name says nothing.
     """
     found = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     strange = [file for file in found if file.stem not in ROLES]
     if strange or not found:
         what = f"{strange[0]}: what it holds is told by its name" if strange else f"{path}: there is no MCAP file in it"
-        raise FootageError(f"{what}; it must be one of {', '.join(f'{name}.mcap' for name in ROLES)}")
+        raise ForeignRecordingError(f"{what}; it must be one of {', '.join(f'{name}.mcap' for name in ROLES)}")
     return {file: ROLES[file.stem] for file in found}
 
 
@@ -82,7 +82,7 @@ def poses(path: Path) -> Poses:
     """Where the cameras are: as the calibration beside the files says, or else the images themselves.
 
     Raises:
-        FootageError: a file cannot be read.
+        ForeignRecordingError: a file cannot be read.
         EepromError: the calibration is not understood.
     """
     file = (path if path.is_dir() else path.parent) / CALIBRATION
@@ -90,16 +90,16 @@ def poses(path: Path) -> Poses:
         if file.is_file():
             return eeprom.parse(file.read_bytes())
     except OSError as error:
-        raise FootageError(f"{file}: cannot be read: {error.strerror}") from error
+        raise ForeignRecordingError(f"{file}: cannot be read: {error.strerror}") from error
     messages = map(_first, files(path))
-    return Poses({message.instanceNum: _link(message.transformation.extrinsics) for message in messages})
+    return Poses({message.instanceNum: _extrinsics(message.transformation.extrinsics) for message in messages})
 
 
 def rate_hz(path: Path) -> float:
     """Images per second of a recording's first file, by its first two; 30 if there are not two.
 
     Raises:
-        FootageError: a file cannot be read.
+        ForeignRecordingError: a file cannot be read.
     """
     first, *more = (_ns(message.tsDevice) for message in islice(_messages(next(iter(files(path)))), 2))
     return 1e9 / (more[0] - first) if more and more[0] > first else 30.0
@@ -128,16 +128,16 @@ def picture(message: Any) -> Picture:
     )
 
 
-def _link(extrinsics: Any) -> Link:
+def _extrinsics(extrinsics: Any) -> Extrinsics:
     rotation = _matrix(extrinsics.rotationMatrix)
     if rotation.shape != (3, 3):
-        return Link(NOWHERE, pose.identity())
+        return Extrinsics(NO_SOCKET, pose.identity())
     t = extrinsics.translation
     unit = UNITS_M[extrinsics.lengthUnit] if extrinsics.lengthUnit < len(UNITS_M) else np.nan
     try:
-        return Link(extrinsics.toCameraSocket, pose.from_rotation(rotation, unit * np.array([t.x, t.y, t.z])))
+        return Extrinsics(extrinsics.toCameraSocket, pose.from_rotation(rotation, unit * np.array([t.x, t.y, t.z])))
     except ValueError:
-        return Link(NOWHERE, pose.identity())
+        return Extrinsics(NO_SOCKET, pose.identity())
 
 
 def _matrix(matrix: Any) -> np.ndarray:
@@ -159,19 +159,19 @@ def _ns(stamp: Any) -> int:
 def _first(path: Path) -> Any:
     message = next(_messages(path), None)
     if message is None:
-        raise FootageError(f"{path}: there are no messages {SCHEMA} in it")
+        raise ForeignRecordingError(f"{path}: there are no messages {SCHEMA} in it")
     return message
 
 
 def _count(path: Path) -> int:
-    with _naming(path), path.open("rb") as stream:
+    with _translated_errors(path), path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
         return sum(summary.statistics.channel_message_counts.values()) if summary and summary.statistics else 0
 
 
 def _messages(path: Path) -> Iterator[Any]:
     """The images of a file in the order of their times."""
-    with _naming(path), path.open("rb") as stream:
+    with _translated_errors(path), path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         types: dict[int, Any] = {}
         for schema, _, message in reader.iter_messages():
@@ -191,10 +191,10 @@ def _type(descriptors: bytes) -> Any:
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _translated_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise FootageError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except Exception as error:  # what the readers of MCAP and protobuf raise about damaged bytes may be anything
-        raise FootageError(f"{path}: this is no recording of depthai, or a damaged one: {error!r}") from error
+        raise ForeignRecordingError(f"{path}: this is no recording of depthai, or a damaged one: {error!r}") from error

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind, Reference
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.realsense.picture import unpadded
 from drivers.realsense.ros import Bag
 from drivers.realsense.streams import ROLES, Role, StreamError, camera
 
 _STREAM = r"/device_0/sensor_\d+/(?P<type>[A-Za-z]+)_(?P<index>\d+)/"
 _DEPTH_UNITS = r"/device_0/sensor_\d+/option/Depth Units/value"
-_ABOUT = rf"{_STREAM}(?P<what>image/metadata|info/camera_info|tf/0)|{_DEPTH_UNITS}"
+_INFO_TOPICS = rf"{_STREAM}(?P<what>image/metadata|info/camera_info|tf/0)|{_DEPTH_UNITS}"
 _IMAGES = f"{_STREAM}image/data"
 
 #: Encodings of ROS and ours, by kind.
@@ -38,7 +38,7 @@ _ENCODINGS: Mapping[Kind, Mapping[str, str]] = {
 
 
 @dataclass
-class _About:
+class _BagInfo:
     """What the bag says of its images: cameras and poses by topic, and of every image by topic and time."""
 
     infos: dict[str, Any] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class RealsenseBag:
         total: number of images.
 
     Raises:
-        FootageError: it cannot be read, `rosbags` is not installed, or its calibration is not understood.
+        ForeignRecordingError: it cannot be read, `rosbags` is not installed, or its calibration is not understood.
     """
 
     def __init__(self, path: Path) -> None:
@@ -67,16 +67,16 @@ class RealsenseBag:
         counts = self._bag.counts()
         self._roles = {topic: role for topic in counts if (role := _role(topic)) is not None}
         if not self._roles:
-            raise FootageError(
+            raise ForeignRecordingError(
                 f"{path}: there are no images of a RealSense in this bag, its topics are {sorted(counts)}"
             )
-        self._about = self._read_about()
+        self._info = self._read_info()
         self.cameras: Mapping[str, Camera] = {}
         self.total = sum(counts[topic] for topic in self._roles)
         try:
             cameras = {topic: self._camera(topic) for topic in self._roles}
         except (StreamError, ValueError) as error:
-            raise FootageError(f"{path}: {error}") from error
+            raise ForeignRecordingError(f"{path}: {error}") from error
         self.cameras = {self._roles[topic].sensor: camera for topic, camera in cameras.items()}
 
     def frames(self) -> Iterator[Frame]:
@@ -84,7 +84,7 @@ class RealsenseBag:
         offsets_ns: dict[str, int] = {}
         for message in self._bag.messages(_IMAGES):
             if message.topic in self._roles:
-                metadata = self._about.metadata.get((message.topic, message.time_ns), {})
+                metadata = self._info.metadata.get((message.topic, message.time_ns), {})
                 domain = metadata.get("timestamp_domain", "unknown").lower()
                 stamp = message.content.header.stamp
                 ticks = stamp.sec * 1_000_000_000 + stamp.nanosec
@@ -93,7 +93,7 @@ class RealsenseBag:
                 try:
                     yield self._frame(self._roles[message.topic], message.content, metadata, t_ns, ticks, domain)
                 except StreamError as error:
-                    raise FootageError(f"{self._path}: {message.topic}: {error}") from error
+                    raise ForeignRecordingError(f"{self._path}: {message.topic}: {error}") from error
 
     def _frame(self, role: Role, image: Any, metadata: Mapping[str, str], t_ns: int, ticks: int, domain: str) -> Frame:
         is_depth = role.kind == Kind.DEPTH
@@ -107,7 +107,7 @@ class RealsenseBag:
             t_host_ns=t_ns,
             t_arrival_ns=t_ns,
             seq=image.header.seq,
-            scale=self._about.depth_unit_m if is_depth else 1.0,
+            scale=self._info.depth_unit_m if is_depth else 1.0,
             geometry=role.geometry,
             invalid=0.0 if is_depth else None,
             t_device_ticks=ticks,
@@ -119,26 +119,26 @@ class RealsenseBag:
             calib_id=self.cameras[role.sensor].calib_id,
         )
 
-    def _read_about(self) -> _About:
-        about = _About()
-        for message in self._bag.messages(_ABOUT):
-            match = re.fullmatch(_ABOUT, message.topic)
+    def _read_info(self) -> _BagInfo:
+        info = _BagInfo()
+        for message in self._bag.messages(_INFO_TOPICS):
+            match = re.fullmatch(_INFO_TOPICS, message.topic)
             what = match["what"] if match else None
             images = f"{message.topic.removesuffix(what or '')}image/data"
             if what is None:
-                about.depth_unit_m = float(message.content.data)
+                info.depth_unit_m = float(message.content.data)
             elif what == "image/metadata":
-                about.metadata.setdefault((images, message.time_ns), {})[message.content.key] = message.content.value
+                info.metadata.setdefault((images, message.time_ns), {})[message.content.key] = message.content.value
             else:
-                (about.infos if what == "info/camera_info" else about.transforms)[images] = message.content
-        if not 0 < about.depth_unit_m < math.inf:
-            raise FootageError(f"{self._path}: a depth unit of {about.depth_unit_m} m is none")
-        return about
+                (info.infos if what == "info/camera_info" else info.transforms)[images] = message.content
+        if not 0 < info.depth_unit_m < math.inf:
+            raise ForeignRecordingError(f"{self._path}: a depth unit of {info.depth_unit_m} m is none")
+        return info
 
     def _camera(self, topic: str) -> Camera:
-        if topic not in self._about.infos or topic not in self._about.transforms:
+        if topic not in self._info.infos or topic not in self._info.transforms:
             raise StreamError(f"{topic} has no camera_info or no transform beside it")
-        info, transform = self._about.infos[topic], self._about.transforms[topic]
+        info, transform = self._info.infos[topic], self._info.transforms[topic]
         q, t = transform.rotation, transform.translation
         T_sensor_reference = pose.from_quaternion([q.x, q.y, q.z, q.w], [t.x, t.y, t.z])
         matrix = (info.K[0], info.K[4], info.K[2], info.K[5])

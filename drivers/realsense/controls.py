@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
-from drivers.realsense.library import naming
+from drivers.realsense.library import translated_errors
 from drivers.realsense.streams import Role
 
 #: Words of the option that ties several cameras together, by its numbers.
@@ -58,12 +58,12 @@ def _number(uri: str, sensor: Any, key: Any, name: str, unit: str, scale: float 
     factor = scale if scale is not None else 1 / max(limits.max, 1e-9)
 
     def read() -> Value:
-        with naming(uri):
+        with translated_errors(uri):
             return float(sensor.get_option(key)) * factor
 
     def write(value: Value) -> None:
         steps = round((float(value) / factor - limits.min) / limits.step) if limits.step > 0 else 0
-        with naming(uri):
+        with translated_errors(uri):
             sensor.set_option(key, limits.min + steps * limits.step if limits.step > 0 else float(value) / factor)
 
     return Control(ControlInfo(name, ControlKind.NUMBER, unit, limits.min * factor, limits.max * factor), read, write)
@@ -71,11 +71,11 @@ def _number(uri: str, sensor: Any, key: Any, name: str, unit: str, scale: float 
 
 def _switch(uri: str, sensor: Any, key: Any, name: str) -> Control:
     def read() -> Value:
-        with naming(uri):
+        with translated_errors(uri):
             return bool(sensor.get_option(key))
 
     def write(value: Value) -> None:
-        with naming(uri):
+        with translated_errors(uri):
             sensor.set_option(key, float(bool(value)))
 
     return Control(ControlInfo(name, ControlKind.SWITCH), read, write)
@@ -83,12 +83,12 @@ def _switch(uri: str, sensor: Any, key: Any, name: str) -> Control:
 
 def _sync(uri: str, sensor: Any, key: Any) -> Control:
     def read() -> Value:
-        with naming(uri):
+        with translated_errors(uri):
             mode = int(sensor.get_option(key))
         return next((word for word, number in _SYNC.items() if number == mode), "slave")
 
     def write(value: Value) -> None:
-        with naming(uri):
+        with translated_errors(uri):
             sensor.set_option(key, float(_SYNC[str(value)]))
 
     return Control(ControlInfo("sync_role", ControlKind.CHOICE, choices=tuple(_SYNC)), read, write)

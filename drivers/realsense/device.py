@@ -1,6 +1,6 @@
 """A RealSense as a device, on librealsense's sensors and callbacks.
 
-librealsense calls back from threads of its own. The callbacks only put frames into an inbox and take no other lock: a
+librealsense calls back from threads of its own. The callbacks only put frames into an queue and take no other lock: a
 Python exception must not reach the SDK, and whoever stops a sensor waits for its callbacks.
 """
 
@@ -15,10 +15,10 @@ from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo, SyncRole
 from drivers.contract.clock import DeviceClock
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
-from drivers.contract.frame_gate import Delivery
+from drivers.contract.frame_gate import FrameGate
 from drivers.realsense import controls
-from drivers.realsense.inbox import Inbox
-from drivers.realsense.library import naming
+from drivers.realsense.frame_queue import FrameQueue
+from drivers.realsense.library import translated_errors
 from drivers.realsense.picture import CLOCK, HARDWARE, Picture, frame, from_frame
 from drivers.realsense.profiles import Stream, cameras
 from drivers.realsense.streams import Role
@@ -36,7 +36,7 @@ _NO_METADATA = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Used:
+class UsedSensor:
     """A sensor of the camera, and its streams that are used."""
 
     sensor: Any
@@ -57,7 +57,9 @@ class RealsenseDevice:
         DeviceError: its calibration is not understood.
     """
 
-    def __init__(self, rs: Any, camera: Any, info: DeviceInfo, used: Sequence[Used], clock: Callable[[], int]) -> None:
+    def __init__(
+        self, rs: Any, camera: Any, info: DeviceInfo, used: Sequence[UsedSensor], clock: Callable[[], int]
+    ) -> None:
         self.info = info
         self._rs = rs
         self._camera = camera
@@ -68,29 +70,29 @@ class RealsenseDevice:
         self._warned = False
         self._thread = threading.Thread()
         self._clocks: dict[Role, DeviceClock] = {}
-        self._inbox: Inbox[tuple[Role, Any, int]] = Inbox()
+        self._queue: FrameQueue[tuple[Role, Any, int]] = FrameQueue()
         streams = [stream for one in used for stream in one.streams]
         try:
             self.cameras: Mapping[str, Camera] = cameras(streams)
         except ValueError as error:
             raise DeviceError(f"{info.uri}: {error}") from error
-        with naming(info.uri):
+        with translated_errors(info.uri):
             sensors = {number: (one.sensor, one.streams[0].role) for number, one in enumerate(used)}
             self.controls = controls.make(rs, info.uri, sensors)
             roles = tuple(SyncRole) if controls.can_sync(rs, sensors) else (SyncRole.FREE,)
         infos = tuple(_info(stream) for stream in streams)
         self.capabilities = Capabilities(infos, self.controls.infos, roles)
-        self._delivery = Delivery(infos, causes=["overrun", "undecodable"])
+        self._gate = FrameGate(infos, causes=["overrun", "undecodable"])
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered; `overrun`: newer ones came before they were taken; `undecodable` ones."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
@@ -104,26 +106,26 @@ class RealsenseDevice:
     def start(self, sink: Sink) -> None:
         """See `drivers.contract.device.Device.start`."""
         with self._lock:
-            stop = self._delivery.begin(sink, "opening the camera's sensors")
+            stop = self._gate.begin(sink, "opening the camera's sensors")
             if stop is None:
                 return
             self._halt()  # what ended by itself still holds its sensors
-            self._inbox = Inbox(4 * sum(len(one.streams) for one in self._used))
+            self._queue = FrameQueue(4 * sum(len(one.streams) for one in self._used))
             self._clocks = {stream.role: DeviceClock(CLOCK) for one in self._used for stream in one.streams}
             try:
-                with naming(self.info.uri):
-                    self._open_sensors(self._inbox)
+                with translated_errors(self.info.uri):
+                    self._open_sensors(self._queue)
             except DeviceError as error:
                 self._halt()
-                self._delivery.report(DeviceState.FAILED, str(error))
+                self._gate.report_state(DeviceState.FAILED, str(error))
                 raise
-            self._thread = threading.Thread(target=self._pump, args=(stop, self._inbox), name="realsense", daemon=True)
-            self._delivery.report(DeviceState.STREAMING, "images follow")
+            self._thread = threading.Thread(target=self._pump, args=(stop, self._queue), name="realsense", daemon=True)
+            self._gate.report_state(DeviceState.STREAMING, "images follow")
             self._thread.start()
 
     def stop(self) -> None:
         """See `drivers.contract.device.Device.stop`."""
-        self._delivery.end("stopped")
+        self._gate.end("stopped")
         with self._lock:
             self._halt()
             thread = self._thread
@@ -132,27 +134,27 @@ class RealsenseDevice:
 
     def close(self) -> None:
         """See `drivers.contract.device.Device.close`."""
-        self._delivery.release()
+        self._gate.release()
         self.stop()
 
     def end(self, reason: str) -> None:
         """Says that nothing will come any more; made for callbacks."""
-        self._inbox.end(reason)
+        self._queue.end(reason)
 
-    def _open_sensors(self, inbox: Inbox[tuple[Role, Any, int]]) -> None:
+    def _open_sensors(self, queue: FrameQueue[tuple[Role, Any, int]]) -> None:
         for one in self._used:
             roles = {stream.profile.unique_id(): stream.role for stream in one.streams}
             one.sensor.open([stream.profile for stream in one.streams])
             self._running.append(one.sensor)
-            one.sensor.start(self._callback(roles, inbox))
+            one.sensor.start(self._callback(roles, queue))
 
-    def _callback(self, roles: Mapping[int, Role], inbox: Inbox[tuple[Role, Any, int]]) -> Callable[[Any], None]:
+    def _callback(self, roles: Mapping[int, Role], queue: FrameQueue[tuple[Role, Any, int]]) -> Callable[[Any], None]:
         def take(image: Any) -> None:
             try:
                 role = roles.get(image.get_profile().unique_id())
                 if role is not None:
                     image.keep()
-                    inbox.put((role, image, self._clock()))
+                    queue.put((role, image, self._clock()))
             except Exception:  # whatever it is, it must not reach the SDK
                 _log.exception("%s: a frame was lost", self.info.uri)
 
@@ -168,19 +170,19 @@ class RealsenseDevice:
                 except RuntimeError:  # a sensor that was not started, or a camera that is gone
                     continue
 
-    def _pump(self, stop: threading.Event, inbox: Inbox[tuple[Role, Any, int]]) -> None:
+    def _pump(self, stop: threading.Event, queue: FrameQueue[tuple[Role, Any, int]]) -> None:
         latest = time.monotonic()
         while not stop.is_set():
-            item = inbox.take(_LOOK_S)
-            self._delivery.drop("overrun", inbox.dropped())
+            item = queue.take(_LOOK_S)
+            self._gate.drop("overrun", queue.dropped())
             if item is not None:
                 latest = time.monotonic()
                 self._deliver(*item)
-            elif inbox.ended():
-                self._delivery.report(DeviceState.CLOSED, inbox.ended())
+            elif queue.ended():
+                self._gate.report_state(DeviceState.CLOSED, queue.ended())
                 return
             elif time.monotonic() - latest > _SILENT_S and not self._is_connected():
-                self._delivery.report(DeviceState.FAILED, "the camera is gone")
+                self._gate.report_state(DeviceState.FAILED, "the camera is gone")
                 return
 
     def _is_connected(self) -> bool:
@@ -194,16 +196,16 @@ class RealsenseDevice:
             picture: Picture = from_frame(self._rs, image)
             made = frame(picture, role, self.cameras[role.sensor].calib_id)
         except (ValueError, RuntimeError):  # what librealsense raises about frames, and ours
-            self._delivery.drop("undecodable")
+            self._gate.drop("undecodable")
             return
         if picture.domain != HARDWARE and not self._warned:
             self._warned = True
-            self._delivery.warn("clock", _NO_METADATA.format(picture.domain))
+            self._gate.warn("clock", _NO_METADATA.format(picture.domain))
         stamp = self._clocks[role].stamp(picture.ticks, t_arrival_ns)
         if stamp.stepped:
-            self._delivery.begin_epoch()
+            self._gate.begin_epoch()
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        self._delivery.frame(replace(made, **times, epoch=self._delivery.epoch))
+        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch))
 
 
 def _info(stream: Stream) -> StreamInfo:

@@ -21,7 +21,7 @@ def load() -> Any:
 
 
 @contextmanager
-def naming(uri: str) -> Iterator[None]:
+def translated_errors(uri: str) -> Iterator[None]:
     """Turns what librealsense raises, plain `RuntimeError`s, into errors that name the device and what to do.
 
     Raises:

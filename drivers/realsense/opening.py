@@ -9,7 +9,7 @@ from drivers.contract.device import AddressError, DeviceError, DeviceInfo, SdkMi
 from drivers.contract.discovery import UDEV_REMEDY, Availability, Found, choose
 from drivers.realsense import library
 from drivers.realsense.address import Address, parse
-from drivers.realsense.device import RealsenseDevice, Used
+from drivers.realsense.device import RealsenseDevice, UsedSensor
 from drivers.realsense.profiles import of_sensor, wanted
 
 
@@ -40,7 +40,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
     if address.recording is not None:
         return _play(rs, address, str(address.recording), clock)
     serial = choose(discover(1.0), "realsense", address.serial).info.serial
-    with library.naming(uri):
+    with library.translated_errors(uri):
         camera = next(one for one in rs.context().query_devices() if _text(rs, one, "serial_number") == serial)
         for sensor in camera.query_sensors():
             # Otherwise librealsense makes host times itself, by a fit that nobody can see.
@@ -48,8 +48,8 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
                 sensor.set_option(rs.option.global_time_enabled, 0.0)
         offers = [(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
         chosen = set(map(id, wanted([stream for _, streams in offers for stream in streams], address)))
-    used = [Used(sensor, [stream for stream in streams if id(stream) in chosen]) for sensor, streams in offers]
-    info = about(rs, camera)
+    used = [UsedSensor(sensor, [stream for stream in streams if id(stream) in chosen]) for sensor, streams in offers]
+    info = device_info(rs, camera)
     query = urlsplit(uri).query
     return _device(rs, camera, replace(info, uri=f"{info.uri}?{query}" if query else info.uri), used, clock)
 
@@ -60,12 +60,12 @@ def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) 
     Raises:
         DeviceError: it offers nothing that is understood.
     """
-    with library.naming(info.uri):
-        used = [Used(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
+    with library.translated_errors(info.uri):
+        used = [UsedSensor(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
     return _device(rs, camera, info, used, clock)
 
 
-def about(rs: Any, camera: Any) -> DeviceInfo:
+def device_info(rs: Any, camera: Any) -> DeviceInfo:
     """Who a camera is."""
     serial = _text(rs, camera, "serial_number")
     usb = _text(rs, camera, "usb_type_descriptor")
@@ -91,7 +91,9 @@ def _play(rs: Any, address: Address, path: str, clock: Callable[[], int]) -> Rea
     return device
 
 
-def _device(rs: Any, camera: Any, info: DeviceInfo, used: list[Used], clock: Callable[[], int]) -> RealsenseDevice:
+def _device(
+    rs: Any, camera: Any, info: DeviceInfo, used: list[UsedSensor], clock: Callable[[], int]
+) -> RealsenseDevice:
     with_streams = [one for one in used if one.streams]
     if not with_streams:
         raise DeviceError(f"{info.uri}: it has no stream of depth, infra-red, confidence or colour")
@@ -100,7 +102,7 @@ def _device(rs: Any, camera: Any, info: DeviceInfo, used: list[Used], clock: Cal
 
 def _found(rs: Any, camera: Any) -> Found:
     try:
-        info = about(rs, camera)
+        info = device_info(rs, camera)
         camera.query_sensors()
     except RuntimeError as error:
         who = DeviceInfo("realsense://", "RealSense", "")

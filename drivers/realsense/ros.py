@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +33,9 @@ class Bag:
         """Number of messages by topic.
 
         Raises:
-            FootageError: the file cannot be read, or `rosbags` is not installed.
+            ForeignRecordingError: the file cannot be read, or `rosbags` is not installed.
         """
-        with _naming(self._path):
+        with _translated_errors(self._path):
             from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
 
             with Reader(self._path) as reader:
@@ -45,9 +45,9 @@ class Bag:
         """The messages of the topics that a regular expression matches wholly, in the order of their times.
 
         Raises:
-            FootageError: as `counts`, and if a message is damaged.
+            ForeignRecordingError: as `counts`, and if a message is damaged.
         """
-        with _naming(self._path):
+        with _translated_errors(self._path):
             from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
             from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415
 
@@ -61,15 +61,15 @@ class Bag:
 
 
 @contextmanager
-def _naming(path: Path) -> Iterator[None]:
+def _translated_errors(path: Path) -> Iterator[None]:
     """Says which file it was, and what to do about it."""
     try:
         yield
     except ImportError as error:
-        raise FootageError(
+        raise ForeignRecordingError(
             f"{path}: bags are read by rosbags, which the extra `import` of abs-service installs"
         ) from error
     except OSError as error:
-        raise FootageError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
     except Exception as error:  # what a parser raises about damaged bytes may be anything
-        raise FootageError(f"{path}: this is no ROS 1 bag, or a damaged one: {error!r}") from error
+        raise ForeignRecordingError(f"{path}: this is no ROS 1 bag, or a damaged one: {error!r}") from error

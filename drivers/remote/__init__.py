@@ -1,6 +1,6 @@
 """A rig whose frames arrive over the network, from another `abs-service capture`, as a device of this one.
 
-Protocol: `survey`, `device`. Transport: `link`, whose SDK is zenoh. Codec: that of the wire, `drivers.encoding.codec`.
+Protocol: `probe`, `device`. Transport: `link`, whose SDK is zenoh. Codec: that of the wire, `drivers.encoding.codec`.
 """
 
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from drivers.contract.discovery import Found
 from drivers.remote.address import DEFAULT_PORT, Address, parse
 from drivers.remote.device import RemoteDevice
 from drivers.remote.link import open_link
-from drivers.remote.survey import choose_rig, survey
+from drivers.remote.probe import choose_rig, probe
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
@@ -28,7 +28,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     link = open_link(address)
     try:
         rig = choose_rig(link, address)
-        return RemoteDevice(address.uri(rig), rig, link, survey(link, rig, address), clock)
+        return RemoteDevice(address.uri(rig), rig, link, probe(link, rig, address), clock)
     except BaseException:
         link.close()
         raise

@@ -10,11 +10,11 @@ from drivers.contract.clock import DeviceClock
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Frame
-from drivers.contract.frame_gate import Delivery
+from drivers.contract.frame_gate import FrameGate
 from drivers.encoding import codec
 from drivers.encoding.codec import CodecError
 from drivers.remote.link import Link
-from drivers.remote.survey import IMAGES, Survey
+from drivers.remote.probe import IMAGES, RemoteRig
 
 TRUTHS = "*/truth"
 #: The other host's monotonic clock, by its stamps.
@@ -41,31 +41,31 @@ class RemoteDevice:
         uri: address that opens it again.
         rig: name of the remote rig.
         link: to it; closed with the device.
-        survey: what the rig delivers.
+        remote: what the rig delivers.
         clock: CLOCK_MONOTONIC [ns].
     """
 
-    def __init__(self, uri: str, rig: str, link: Link, survey: Survey, clock: Callable[[], int]) -> None:
+    def __init__(self, uri: str, rig: str, link: Link, remote: RemoteRig, clock: Callable[[], int]) -> None:
         self.info = DeviceInfo(uri, "abs-service rig", rig, link=uri.removeprefix("remote://").partition("/")[0])
-        self.capabilities = Capabilities(survey.streams)
-        self.cameras: Mapping[str, Camera] = survey.cameras
+        self.capabilities = Capabilities(remote.streams)
+        self.cameras: Mapping[str, Camera] = remote.cameras
         self.controls = Controls()
         self._rig = rig
         self._link = link
-        self._same_clock = survey.same_clock
+        self._same_clock = remote.same_clock
         self._clock = clock
-        self._delivery = Delivery(survey.streams, causes=["missing", "malformed"])
+        self._gate = FrameGate(remote.streams, causes=["missing", "malformed"])
         self._streams: dict[tuple[str, str], _Stream] = {}
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames`; exposures that are `missing` between two that came, lost there or on the way; `malformed` ones."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
@@ -83,57 +83,57 @@ class RemoteDevice:
         Raises:
             DeviceError: the device was closed.
         """
-        stop = self._delivery.begin(sink, f'subscribing to rig "{self._rig}"')
+        stop = self._gate.begin(sink, f'subscribing to rig "{self._rig}"')
         if stop is None:
             return
         self._streams = {}
-        self._delivery.report(DeviceState.STREAMING, f'rig "{self._rig}" is captured elsewhere')
+        self._gate.report_state(DeviceState.STREAMING, f'rig "{self._rig}" is captured elsewhere')
         # Whoever makes a mesh of the first images needs their truth, which comes just before them.
-        self._link.listen(self._rig, TRUTHS, self._on_truth)
-        self._link.listen(self._rig, IMAGES, self._on_image)
-        self._link.watch(self._rig, self._on_gone)
+        self._link.subscribe(self._rig, TRUTHS, self._on_truth)
+        self._link.subscribe(self._rig, IMAGES, self._on_image)
+        self._link.watch_liveliness(self._rig, self._on_gone)
         if stop.is_set():
-            self._link.silence()
+            self._link.unsubscribe()
 
     def stop(self) -> None:
         """Ends delivery; after it returns the sink is not called again."""
-        self._delivery.end("stopped")
-        self._link.silence()
+        self._gate.end("stopped")
+        self._link.unsubscribe()
 
     def close(self) -> None:
         """Stops and ends the session."""
-        self._delivery.release()
+        self._gate.release()
         self._link.close()
 
     def _on_gone(self) -> None:
-        self._delivery.report(DeviceState.FAILED, f'the capture of rig "{self._rig}" has ended')
+        self._gate.report_state(DeviceState.FAILED, f'the capture of rig "{self._rig}" has ended')
 
     def _on_truth(self, topic: str, payload: bytes, attachment: bytes) -> None:
         # Truths of another clock would have no frame of the same time.
         if self._same_clock:
             try:
-                self._delivery.truth(codec.decode_truth(payload))
+                self._gate.deliver_truth(codec.decode_truth(payload))
             except CodecError:
-                self._delivery.drop("malformed")
+                self._gate.drop("malformed")
 
     def _on_image(self, topic: str, payload: bytes, attachment: bytes) -> None:
         t_arrival_ns = self._clock()
         try:
             frame = codec.decode(payload, attachment)
         except CodecError:
-            self._delivery.drop("malformed")
+            self._gate.drop("malformed")
             return
         stream = self._follow(frame)
         if self._same_clock:
-            self._delivery.frame(replace(frame, epoch=stream.ours))
+            self._gate.deliver(replace(frame, epoch=stream.ours))
             return
         stamp = stream.clock.stamp(frame.t_arrival_ns, t_arrival_ns)
         if stamp.stepped:
-            self._delivery.begin_epoch()
-            stream.ours = self._delivery.epoch
+            self._gate.begin_epoch()
+            stream.ours = self._gate.epoch
         t_host_ns = min(stamp.t_host_ns + frame.t_host_ns - frame.t_arrival_ns, t_arrival_ns)
         sigma_ns = round(math.hypot(frame.t_sigma_ns, stamp.t_sigma_ns))
-        self._delivery.frame(
+        self._gate.deliver(
             replace(frame, epoch=stream.ours, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, t_sigma_ns=sigma_ns)
         )
 
@@ -141,7 +141,7 @@ class RemoteDevice:
         """Where the frame's stream is; counts what is missing before the frame."""
         stream = self._streams.get(frame.key)
         if stream is None:
-            stream = _Stream(frame.epoch, self._delivery.epoch, frame.seq, DeviceClock(CLOCK))
+            stream = _Stream(frame.epoch, self._gate.epoch, frame.seq, DeviceClock(CLOCK))
             self._streams[frame.key] = stream
             return stream
         if stream.theirs != frame.epoch:
@@ -149,10 +149,10 @@ class RemoteDevice:
             if siblings:
                 stream.ours = siblings[0].ours
             else:
-                self._delivery.begin_epoch()
-                stream.ours = self._delivery.epoch
+                self._gate.begin_epoch()
+                stream.ours = self._gate.epoch
             stream.theirs, stream.clock = frame.epoch, DeviceClock(CLOCK)
         elif frame.seq > stream.seq:
-            self._delivery.drop("missing", frame.seq - stream.seq - 1)
+            self._gate.drop("missing", frame.seq - stream.seq - 1)
         stream.seq = frame.seq
         return stream

@@ -10,7 +10,7 @@ from typing import Any
 
 import zenoh
 
-from drivers.contract.callbacks import outside_daemons
+from drivers.contract.callbacks import from_non_daemon_thread
 from drivers.contract.device import DeviceError
 from drivers.remote.address import Address
 
@@ -40,13 +40,13 @@ class Link:
         replies = self._session.liveliness().get("abs/*/live/capture", timeout=timeout_s)
         return sorted({str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok is not None})
 
-    def ask(self, rig: str, pattern: str) -> list[bytes]:
+    def query(self, rig: str, pattern: str) -> list[bytes]:
         """What answers a question for the topics of a rig that match."""
         replies = self._session.get(f"abs/{rig}/{pattern}", target=zenoh.QueryTarget.ALL, timeout=ANSWER_S)
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
-    def listen(self, rig: str, pattern: str, on_message: OnMessage) -> None:
-        """Hears the messages of a rig's topics that match, until `silence`."""
+    def subscribe(self, rig: str, pattern: str, on_message: OnMessage) -> None:
+        """Hears the messages of a rig's topics that match, until `unsubscribe`."""
         prefix = f"abs/{rig}/"
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -55,8 +55,8 @@ class Link:
 
         self._keep(lambda: self._session.declare_subscriber(prefix + pattern, on_sample))
 
-    def watch(self, rig: str, on_gone: Callable[[], None]) -> None:
-        """Hears when the capture of a rig ends, cleanly or not, until `silence`."""
+    def watch_liveliness(self, rig: str, on_gone: Callable[[], None]) -> None:
+        """Hears when the capture of a rig ends, cleanly or not, until `unsubscribe`."""
 
         def on_token(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.DELETE:
@@ -65,7 +65,7 @@ class Link:
         tokens, key = self._session.liveliness(), f"abs/{rig}/live/capture"
         self._keep(lambda: tokens.declare_subscriber(key, on_token, history=True))
 
-    def silence(self) -> None:
+    def unsubscribe(self) -> None:
         """Hears nothing any more."""
         with self._lock:
             declared, self._declared = self._declared, []
@@ -74,12 +74,12 @@ class Link:
 
     def close(self) -> None:
         """Ends the session; may be called again. Has to happen before the interpreter ends: zenoh hangs there else."""
-        self.silence()
+        self.unsubscribe()
         if not self._session.is_closed():
             self._session.close()
 
     def _keep(self, declare: Callable[[], Any]) -> None:
-        declared = outside_daemons(declare)
+        declared = from_non_daemon_thread(declare)
         with self._lock:
             self._declared.append(declared)
 

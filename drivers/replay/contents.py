@@ -29,7 +29,7 @@ class RecordingError(DeviceError):
 
 
 @dataclass(frozen=True)
-class ChunkPlace:
+class ChunkLocation:
     """Where a chunk begins in the file, and the earliest time in it [ns]."""
 
     offset: int
@@ -58,7 +58,7 @@ class Contents:
         damaged: chunks left out because they are damaged; those of a finished file are found when they are read.
     """
 
-    chunks: tuple[ChunkPlace, ...]
+    chunks: tuple[ChunkLocation, ...]
     topics: Mapping[int, Topic]
     attachments: Mapping[str, bytes]
     start_ns: int
@@ -67,7 +67,7 @@ class Contents:
     damaged: int
 
 
-def survey(path: Path) -> Contents:
+def scan(path: Path) -> Contents:
     """Surveys a file, quickly if it has an index.
 
     Raises:
@@ -76,12 +76,12 @@ def survey(path: Path) -> Contents:
     try:
         with path.open("rb") as stream:
             summary = _summary(path, stream)
-            return _read_through(stream) if summary is None else _from_index(summary, stream)
+            return _scan_records(stream) if summary is None else _from_index(summary, stream)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
 
 
-def read_chunk(stream: BinaryIO, place: ChunkPlace) -> list[McapRecord]:
+def read_chunk(stream: BinaryIO, place: ChunkLocation) -> list[McapRecord]:
     """The records of a chunk; raises one of `DAMAGE` if it is damaged."""
     stream.seek(place.offset + _RECORD_HEADER)
     return breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
@@ -103,7 +103,9 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
     counts = summary.statistics.channel_message_counts if summary.statistics else {}
     stream.seek(0)
     return Contents(
-        chunks=tuple(ChunkPlace(index.chunk_start_offset, index.message_start_time) for index in summary.chunk_indexes),
+        chunks=tuple(
+            ChunkLocation(index.chunk_start_offset, index.message_start_time) for index in summary.chunk_indexes
+        ),
         topics=_topics(summary.schemas, summary.channels, counts),
         attachments={attachment.name: attachment.data for attachment in SeekingReader(stream).iter_attachments()},
         start_ns=min((index.message_start_time for index in summary.chunk_indexes), default=0),
@@ -113,10 +115,10 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
     )
 
 
-def _read_through(stream: BinaryIO) -> Contents:
+def _scan_records(stream: BinaryIO) -> Contents:
     """Reads every record up to the first that is cut off; a damaged chunk is left out and counted."""
     damaged = 0
-    chunks: list[ChunkPlace] = []
+    chunks: list[ChunkLocation] = []
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     counts: Counter[int] = Counter()
@@ -132,7 +134,7 @@ def _read_through(stream: BinaryIO) -> Contents:
         except DAMAGE:
             damaged += 1
             continue
-        chunks.append(ChunkPlace(offset, record.message_start_time))
+        chunks.append(ChunkLocation(offset, record.message_start_time))
         times += [record.message_start_time, record.message_end_time]
         schemas |= {schema.id: schema for schema in contents if isinstance(schema, Schema)}
         channels |= {channel.id: channel for channel in contents if isinstance(channel, Channel)}

@@ -9,7 +9,7 @@ from drivers.contract.capabilities import Capabilities, ClockInfo, StreamInfo
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
-from drivers.contract.frame_gate import Delivery
+from drivers.contract.frame_gate import FrameGate
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
 
@@ -56,19 +56,19 @@ class ReplayDevice:
         self._clock = clock
         self._wait = wait
         self._delay_s = delay_s
-        self._delivery = Delivery(self.capabilities.streams, causes=["unpaired"])
+        self._gate = FrameGate(self.capabilities.streams, causes=["unpaired"])
         self._next_epoch = 0
         self._thread = threading.Thread()
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, and images or descriptions in the file that were `unpaired`."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
@@ -81,32 +81,32 @@ class ReplayDevice:
         Raises:
             DeviceError: the device was closed.
         """
-        if stop := self._delivery.begin(sink, f"begins {self._delay_s:g} s after it was started"):
+        if stop := self._gate.begin(sink, f"begins {self._delay_s:g} s after it was started"):
             self._thread = threading.Thread(target=self._run, args=(stop,), name="replay", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
         """Ends delivery; after it returns the sink is not called again."""
-        self._delivery.end("stopped")
+        self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
         """Stops; the file is not kept open."""
-        self._delivery.release()
+        self._gate.release()
         self.stop()
 
     def _run(self, stop: threading.Event) -> None:
         self._wait(stop, self._delay_s)
-        self._delivery.report(DeviceState.STREAMING, f"replaying {self._recording.path}")
+        self._gate.report_state(DeviceState.STREAMING, f"replaying {self._recording.path}")
         try:
             while self._play(stop) and self._loop:
                 pass
         except (RecordingError, OSError) as error:
-            self._delivery.report(DeviceState.FAILED, str(error))
+            self._gate.report_state(DeviceState.FAILED, str(error))
             return
         if not stop.is_set():
-            self._delivery.end("the recording ended")
+            self._gate.end("the recording ended")
 
     def _play(self, stop: threading.Event) -> bool:
         """Plays the file once; tells whether to go on. Each epoch of the file becomes one of the device."""
@@ -119,12 +119,12 @@ class ReplayDevice:
             if self._wait(stop, max(t_host_ns - self._clock(), 0) * 1e-9):
                 break
             if isinstance(item, Truth):
-                self._delivery.truth(replace(item, t_host_ns=t_host_ns))
+                self._gate.deliver_truth(replace(item, t_host_ns=t_host_ns))
                 continue
             epoch = epochs.setdefault(item.epoch, self._next_epoch + len(epochs))
-            self._delivery.frame(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
+            self._gate.deliver(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
         else:
-            self._delivery.drop("unpaired", self._recording.unpaired)
+            self._gate.drop("unpaired", self._recording.unpaired)
         self._next_epoch += len(epochs)
         return not stop.is_set()
 

@@ -17,7 +17,7 @@ from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.codec import CodecError
 from drivers.encoding.sensor_model import decode_camera
-from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, survey
+from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, scan
 
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
@@ -47,7 +47,7 @@ class Recording:
     """
 
     def __init__(self, path: Path) -> None:
-        contents = survey(path)
+        contents = scan(path)
         self.path = path
         self.truncated = contents.truncated
         self.damaged_chunks = contents.damaged

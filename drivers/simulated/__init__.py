@@ -18,7 +18,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         AddressError: the address is not understood; names key, value and what is allowed.
     """
     address = parse(uri)
-    return SimulatedDevice(uri, address.build(), clock, misbehaviour=address.fault)
+    return SimulatedDevice(uri, address.build(), clock, fault_schedule=address.fault)
 
 
 def discover(timeout_s: float) -> list[Found]:

@@ -10,11 +10,11 @@ from calib.lens import COEFFICIENTS, LensError, LensModel
 from calib.lenses import lens_of
 from drivers.contract.device import AddressError
 from drivers.simulated import faults, values
-from drivers.simulated.faults import Misbehaviour
+from drivers.simulated.faults import FaultSchedule
 from drivers.simulated.scene.excursion import Excursion
-from drivers.simulated.scene.scenes import SCENES, Choices
+from drivers.simulated.scene.scenes import SCENES, SceneSettings
 from drivers.simulated.sensors.bayer import ORDERS, Mosaic
-from drivers.simulated.sensors.heads import Equipment
+from drivers.simulated.sensors.heads import HeadFactory
 from drivers.simulated.sensors.optics import BEAMS, OPTICS
 from drivers.simulated.shapes.printed import TARGETS
 from drivers.simulated.simulation import Simulation
@@ -127,7 +127,7 @@ class Address:
     speed: float = 1.0
     jitter_ms: float = 0.0
     occluder: str = "none"
-    fault: Misbehaviour = field(default_factory=Misbehaviour)
+    fault: FaultSchedule = field(default_factory=FaultSchedule)
     turn: float = math.inf
     leave: tuple[float, float] = (math.inf, math.inf)
     stiffness: float = 0.01
@@ -146,13 +146,13 @@ class Address:
     crosstalk: float = 0.0
 
     def build(self) -> Simulation:
-        """The world that the address describes.
+        """The scene that the address describes.
 
         Raises:
             AddressError: no such lens, or light from somewhere in an image cannot have come through it.
         """
         fine = self.texture == "fine"
-        choices = Choices(
+        settings = SceneSettings(
             seed=self.seed,
             bend=math.radians(self.bend),
             speed=self.speed,
@@ -168,7 +168,7 @@ class Address:
             hold_s=self.hold,
             reach=self.reach,
         )
-        equipment = Equipment(
+        factory = HeadFactory(
             sizes=self.sizes,
             rate_hz=self.rate,
             noise=self.noise,
@@ -180,12 +180,12 @@ class Address:
             mosaic=Mosaic(self.order, self.blur, self.crosstalk),
             samples=2 if fine else 1,
         )
-        world = SCENES[self.scene](choices)
+        scene = SCENES[self.scene](settings)
         try:
-            heads = {name: equipment.head(name, world) for name in self.sensors}
+            heads = {name: factory.head(name, scene) for name in self.sensors}
         except LensError as error:
             raise AddressError(f"simulated://{self.scene}: lens = {self.lens} is too strong: {error}") from error
-        return Simulation(world, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
+        return Simulation(scene, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
 
     def _lens(self) -> LensModel:
         try:

@@ -9,8 +9,8 @@ from drivers.contract.capabilities import Capabilities
 from drivers.contract.controls import Controls
 from drivers.contract.device import DeviceInfo, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
-from drivers.contract.frame_gate import Delivery
-from drivers.simulated.faults import Fault, Misbehaviour, spoilt
+from drivers.contract.frame_gate import FrameGate
+from drivers.simulated.faults import Fault, FaultSchedule, corrupted
 from drivers.simulated.simulation import Simulation
 
 #: Waits until the event is set or so many seconds have passed; tells whether it is set.
@@ -20,7 +20,7 @@ Wait = Callable[[threading.Event, float], bool]
 BUFFERED = 3
 
 #: A device without a fault.
-SOUND = Misbehaviour()
+NO_FAULT = FaultSchedule()
 
 
 class SimulatedDevice:
@@ -35,7 +35,7 @@ class SimulatedDevice:
         simulation: what is seen.
         clock: CLOCK_MONOTONIC [ns].
         wait: how to pass time; tests pass their own.
-        misbehaviour: what goes wrong, and when.
+        fault_schedule: what goes wrong, and when.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class SimulatedDevice:
         simulation: Simulation,
         clock: Callable[[], int],
         wait: Wait = threading.Event.wait,
-        misbehaviour: Misbehaviour = SOUND,
+        fault_schedule: FaultSchedule = NO_FAULT,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="simulated", serial=f"seed {simulation.seed}")
         self.capabilities = Capabilities(tuple(s for head in simulation.heads.values() for s in head.streams))
@@ -53,19 +53,19 @@ class SimulatedDevice:
         self._simulation = simulation
         self._clock = clock
         self._wait = wait
-        self._misbehaviour = misbehaviour
-        self._delivery = Delivery(self.capabilities.streams, causes=["late", "lost"])
+        self._fault_schedule = fault_schedule
+        self._gate = FrameGate(self.capabilities.streams, causes=["late", "lost"])
         self._thread = threading.Thread()
 
     @property
     def state(self) -> DeviceState:
         """See `drivers.contract.device.Device.state`."""
-        return self._delivery.state
+        return self._gate.state
 
     @property
     def counters(self) -> Mapping[str, int]:
         """`frames` delivered, exposures skipped because it was too `late` for them, and frames `lost` by a fault."""
-        return self._delivery.counters
+        return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
@@ -78,28 +78,28 @@ class SimulatedDevice:
         Raises:
             DeviceError: the device was closed.
         """
-        if stop := self._delivery.begin(sink, "preparing the simulation"):
+        if stop := self._gate.begin(sink, "preparing the simulation"):
             self._thread = threading.Thread(target=self._run, args=(stop,), name="simulated", daemon=True)
             self._thread.start()
 
     def stop(self) -> None:
         """Ends delivery; after it returns the sink is not called again."""
-        self._delivery.end("stopped")
+        self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
         """Stops; there is nothing else to release."""
-        self._delivery.release()
+        self._gate.release()
         self.stop()
 
     def _run(self, stop: threading.Event) -> None:
         try:
             self._simulation.frames(0)  # compiles the kernels, which must not make the first exposures late
-            self._delivery.report(DeviceState.STREAMING, "simulated exposures follow")
-            self._stream(stop, self._delivery.epoch)
+            self._gate.report_state(DeviceState.STREAMING, "simulated exposures follow")
+            self._stream(stop, self._gate.epoch)
         except Exception as error:
-            self._delivery.report(DeviceState.FAILED, f"the simulation failed: {error!r}")
+            self._gate.report_state(DeviceState.FAILED, f"the simulation failed: {error!r}")
             raise
 
     def _stream(self, stop: threading.Event, epoch: int) -> None:
@@ -109,29 +109,29 @@ class SimulatedDevice:
         while True:
             behind = (self._clock() - first_ns - self._simulation.time_ns(k)) // period_ns
             if behind > BUFFERED:
-                self._delivery.drop("late", behind)
+                self._gate.drop("late", behind)
                 k += behind
             frames, truths = self._simulation.frames(k), self._simulation.truths(k)
             if self._wait(stop, max(first_ns + self._simulation.time_ns(k) - self._clock(), 0) * 1e-9):
                 return
-            match fault := self._misbehaviour.at(k):
+            match fault := self._fault_schedule.at(k):
                 case Fault.STALL:
                     stop.wait()
                     return
                 case Fault.UNPLUG:
-                    self._delivery.report(DeviceState.FAILED, "unplugged, as the address says")
+                    self._gate.report_state(DeviceState.FAILED, "unplugged, as the address says")
                     return
                 case Fault.DROP:
-                    self._delivery.drop("lost", len(frames))
+                    self._gate.drop("lost", len(frames))
                 case _:
-                    self._deliver([spoilt(frame, fault) for frame in frames], truths, first_ns, epoch)
+                    self._deliver([corrupted(frame, fault) for frame in frames], truths, first_ns, epoch)
             if stop.is_set():
                 return
             k += 1
 
     def _deliver(self, frames: list[Frame], truths: list[Truth], first_ns: int, epoch: int) -> None:
         for truth in truths:
-            self._delivery.truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
+            self._gate.deliver_truth(replace(truth, t_host_ns=first_ns + truth.t_host_ns))
         for frame in frames:
             t_host_ns, t_arrival_ns = first_ns + frame.t_host_ns, self._clock()
-            self._delivery.frame(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=epoch))
+            self._gate.deliver(replace(frame, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, epoch=epoch))

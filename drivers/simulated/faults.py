@@ -21,11 +21,11 @@ class Fault(StrEnum):
 
 
 #: How many exposures a fault lasts that passes.
-LASTS = 10
+PASSING_FAULT_EXPOSURES = 10
 
 
 @dataclass(frozen=True)
-class Misbehaviour:
+class FaultSchedule:
     """What goes wrong, and from which exposure on."""
 
     fault: Fault = Fault.NONE
@@ -33,15 +33,15 @@ class Misbehaviour:
 
     def at(self, k: int) -> Fault:
         """What is wrong at exposure `k`."""
-        if k < self.begin or (self.fault not in _LASTING and k >= self.begin + LASTS):
+        if k < self.begin or (self.fault not in _PERMANENT and k >= self.begin + PASSING_FAULT_EXPOSURES):
             return Fault.NONE
         return Fault.NONE if self.fault == Fault.DROP and (k - self.begin) % 2 else self.fault
 
 
-_LASTING = frozenset({Fault.STALL, Fault.UNPLUG})
+_PERMANENT = frozenset({Fault.STALL, Fault.UNPLUG})
 
 
-def spoilt(frame: Frame, fault: Fault) -> Frame:
+def corrupted(frame: Frame, fault: Fault) -> Frame:
     """The frame as a device with a fault of its images delivers it."""
     if fault == Fault.WRONG_SIZE:
         return replace(frame, data=frame.data[:-1])
@@ -51,7 +51,7 @@ def spoilt(frame: Frame, fault: Fault) -> Frame:
     return frame
 
 
-def read(text: str) -> Misbehaviour:
+def read(text: str) -> FaultSchedule:
     """Reads `stall@20`: a fault and the exposure with which it begins.
 
     Raises:
@@ -61,4 +61,4 @@ def read(text: str) -> Misbehaviour:
     faults = sorted(fault.value for fault in Fault if fault != Fault.NONE)
     if match is None or match[1] not in faults:
         raise ValueError(f"FAULT@EXPOSURE, for example stall@20; the faults are {', '.join(faults)}")
-    return Misbehaviour(Fault(match[1]), int(match[2]))
+    return FaultSchedule(Fault(match[1]), int(match[2]))

@@ -16,7 +16,7 @@ from drivers.simulated.simulation import Simulation
 
 @dataclass(frozen=True)
 class Filmed:
-    """The first exposures of a simulated board; see `drivers.encoding.foreign_recording.Footage`."""
+    """The first exposures of a simulated board; see `drivers.encoding.foreign_recording.ForeignRecording`."""
 
     simulation: Simulation
     exposures: int

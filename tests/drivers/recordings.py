@@ -12,7 +12,7 @@ from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
-from drivers.replay.contents import survey
+from drivers.replay.contents import scan
 from drivers.simulated.address import parse
 
 SIMULATION = parse("simulated://sheet?tof=32x24&color=32x24&sensors=tof,color").build()
@@ -75,6 +75,6 @@ def write(
 
 def damage(path: Path) -> None:
     whole = bytearray(path.read_bytes())
-    inside = survey(path).chunks[5].offset + 1000
+    inside = scan(path).chunks[5].offset + 1000
     whole[inside : inside + 50] = bytes(50)
     path.write_bytes(whole)

@@ -17,7 +17,7 @@ from drivers.azure import calibration, mkv
 from drivers.azure.calibration import CalibrationError
 from drivers.azure.mkv import AzureRecording
 from drivers.contract.frame import Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 
 ROTATION = cv2.Rodrigues(np.array([0.09, 0.0, 0.01]))[0]
 
@@ -109,7 +109,7 @@ def test_what_is_no_such_recording_is_named(tmp_path: Path) -> None:
     for name, content in (("nothing.mkv", None), ("text.mkv", b"no MKV")):
         if content is not None:
             (tmp_path / name).write_bytes(content)
-        with pytest.raises(FootageError, match=f"{name}: cannot be read as MKV"):
+        with pytest.raises(ForeignRecordingError, match=f"{name}: cannot be read as MKV"):
             AzureRecording(tmp_path / name)
 
 
@@ -124,7 +124,7 @@ def test_a_damaged_recording_is_read_or_refused(recording: Path, tmp_path: Path)
         damaged.write_bytes(changed)
         try:
             list(AzureRecording(damaged).frames())
-        except FootageError:
+        except ForeignRecordingError:
             refused += 1
     assert refused > 0
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.o3r.buffers import O3rBuffers, exposure
 from drivers.o3r.chunks import ChunkError, ChunkType, messages
 from tests.drivers import o3r_buffer
@@ -97,7 +97,7 @@ def test_messages_as_they_travel_and_older_ones_are_read(tmp_path: Path) -> None
     ],
 )
 def test_what_is_no_buffer_is_named(tmp_path: Path, content: bytes, complaint: str) -> None:
-    with pytest.raises(FootageError, match=complaint) as error:
+    with pytest.raises(ForeignRecordingError, match=complaint) as error:
         footage(tmp_path, content)
     assert "buffer.data" in str(error.value)
 
@@ -106,7 +106,7 @@ def test_an_image_with_fewer_pixels_than_it_says_is_refused_when_it_is_read(tmp_
     content = o3r_buffer.message(
         o3r_buffer.chunk(100, bytes(94), 8, 6, 2), o3r_buffer.chunk(420, o3r_buffer.tof_info(), 8, 6, 0)
     )
-    with pytest.raises(FootageError, match="needs 96 bytes"):
+    with pytest.raises(ForeignRecordingError, match="needs 96 bytes"):
         list(footage(tmp_path, content).frames())
 
 

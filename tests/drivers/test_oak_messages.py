@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak import eeprom
-from drivers.oak.eeprom import EepromError, Link, Poses
+from drivers.oak.eeprom import EepromError, Extrinsics, Poses
 from drivers.oak.heads import cameras
 from drivers.oak.picture import Picture, PictureError, camera, frame, pixels
 from drivers.oak.recording import OakRecording
@@ -112,7 +112,7 @@ def test_stereo_images_are_where_their_rectified_views_are() -> None:
     T_rect_left_right = pose.from_rotation_vector([0, 0, 0], [0.075, 0, 0])
     R2 = pose.from_rotation_vector([0.01, -0.01, 0], [0, 0, 0])
     T_left_right = pose.inverse(R1) @ T_rect_left_right @ R2
-    poses = Poses({1: Link(-1, pose.identity()), 2: Link(1, T_left_right)}, {1: R1, 2: R2})
+    poses = Poses({1: Extrinsics(-1, pose.identity()), 2: Extrinsics(1, T_left_right)}, {1: R1, 2: R2})
     gray = replace(DEPTH, type="GRAY8", stride=8, socket=1)
     found = cameras(
         {ROLES["depth"]: replace(DEPTH, socket=1), ROLES["left"]: gray, ROLES["right"]: replace(gray, socket=2)}, poses
@@ -124,7 +124,7 @@ def test_stereo_images_are_where_their_rectified_views_are() -> None:
 def test_unconnected_cameras_and_circles_are_refused() -> None:
     with pytest.raises(EepromError, match="nothing is known of where camera 1 is relative to camera 0"):
         Poses({}).between(0, 1)
-    circle = Poses({0: Link(1, pose.identity()), 1: Link(0, pose.identity())})
+    circle = Poses({0: Extrinsics(1, pose.identity()), 1: Extrinsics(0, pose.identity())})
     with pytest.raises(EepromError, match="circle"):
         circle.between(0, 1)
 
@@ -167,7 +167,7 @@ def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
         damaged.write_bytes(changed)
         try:
             assert all(isinstance(made, Frame) for made in OakRecording(damaged).frames())
-        except FootageError:
+        except ForeignRecordingError:
             refused += 1
     assert refused > 0
 
@@ -184,17 +184,17 @@ def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
 def test_what_is_no_recording_is_named(tmp_path: Path, name: str, content: bytes | None, complaint: str) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    with pytest.raises(FootageError, match=complaint):
+    with pytest.raises(ForeignRecordingError, match=complaint):
         OakRecording(tmp_path / name)
 
 
 def test_without_a_calibration_only_one_camera_can_be_read(tmp_path: Path) -> None:
     for name in ("tof_depth", "tof_amplitude", "color"):
         (tmp_path / f"{name}.mcap").write_bytes((SAMPLE / f"{name}.mcap").read_bytes())
-    with pytest.raises(FootageError, match="nothing is known of where camera"):
+    with pytest.raises(ForeignRecordingError, match="nothing is known of where camera"):
         OakRecording(tmp_path)
     (tmp_path / "color.mcap").unlink()
     assert OakRecording(tmp_path).cameras.keys() == {"tof"}
     (tmp_path / "calibration.json").write_text(json.dumps({}))
-    with pytest.raises(FootageError, match="lacks 'cameraData'"):
+    with pytest.raises(ForeignRecordingError, match="lacks 'cameraData'"):
         OakRecording(tmp_path)

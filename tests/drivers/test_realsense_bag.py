@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.contract.frame import Geometry, Kind
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.realsense.bag import RealsenseBag, pixels
 from drivers.realsense.streams import StreamError
 
@@ -135,15 +135,15 @@ def test_the_colour_camera_is_where_the_transform_says(bag: Path) -> None:
 def test_what_is_no_such_bag_is_named(tmp_path: Path) -> None:
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
     (tmp_path / "text.bag").write_bytes(b"no bag")
-    with pytest.raises(FootageError, match=r"text.bag: this is no ROS 1 bag"):
+    with pytest.raises(ForeignRecordingError, match=r"text.bag: this is no ROS 1 bag"):
         RealsenseBag(tmp_path / "text.bag")
-    with pytest.raises(FootageError, match=r"nothing.bag: cannot be read"):
+    with pytest.raises(ForeignRecordingError, match=r"nothing.bag: cannot be read"):
         RealsenseBag(tmp_path / "nothing.bag")
-    with pytest.raises(FootageError, match="has no camera_info"):
+    with pytest.raises(ForeignRecordingError, match="has no camera_info"):
         RealsenseBag(write(tmp_path / "bare.bag", with_info=False))
-    with pytest.raises(FootageError, match="distortion 'ftheta' is none of brown conrady"):
+    with pytest.raises(ForeignRecordingError, match="distortion 'ftheta' is none of brown conrady"):
         RealsenseBag(write(tmp_path / "fisheye.bag", model="Ftheta"))
-    with pytest.raises(FootageError, match=r"a depth unit of 0.0 m is none"):
+    with pytest.raises(ForeignRecordingError, match=r"a depth unit of 0.0 m is none"):
         RealsenseBag(write(tmp_path / "unit.bag", units=0.0))
 
 
@@ -158,7 +158,7 @@ def test_a_damaged_bag_is_read_or_refused(bag: Path, tmp_path: Path) -> None:
         damaged.write_bytes(changed)
         try:
             list(RealsenseBag(damaged).frames())
-        except FootageError:
+        except ForeignRecordingError:
             refused += 1
     assert refused > 0
 

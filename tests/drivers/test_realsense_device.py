@@ -21,8 +21,8 @@ from drivers.realsense import library, open_device
 from drivers.realsense.address import parse
 from drivers.realsense.controls import make
 from drivers.realsense.device import RealsenseDevice
-from drivers.realsense.inbox import Inbox
-from drivers.realsense.opening import about, discover, of_device
+from drivers.realsense.frame_queue import FrameQueue
+from drivers.realsense.opening import device_info, discover, of_device
 from drivers.realsense.picture import Picture, pixels
 from drivers.realsense.profiles import Stream, wanted
 from drivers.realsense.streams import ROLES, StreamError
@@ -44,7 +44,7 @@ def camera() -> Iterator[SoftwareCamera]:
 
 @pytest.fixture
 def device(camera: SoftwareCamera) -> Iterator[RealsenseDevice]:
-    opened = of_device(rs, camera.device, about(rs, camera.device), time.monotonic_ns)
+    opened = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
     yield opened
     opened.close()
 
@@ -81,7 +81,7 @@ def test_the_colour_camera_is_where_librealsense_says(device: RealsenseDevice) -
 @pytest.mark.parametrize("model", ["modified_brown_conrady", "inverse_brown_conrady"])
 def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> None:
     camera = SoftwareCamera(model=model)
-    device = of_device(rs, camera.device, about(rs, camera.device), time.monotonic_ns)
+    device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
     intrinsics = device._used[0].streams[0].profile.get_intrinsics()
     for point in ([0.1, -0.05, 0.8], [-0.3, 0.2, 0.8]):
         expected = rs.rs2_project_point_to_pixel(intrinsics, point)
@@ -91,7 +91,7 @@ def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> No
 def test_an_unknown_lens_is_refused() -> None:
     camera = SoftwareCamera(model="ftheta")
     with pytest.raises(DeviceError, match="distortion 'ftheta' is none of brown conrady"):
-        of_device(rs, camera.device, about(rs, camera.device), time.monotonic_ns)
+        of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
 
 
 def test_host_times_follow_the_exposures_and_starting_again_is_a_new_epoch(
@@ -130,7 +130,7 @@ def test_nothing_is_left_behind(camera: SoftwareCamera) -> None:
     camera.run()
     resources = []
     for _ in range(6):
-        device = of_device(rs, camera.device, about(rs, camera.device), time.monotonic_ns)
+        device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
         receiver = Receiver()
         device.start(receiver)
         receiver.wait(lambda receiver=receiver: len(receiver.frames) > 0)
@@ -264,7 +264,7 @@ def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
 
 
 def test_an_inbox_keeps_the_newest_and_counts_the_rest() -> None:
-    inbox: Inbox[int] = Inbox(2)
+    inbox: FrameQueue[int] = FrameQueue(2)
     for number in range(5):
         inbox.put(number)
     inbox.end("over")

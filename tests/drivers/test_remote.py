@@ -15,7 +15,7 @@ from drivers.opening import open_device
 from drivers.remote.address import Address, parse
 from drivers.remote.device import RemoteDevice
 from drivers.remote.link import open_link
-from drivers.remote.survey import Survey
+from drivers.remote.probe import RemoteRig
 from tests.drivers.benches.remote import bench
 from tests.drivers.conformance import Ear
 from tests.drivers.recordings import CAMERAS, SIMULATION
@@ -33,16 +33,16 @@ class Wire:
         self.listeners = {}
         self.on_gone = lambda: None
 
-    def listen(self, rig, pattern, on_message):
+    def subscribe(self, rig, pattern, on_message):
         self.listeners[pattern] = on_message
 
-    def watch(self, rig, on_gone):
+    def watch_liveliness(self, rig, on_gone):
         self.on_gone = on_gone
 
-    def silence(self):
+    def unsubscribe(self):
         self.listeners = {}
 
-    close = silence
+    close = unsubscribe
 
     def say(self, frame: Frame) -> None:
         topic = keys.image(frame.sensor, frame.stream)
@@ -57,8 +57,8 @@ def heard():
     def heard(same_clock: bool):
         wire, ear, now = Wire(), Ear(), [5_000_000_000]
         cameras = {"tof": CAMERAS["tof"]}
-        survey = Survey(cameras, STREAMS, same_clock)
-        device = RemoteDevice("remote://a:1/bench", "bench", wire, survey, lambda: now[0])  # type: ignore[arg-type]
+        remote = RemoteRig(cameras, STREAMS, same_clock)
+        device = RemoteDevice("remote://a:1/bench", "bench", wire, remote, lambda: now[0])  # type: ignore[arg-type]
         device.start(ear)
         return device, wire, ear, now
 

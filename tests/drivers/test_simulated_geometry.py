@@ -12,7 +12,7 @@ from calib.lens import Lens
 from drivers.simulated.scene import scenes
 from drivers.simulated.scene.motion import Placement
 from drivers.simulated.scene.scene import REST_Z, WALL_Z, Moment, Scene
-from drivers.simulated.scene.scenes import Choices
+from drivers.simulated.scene.scenes import SceneSettings
 from drivers.simulated.scene.surface import surface_points
 from drivers.simulated.sensors.view import View
 from drivers.simulated.shapes.raycast import cast, lookup, shadowed
@@ -31,7 +31,7 @@ PLACEMENTS = st.builds(
     st.floats(-4, 4),
     st.floats(-0.03, 0.03),
 )
-SHEET, BOARD = scenes.sheet(Choices()), scenes.board(Choices())
+SHEET, BOARD = scenes.sheet(SceneSettings()), scenes.board(SceneSettings())
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
 
 

@@ -11,7 +11,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
 from drivers.simulated.address import parse
-from drivers.simulated.shapes.elastica import hang
+from drivers.simulated.shapes.elastica import solve_elastica
 from drivers.simulated.shapes.strip import GRAVITY, PlacedStrip, Strip
 from drivers.simulated.simulation import Simulation
 
@@ -34,7 +34,7 @@ STILL = build("sensors=tof&speed=0&noise=0")
 
 def placed(clamp: float, load: float, turn: float, x: float, z: float) -> PlacedStrip:
     T_rp = pose.from_rotation_vector((0, np.pi / 2 + turn, 0), (x, -0.13, z))
-    return PlacedStrip(0.05, strip_of(STILL).texture, T_rp, hang(0.30, load, clamp))
+    return PlacedStrip(0.05, strip_of(STILL).texture, T_rp, solve_elastica(0.30, load, clamp))
 
 
 PLACED = st.builds(
@@ -57,7 +57,7 @@ def test_the_shape_solves_the_boundary_value_problem(stiffness: float, weight: f
         tol=1e-6,
     )
     assert solution.success
-    profile = hang(length, load, clamp)
+    profile = solve_elastica(length, load, clamp)
     angle, _, reach, drop = solution.sol(profile.s)
     np.testing.assert_allclose(profile.angle, angle, atol=1e-5)
     np.testing.assert_allclose(profile.reach, reach, atol=1e-6)
@@ -67,14 +67,14 @@ def test_the_shape_solves_the_boundary_value_problem(stiffness: float, weight: f
 @given(st.floats(0.3, 1.2), st.floats(0.1, 0.5))
 def test_a_stiff_strip_bends_as_a_beam(clamp: float, length: float) -> None:
     load = 1e-3 / length**3
-    profile = hang(length, load, clamp)
+    profile = solve_elastica(length, load, clamp)
     away = profile.drop[-1] * np.sin(clamp) - profile.reach[-1] * np.cos(clamp)  # across the clamped direction
     assert away == pytest.approx(load * np.sin(clamp) * length**4 / 8, rel=1e-2)
 
 
 @given(st.floats(0.2, 1.3), st.floats(1, 2000))
 def test_chords_are_as_long_as_the_strip_and_near_its_curve(clamp: float, load: float) -> None:
-    profile, whole = hang(0.30, load, clamp), np.linspace(0, 1, 129)
+    profile, whole = solve_elastica(0.30, load, clamp), np.linspace(0, 1, 129)
     nodes = np.stack([profile.reach, profile.drop], axis=1)
     chords = np.diff(nodes, axis=0)
     assert np.linalg.norm(chords, axis=1).sum() == pytest.approx(0.30, abs=1e-5)

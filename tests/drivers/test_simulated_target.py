@@ -9,7 +9,7 @@ from calib.board.corners.detection import detect
 from drivers.contract.device import AddressError
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.address import parse
-from drivers.simulated.scene.handling import MOVE_S
+from drivers.simulated.scene.board_motion import MOVE_S
 from drivers.simulated.shapes.printed import TARGETS, board_pose
 
 

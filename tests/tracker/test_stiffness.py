@@ -15,7 +15,7 @@ from abs_service.tracking.stiffness import (
     hanging,
     predicted_tip,
 )
-from drivers.simulated.shapes.elastica import hang
+from drivers.simulated.shapes.elastica import solve_elastica
 
 SIGMA = 0.02
 DOWN = np.array([0.0, 1.0, 0.0])
@@ -36,7 +36,7 @@ def frames(load: float, count: int = 80, segments: int = 4, sigma: float = SIGMA
     generator = np.random.default_rng(seed)
     found = []
     for clamp in np.deg2rad(55 + 15 * np.sin(np.linspace(0, 6, count))):
-        profile = hang(1.0, load, float(clamp))
+        profile = solve_elastica(1.0, load, float(clamp))
         true = np.interp(np.linspace(0, 1, segments + 1), profile.s, np.pi / 2 - profile.angle)
         noisy = true + generator.normal(0, sigma, segments + 1)
         found.append(Hanging(noisy, sigma**2 * np.eye(segments + 1)))
@@ -93,7 +93,7 @@ def test_what_cannot_be_told_is_refused():
 
 
 def test_the_tip_that_goes_with_a_load_is_found():
-    profile = hang(1.0, 4.0, 1.0)
+    profile = solve_elastica(1.0, 4.0, 1.0)
     frame = Hanging(np.interp(np.linspace(0, 1, 5), profile.s, np.pi / 2 - profile.angle), np.eye(5))
     assert predicted_tip(4.0, frame) == pytest.approx(np.pi / 2 - profile.angle[-1], abs=1e-3)
 

@@ -17,7 +17,7 @@ from drivers.contract.discovery import Availability, Found
 from drivers.kinect1 import udev
 
 #: Makes a pyusb backend.
-Backends = Callable[[], Any]
+BackendFactory = Callable[[], Any]
 
 _INTERFACE = 0
 _ENGLISH = 0x0409
@@ -26,7 +26,7 @@ _HIGH_SPEED = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Attached:
+class AttachedCamera:
     """A camera that is attached: what is known of it, and how pyusb calls it."""
 
     found: Found
@@ -56,25 +56,25 @@ def fresh_backend() -> Any:
     return _Libusb(libusb._lib)  # noqa: SLF001
 
 
-def attached(backend: Any) -> list[Attached]:
+def list_attached(backend: Any) -> list[AttachedCamera]:
     """All cameras on the bus; leaves none of them open. Never raises."""
     devices: list[Any] = list(usb.core.find(find_all=True, idVendor=udev.VENDOR, backend=backend) or ())
     result = []
     for device in devices:
         if device.idProduct in udev.CAMERAS:
-            result.append(Attached(_judge(device, devices), device))
+            result.append(AttachedCamera(_probe(device, devices), device))
             usb.util.dispose_resources(device)
     return result
 
 
-def _judge(device: Any, neighbours: list[Any]) -> Found:
+def _probe(device: Any, neighbours: list[Any]) -> Found:
     availability, reason, remedy = Availability.READY, "", ""
     serial = ""
     try:
         serial = _serial(device, neighbours)
         _try_to_claim(device)
     except usb.core.USBError as error:
-        availability, reason, remedy = _obstacle(error)
+        availability, reason, remedy = _availability(error)
         serial = serial or _public_serial(device)
     if device.speed is not None and device.speed < _HIGH_SPEED and availability == Availability.READY:
         availability, reason = Availability.FAULTY, f"it is attached by {_LINKS.get(device.speed, 'a slow link')}"
@@ -136,7 +136,7 @@ def _try_to_claim(device: Any) -> None:
     usb.util.release_interface(device, _INTERFACE)
 
 
-def _obstacle(error: usb.core.USBError) -> tuple[Availability, str, str]:
+def _availability(error: usb.core.USBError) -> tuple[Availability, str, str]:
     match error.errno:
         case errno.EACCES | errno.EPERM:
             return Availability.NO_PERMISSION, "you may not open it", udev.PERMISSION_REMEDY

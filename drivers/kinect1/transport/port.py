@@ -11,10 +11,10 @@ import usb.util
 
 from drivers.contract.device import DeviceError
 from drivers.kinect1 import udev
-from drivers.kinect1.transport.transfer import GoneError, Reader
+from drivers.kinect1.transport.transfer import DisconnectedError, Reader
 
 #: Makes the reader of a device's streams.
-Streaming = Callable[[usb.core.Device, Sequence[int], Callable[[], int]], Reader]
+ReaderFactory = Callable[[usb.core.Device, Sequence[int], Callable[[], int]], Reader]
 
 _OUT, _IN = 0x40, 0xC0
 _CONTROL_MS = 1000
@@ -38,7 +38,7 @@ class Port:
     """
 
     def __init__(
-        self, device: usb.core.Device, backend: object, streaming: Streaming, clock: Callable[[], int]
+        self, device: usb.core.Device, backend: object, streaming: ReaderFactory, clock: Callable[[], int]
     ) -> None:
         self._device = device
         self._backend = backend
@@ -55,12 +55,12 @@ class Port:
 
     def write(self, data: bytes) -> None:
         """See `drivers.kinect1.transport.commands.Control`."""
-        with self._opened(), plain_errors():
+        with self._opened(), translated_errors():
             self._device.ctrl_transfer(_OUT, 0, 0, 0, data, _CONTROL_MS)
 
     def read(self, size: int) -> bytes:
         """See `drivers.kinect1.transport.commands.Control`."""
-        with self._opened(), plain_errors():
+        with self._opened(), translated_errors():
             return bytes(self._device.ctrl_transfer(_IN, 0, 0, 0, size, _CONTROL_MS))
 
     @contextmanager
@@ -103,7 +103,7 @@ class Port:
             usb.util.dispose_resources(self._device)
 
     def _claim(self) -> None:
-        with plain_errors():
+        with translated_errors():
             self._detach_kernel()
             if not self._is_configured():
                 self._device.set_configuration()
@@ -150,19 +150,19 @@ class Port:
 
 
 @contextmanager
-def plain_errors() -> Iterator[None]:
+def translated_errors() -> Iterator[None]:
     """Turns pyusb's errors into `DeviceError`s that say what to do."""
     try:
         yield
     except usb.core.USBError as error:
-        raise explain(error) from error
+        raise translate(error) from error
 
 
-def explain(error: usb.core.USBError) -> DeviceError:
+def translate(error: usb.core.USBError) -> DeviceError:
     """A pyusb error in plain words."""
     match error.errno:
         case errno.ENODEV | errno.ENOENT | errno.ESHUTDOWN:
-            return GoneError("the camera was unplugged")
+            return DisconnectedError("the camera was unplugged")
         case errno.EACCES | errno.EPERM:
             return DeviceError(f"you may not open the camera; {udev.PERMISSION_REMEDY}")
         case errno.EBUSY:

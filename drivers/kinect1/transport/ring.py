@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from drivers.contract.device import DeviceError
 from drivers.kinect1.transport.packets import PACKET_BYTES
-from drivers.kinect1.transport.transfer import GoneError, Transfer
+from drivers.kinect1.transport.transfer import DisconnectedError, Transfer
 
 #: Transfers in flight per pipe, and microframes in each: 128 ms in which the host may be busy with something else. Both
 #: pipes take 4 MB of the 16 MB that Linux grants to usbfs by default.
 TRANSFERS, MICROFRAMES = 16, 64
 
 #: Transfers in a row that the host may report as failed before it is given up: a second of them.
-PATIENCE = 125
+MAX_FAILURES = 125
 
 _COMPLETED, _NO_DEVICE = 0, 5
 _ERROR_NO_DEVICE = -4
@@ -33,7 +33,7 @@ _ERROR_NO_DEVICE = -4
 _CANCEL_S = 2.0
 
 #: Rings whose transfers never came back: the kernel may still write into their memory, so it is kept.
-_abandoned: list["IsochronousRing"] = []
+_leaked: list["IsochronousRing"] = []
 
 
 class _Time(ctypes.Structure):
@@ -93,9 +93,9 @@ class IsochronousRing:
             slot = self._slots[address]
             status = slot.transfer.contents.status
             if status == _NO_DEVICE:
-                raise GoneError("the camera was unplugged")
+                raise DisconnectedError("the camera was unplugged")
             self._failures = 0 if status == _COMPLETED else self._failures + 1
-            if self._failures > PATIENCE:
+            if self._failures > MAX_FAILURES:
                 raise DeviceError(f"the host reports every transfer as failed, the last with libusb status {status}")
             if status == _COMPLETED:
                 lengths = np.where(slot.results[:, 2] == _COMPLETED, slot.results[:, 1], 0).astype(np.uint32)
@@ -112,7 +112,7 @@ class IsochronousRing:
             while self._completed:
                 self._flying.discard(self._completed.popleft()[0])
         if self._flying:
-            _abandoned.append(self)
+            _leaked.append(self)
             return
         for slot in self._slots.values():
             self._library.libusb_free_transfer(slot.transfer)
@@ -134,7 +134,7 @@ class IsochronousRing:
     def _submit(self, address: int) -> None:
         code = self._library.libusb_submit_transfer(self._slots[address].transfer)
         if code == _ERROR_NO_DEVICE:
-            raise GoneError("the camera was unplugged")
+            raise DisconnectedError("the camera was unplugged")
         if code != 0:
             raise DeviceError(
                 f"the host takes no more transfers (libusb error {code}): a Kinect needs most of a USB 2 bus, "

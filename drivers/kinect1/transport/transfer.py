@@ -13,7 +13,7 @@ from drivers.contract.device import DeviceError
 MICROFRAME_NS = 125_000
 
 
-class GoneError(DeviceError):
+class DisconnectedError(DeviceError):
     """The device was unplugged, or lost its power."""
 
 
@@ -48,7 +48,7 @@ class Reader(Protocol):
             timeout_s: the longest to wait for the first one [s].
 
         Raises:
-            GoneError: there will be no more.
+            DisconnectedError: there will be no more.
             DeviceError: the host does not go on.
         """
         ...

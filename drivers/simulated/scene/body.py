@@ -10,7 +10,7 @@ from calib.pose import Pose
 
 
 @dataclass(frozen=True, eq=False)
-class Appearance:
+class RayImage:
     """What some lines of sight see of one body, noise-free; every array covers the rays (height, width).
 
     Attributes:
@@ -33,7 +33,7 @@ class Body(Protocol):
         """Rig points (…, 3) [m] around the body: in every image their pixels enclose it, but for 3 pixels."""
         ...
 
-    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> Appearance:
+    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> RayImage:
         """What a camera sees of the body.
 
         Args:
@@ -58,7 +58,7 @@ class SurfaceBody(Body, Protocol):
         ...
 
 
-class Thing(Protocol):
+class MovingBody(Protocol):
     """What moves."""
 
     def at(self, t: float) -> Body:

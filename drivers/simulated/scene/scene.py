@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
-from drivers.simulated.scene.body import Body, Surface, SurfaceBody, Thing
+from drivers.simulated.scene.body import Body, MovingBody, Surface, SurfaceBody
 from drivers.simulated.scene.texture import Texture
 
 #: Distance of a surface at rest, and of the wall behind it, along the rig's z axis [m].
@@ -56,7 +56,7 @@ class Scene:
 
     surfaces: tuple[Surface, ...]
     wall: Texture
-    occluders: tuple[Thing, ...] = ()
+    occluders: tuple[MovingBody, ...] = ()
     T_rw: Pose = field(default_factory=lambda: pose.from_rotation_vector((0, 0, 0), (0, 0, WALL_Z)))
 
     def at(self, t: float) -> Moment:

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from calib import pose
+from drivers.simulated.scene.board_motion import BoardMotion
 from drivers.simulated.scene.body import Surface
 from drivers.simulated.scene.excursion import Excursion
-from drivers.simulated.scene.handling import Handling
 from drivers.simulated.scene.motion import Motion
 from drivers.simulated.scene.scene import REST_Z, Scene
 from drivers.simulated.scene.texture import Texture, checkerboard, fine_pattern, smooth_pattern
 from drivers.simulated.shapes.hand import Hand
-from drivers.simulated.shapes.printed import TARGETS, paper, printed
+from drivers.simulated.shapes.printed import TARGETS, paper_size, print_texture
 from drivers.simulated.shapes.rectangle import Rectangle
 from drivers.simulated.shapes.strip import Strip
 
@@ -22,7 +22,7 @@ _WALL = (4.0, 3.0)
 
 
 @dataclass(frozen=True)
-class Choices:
+class SceneSettings:
     """What can be chosen of a scene.
 
     Attributes:
@@ -56,30 +56,30 @@ class Choices:
     reach: float = 1.0
 
 
-def sheet(choices: Choices) -> Scene:
-    """A sheet of 0.30 × 0.20 m that bends by up to `choices.bend` while it moves and turns."""
+def sheet(settings: SceneSettings) -> Scene:
+    """A sheet of 0.30 × 0.20 m that bends by up to `settings.bend` while it moves and turns."""
     width, height = 0.30, 0.20
     motion = Motion(
-        seed=choices.seed,
+        seed=settings.seed,
         rest=(0.0, 0.0, REST_Z),
         translation=(0.04, 0.03, 0.05),
         rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)),
-        bend=choices.bend,
+        bend=settings.bend,
         width=width,
         height=height,
         turn=np.deg2rad(35),
         shift=0.02,
-        speed=choices.speed,
+        speed=settings.speed,
     )
-    pattern = _print(choices, choices.seed, width, height)
-    return _scene(choices, Rectangle(width, height, motion, pattern, choices.excursion))
+    pattern = _print(settings, settings.seed, width, height)
+    return _scene(settings, Rectangle(width, height, motion, pattern, settings.excursion))
 
 
-def board(choices: Choices) -> Scene:
+def board(settings: SceneSettings) -> Scene:
     """A rigid checker board of 0.30 × 0.20 m, squares of 50 mm, that moves and turns; nothing bends it."""
     width, height = 0.30, 0.20
     motion = Motion(
-        seed=choices.seed,
+        seed=settings.seed,
         rest=(0.0, 0.0, REST_Z),
         translation=(0.06, 0.05, 0.08),
         rotation=(np.deg2rad(20), np.deg2rad(20), np.deg2rad(15)),
@@ -88,58 +88,58 @@ def board(choices: Choices) -> Scene:
         height=height,
         turn=0.0,
         shift=0.0,
-        speed=choices.speed,
+        speed=settings.speed,
     )
-    return _scene(choices, Rectangle(width, height, motion, checkerboard(width, height, 0.05), choices.excursion))
+    return _scene(settings, Rectangle(width, height, motion, checkerboard(width, height, 0.05), settings.excursion))
 
 
-def strip(choices: Choices) -> Scene:
+def strip(settings: SceneSettings) -> Scene:
     """A strip of 0.30 × 0.05 m that hangs from a gripper towards the viewer and sags under its weight."""
     length, width = 0.30, 0.05
-    pattern = smooth_pattern(choices.seed, length, width, (0.015, 0.006, 0.003), 1000.0, (0.1, 0.95), (0.5, 0.95))
-    elastic = (choices.stiffness, choices.weight)
-    return _scene(choices, Strip(choices.seed, length, width, *elastic, pattern, choices.speed, choices.excursion))
+    pattern = smooth_pattern(settings.seed, length, width, (0.015, 0.006, 0.003), 1000.0, (0.1, 0.95), (0.5, 0.95))
+    elastic = (settings.stiffness, settings.weight)
+    return _scene(settings, Strip(settings.seed, length, width, *elastic, pattern, settings.speed, settings.excursion))
 
 
-def pair(choices: Choices) -> Scene:
+def pair(settings: SceneSettings) -> Scene:
     """Two sheets of 0.20 × 0.15 m side by side, at rest 8 cm apart; each has a motion and a print of its own."""
     width, height, middle = 0.20, 0.15, 0.14
     motions = [
         Motion(
-            seed=choices.seed + number,
+            seed=settings.seed + number,
             rest=(side * middle, 0.0, REST_Z),
             translation=(0.015, 0.03, 0.05),
             rotation=(np.deg2rad(13), np.deg2rad(13), np.deg2rad(8)),
-            bend=choices.bend,
+            bend=settings.bend,
             width=width,
             height=height,
             turn=np.deg2rad(35),
             shift=0.015,
-            speed=choices.speed,
+            speed=settings.speed,
         )
         for number, side in enumerate((-1, 1))
     ]
-    patterns = [_print(choices, motion.seed, width, height) for motion in motions]
-    sheets = [Rectangle(width, height, *of_one, choices.excursion) for of_one in zip(motions, patterns)]
-    return _scene(choices, *sheets)
+    patterns = [_print(settings, motion.seed, width, height) for motion in motions]
+    sheets = [Rectangle(width, height, *of_one, settings.excursion) for of_one in zip(motions, patterns)]
+    return _scene(settings, *sheets)
 
 
-def wall(choices: Choices) -> Scene:
-    """Nothing but a wall of one brightness, for static sequences: `choices.distance` away and turned about y."""
-    T_rw = pose.from_rotation_vector((0, choices.tilt, 0), (0, 0, choices.distance))
-    return Scene((), Texture(np.full((2, 2, 4), choices.reflectivity, np.float32), 1.0), T_rw=T_rw)
+def wall(settings: SceneSettings) -> Scene:
+    """Nothing but a wall of one brightness, for static sequences: `settings.distance` away and turned about y."""
+    T_rw = pose.from_rotation_vector((0, settings.tilt, 0), (0, 0, settings.distance))
+    return Scene((), Texture(np.full((2, 2, 4), settings.reflectivity, np.float32), 1.0), T_rw=T_rw)
 
 
-def target(choices: Choices) -> Scene:
-    """A calibration board, `choices.printed`, that is held still in one pose after another."""
-    board_ = TARGETS[choices.printed]
-    width, height = paper(board_)
-    handling = Handling(choices.seed, width, height, choices.hold_s, choices.reach, choices.speed)
-    return _scene(choices, Rectangle(width, height, handling, printed(board_), choices.excursion))
+def target(settings: SceneSettings) -> Scene:
+    """A calibration board, `settings.printed`, that is held still in one pose after another."""
+    board_ = TARGETS[settings.printed]
+    width, height = paper_size(board_)
+    board_motion = BoardMotion(settings.seed, width, height, settings.hold_s, settings.reach, settings.speed)
+    return _scene(settings, Rectangle(width, height, board_motion, print_texture(board_), settings.excursion))
 
 
 #: The scenes by the name that an address calls them.
-SCENES: Mapping[str, Callable[[Choices], Scene]] = {
+SCENES: Mapping[str, Callable[[SceneSettings], Scene]] = {
     "sheet": sheet,
     "board": board,
     "strip": strip,
@@ -149,14 +149,14 @@ SCENES: Mapping[str, Callable[[Choices], Scene]] = {
 }
 
 
-def _scene(choices: Choices, *surfaces: Surface) -> Scene:
-    hands = (Hand(choices.seed, surfaces, choices.speed),) if choices.hand else ()
-    return Scene(surfaces, _wall(choices.seed), hands)
+def _scene(settings: SceneSettings, *surfaces: Surface) -> Scene:
+    hands = (Hand(settings.seed, surfaces, settings.speed),) if settings.hand else ()
+    return Scene(surfaces, _wall(settings.seed), hands)
 
 
-def _print(choices: Choices, seed: int, width: float, height: float) -> Texture:
+def _print(settings: SceneSettings, seed: int, width: float, height: float) -> Texture:
     color, infrared = (0.1, 0.95), (0.35, 0.9)
-    if choices.fine:
+    if settings.fine:
         return fine_pattern(seed, width, height, color, infrared)
     return smooth_pattern(seed, width, height, (0.025, 0.01, 0.004), 800.0, color, infrared)
 

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from calib.camera import Camera
 from calib.jit import kernel
 from drivers.contract.frame import Frame, Kind
-from drivers.simulated.scene.body import Appearance
+from drivers.simulated.scene.body import RayImage
 from drivers.simulated.scene.scene import Moment, Scene
 from drivers.simulated.sensors.exposure import Exposure, stream_of
 from drivers.simulated.sensors.view import View
@@ -89,7 +89,7 @@ def _finer(camera: Camera, samples: int) -> Camera:
     )
 
 
-def _levels(seen: Appearance) -> NDArray[np.float32]:
+def _levels(seen: RayImage) -> NDArray[np.float32]:
     """Colours (height, width, 3) in levels of 256; 0 where nothing is seen."""
     brightness = 255 * (1 - SHADING * (1 - np.nan_to_num(seen.cosine)))
     return (seen.albedo[..., :3] * brightness[..., None]).astype(np.float32, copy=False)

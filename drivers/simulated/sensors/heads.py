@@ -18,7 +18,7 @@ from drivers.simulated.sensors.time_of_flight import TimeOfFlight, TimeOfFlightN
 
 
 @dataclass(frozen=True)
-class Equipment:
+class HeadFactory:
     """What can be chosen of the heads.
 
     Attributes:

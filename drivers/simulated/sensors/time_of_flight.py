@@ -10,7 +10,7 @@ from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.scene.scene import Scene
 from drivers.simulated.sensors.active_light import returned
 from drivers.simulated.sensors.exposure import Exposure, stream_of
-from drivers.simulated.sensors.view import Sight, View
+from drivers.simulated.sensors.view import BodyImage, View
 
 #: Unambiguous range [m] and the steps that it is digitised in: a SwissRanger SR4000 at 30 MHz.
 RANGE_M, LEVELS = 5.0, 2**14
@@ -108,7 +108,7 @@ class TimeOfFlight:
             exposure.frame(self.streams[1], self.camera, levels),
         ]
 
-    def ideal(self, sights: tuple[Sight, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def ideal(self, sights: tuple[BodyImage, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Distance [m] and amplitude (height, width) before any noise; mixed at the rims, NaN where nothing is seen."""
         distance, amplitude = self._view.wall.distance.copy(), self._wall_amplitude.copy()
         for sight in sights:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.camera import Camera
-from drivers.simulated.scene.body import Appearance, Body
+from drivers.simulated.scene.body import Body, RayImage
 from drivers.simulated.scene.scene import Moment, Scene
 
 #: What a body's outline may miss of it [px].
@@ -15,7 +15,7 @@ _MARGIN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Sight(Appearance):
+class BodyImage(RayImage):
     """What a region of an image sees of one body.
 
     Attributes:
@@ -30,7 +30,7 @@ class View:
 
     Attributes:
         rays: unit direction of every pixel in the sensor frame, (height, width, 3).
-        wall: what the camera would see without any body: a `Sight` of the whole image, its `share` 1.
+        wall: what the camera would see without any body: a `BodyImage` of the whole image, its `share` 1.
     """
 
     def __init__(self, scene: Scene, camera: Camera) -> None:
@@ -38,7 +38,7 @@ class View:
         self.rays = np.ascontiguousarray(camera.rays())
         self.wall = self._look_at_wall(scene)
 
-    def look(self, moment: Moment) -> tuple[Sight, ...]:
+    def look(self, moment: Moment) -> tuple[BodyImage, ...]:
         """What the camera sees of each body; whatever hides another comes after it."""
         return tuple(self._look_at(body) for body in moment.bodies)
 
@@ -60,19 +60,19 @@ class View:
         points_s = self.rays[region] * distance[..., None].astype(np.float64)
         return body.shadowed(points_s, np.asarray(light_s), self._camera.T_rs)
 
-    def _look_at(self, body: Body) -> Sight:
+    def _look_at(self, body: Body) -> BodyImage:
         region = self._region(body)
         seen = body.cast(np.ascontiguousarray(self.rays[region]), self._camera.T_rs)
-        return Sight(seen.share, seen.distance, seen.cosine, seen.albedo, region)
+        return BodyImage(seen.share, seen.distance, seen.cosine, seen.albedo, region)
 
-    def _look_at_wall(self, scene: Scene) -> Sight:
+    def _look_at_wall(self, scene: Scene) -> BodyImage:
         T_ws = pose.inverse(scene.T_rw) @ self._camera.T_rs
         directions_w = self.rays @ T_ws[:3, :3].T
         with np.errstate(divide="ignore"):
             distance = -T_ws[2, 3] / directions_w[..., 2]
         distance = np.where((distance > 0) & np.isfinite(distance), distance, np.nan)
         points_w = (T_ws[:3, 3] + directions_w * distance[..., None]).astype(np.float32)
-        return Sight(
+        return BodyImage(
             share=np.ones_like(distance, np.float32),
             distance=distance.astype(np.float32),
             cosine=np.abs(directions_w[..., 2]).astype(np.float32),

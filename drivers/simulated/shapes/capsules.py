@@ -14,7 +14,7 @@ _CLEARANCE = 2e-3
 
 
 @kernel
-def approach(
+def closest_approach(
     x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> tuple[float, float]:
     """Where the line of sight in the unit direction (x, y, z) comes closest to the segment from a to a + b.
@@ -34,7 +34,7 @@ def approach(
 
 
 @kernel
-def enter(
+def intersect_capsule(
     x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius: float
 ) -> float:
     """Distance [m] at which the line of sight in the unit direction (x, y, z) enters a capsule; NaN if it misses.
@@ -91,11 +91,11 @@ def cast_capsules(
                 if cones[i, 0] * x + cones[i, 1] * y + cones[i, 2] * z < cones[i, 3] - pixel:
                     continue
                 ax, ay, az, bx, by, bz, radius = capsules[i]
-                along, miss = approach(x, y, z, ax, ay, az, bx, by, bz)
+                along, miss = closest_approach(x, y, z, ax, ay, az, bx, by, bz)
                 if along <= 0 or miss > radius + 0.5 * pixel * along:
                     continue
                 covered = min(0.5 + (radius - miss) / (pixel * along), 1.0)
-                found = enter(x, y, z, ax, ay, az, bx, by, bz, radius)
+                found = intersect_capsule(x, y, z, ax, ay, az, bx, by, bz, radius)
                 entry = along if np.isnan(found) else found
                 if (covered >= 0.5 and entry < nearest) or (best < 0.5 and covered > best):
                     nearest = entry if covered >= 0.5 else np.inf
@@ -124,7 +124,7 @@ def shadowed_by_capsules(
             length = np.sqrt(x * x + y * y + z * z)
             for i in range(len(capsules)):
                 ax, ay, az, bx, by, bz, radius = capsules[i]
-                found = enter(x / length, y / length, z / length, ax, ay, az, bx, by, bz, radius)
+                found = intersect_capsule(x / length, y / length, z / length, ax, ay, az, bx, by, bz, radius)
                 if 0 < found < length - _CLEARANCE:
                     dark[row, column] = True
                     break

@@ -37,7 +37,7 @@ class Profile:
     angle: NDArray[np.float64]
 
 
-def hang(length: float, load: float, clamp: float) -> Profile:
+def solve_elastica(length: float, load: float, clamp: float) -> Profile:
     """The shape of a strip.
 
     The equation is integrated from the free end, where the angle is searched for with which the clamp's comes out. The
@@ -49,20 +49,22 @@ def hang(length: float, load: float, clamp: float) -> Profile:
         clamp: angle between the clamped end and the vertical, above 0 and below π/2 [rad].
     """
     step = length / _STEPS
-    free = scipy.optimize.brentq(lambda angle: swing(angle, step, load, _STEPS)[-1, 0] - clamp, 0.0, clamp, xtol=1e-15)
-    nodes = swing(free, step, load, _STEPS)[::-_CHORD]
+    free = scipy.optimize.brentq(
+        lambda angle: integrate_elastica(angle, step, load, _STEPS)[-1, 0] - clamp, 0.0, clamp, xtol=1e-15
+    )
+    nodes = integrate_elastica(free, step, load, _STEPS)[::-_CHORD]
     angle, reach, drop = nodes[:, 0], nodes[0, 2] - nodes[:, 2], nodes[0, 3] - nodes[:, 3]
     return Profile(np.linspace(0, length, len(nodes)), reach, drop, angle)
 
 
 @kernel
-def swing(angle: float, step: float, load: float, steps: int) -> NDArray[np.float64]:
+def integrate_elastica(angle: float, step: float, load: float, steps: int) -> NDArray[np.float64]:
     """Follows the strip from its free end, by the Runge–Kutta method of fourth order.
 
     Args:
         angle: at the free end [rad].
         step: length of a step [m].
-        load: as of `hang` [1/m³].
+        load: as of `solve_elastica` [1/m³].
         steps: how many.
 
     Returns:

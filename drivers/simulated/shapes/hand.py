@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
-from drivers.simulated.scene.body import Appearance, Surface
+from drivers.simulated.scene.body import RayImage, Surface
 from drivers.simulated.shapes.capsules import cast_capsules, shadowed_by_capsules
 
 #: The hand's joints [m]: x to the side of the thumb, y from the fingers to the forearm, z towards what it covers.
@@ -59,7 +59,7 @@ class Hand:
 
     def at(self, t: float) -> "PlacedHand":
         """The hand at time `t` [s] after the start."""
-        side, period_s, height, slant, phase = self._habits
+        side, period_s, height, slant, phase = self._path
         angle = 2 * np.pi * self.speed * max(t - self.FIRST_S, 0.0) / period_s
         covered = np.concatenate([surface.at(t).grid(5, 7).reshape(-1, 3) for surface in self.surfaces])
         position = (
@@ -71,11 +71,11 @@ class Hand:
 
     def crossings(self, count: int) -> list[float]:
         """The times [s] at which it is in the middle of its first passes."""
-        period_s = self._habits[1] / self.speed
+        period_s = self._path[1] / self.speed
         return [self.FIRST_S + period_s * (0.25 + 0.5 * i) for i in range(count)]
 
     @cached_property
-    def _habits(self) -> tuple[float, float, float, float, float]:
+    def _path(self) -> tuple[float, float, float, float, float]:
         """Side it begins on, time there and back [s], height [m], slant [rad], phase of its small motions [rad]."""
         generator = np.random.default_rng([self.seed, 4])
         side = 1.0 if generator.random() < 0.5 else -1.0
@@ -101,11 +101,11 @@ class PlacedHand:
         ends = np.stack([capsules[:, :3], capsules[:, :3] + capsules[:, 3:6]], axis=1)
         return ends[:, :, None] + corners * capsules[:, None, None, 6:]
 
-    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> Appearance:
+    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> RayImage:
         """See `Body.cast`."""
         share, distance, cosine, part = cast_capsules(rays, self._capsules(pose.inverse(T_rs) @ self.T_rh))
         albedo = np.where((part >= 0)[..., None], np.array(_SKIN, np.float32), np.float32(0))
-        return Appearance(share, distance, cosine, albedo)
+        return RayImage(share, distance, cosine, albedo)
 
     def shadowed(self, points_s: NDArray[np.float64], light_s: NDArray[np.float64], T_rs: Pose) -> NDArray[np.bool_]:
         """See `Body.shadowed`."""

@@ -20,19 +20,19 @@ TARGETS: Mapping[str, Target] = {
 
 #: Texels per metre, and the deviation of the blur [m] that stands for lenses: heads see points, not areas.
 _DENSITY, _BLUR = 2000.0, 0.0012
-#: Reflectivities of ink and paper, in all light: black ink is not black in infra-red.
+#: Reflectivities of ink and paper_size, in all light: black ink is not black in infra-red.
 _INK, _PAPER = 0.15, 0.85
 
 
-def printed(target: Target) -> Texture:
-    """The print with its white rim, centred on the paper."""
+def print_texture(target: Target) -> Texture:
+    """The print with its white rim, centred on the paper_size."""
     white = gaussian_filter(raster(target, _DENSITY)[0], _BLUR * _DENSITY, mode="nearest")
     texels = np.repeat((_INK + (_PAPER - _INK) * white)[..., None], 4, axis=-1)
     return Texture(texels.astype(np.float32), _DENSITY)
 
 
-def paper(target: Target) -> tuple[float, float]:
-    """Width and height of the paper [m]."""
+def paper_size(target: Target) -> tuple[float, float]:
+    """Width and height of the paper_size [m]."""
     rows, columns = raster(target, _DENSITY)[0].shape
     return columns / _DENSITY, rows / _DENSITY
 
@@ -42,7 +42,7 @@ def board_pose(surface: Surface, target: Target, t: float) -> Pose:
 
     Args:
         surface: of the scene `target`: `parse(uri).build().scene.surfaces[0]`.
-        target: what is printed on it, one of `TARGETS`.
+        target: what is print_texture on it, one of `TARGETS`.
         t: after the first exposure; of exposure k it is k divided by the rate.
     """
     corners = surface.at(t).grid(2, 2)

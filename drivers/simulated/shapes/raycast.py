@@ -94,7 +94,7 @@ def cast(
 
 
 @kernel
-def soften_edges(
+def antialias_edges(
     rays: NDArray[np.float64],
     T_bs: NDArray[np.float64],
     sheet: NDArray[np.float64],

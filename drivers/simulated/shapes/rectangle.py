@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
-from drivers.simulated.scene.body import Appearance
+from drivers.simulated.scene.body import RayImage
 from drivers.simulated.scene.excursion import Excursion
 from drivers.simulated.scene.motion import Placement
 from drivers.simulated.scene.surface import surface_points
 from drivers.simulated.scene.texture import Texture
-from drivers.simulated.shapes.raycast import cast, shadowed, soften_edges
+from drivers.simulated.shapes.raycast import antialias_edges, cast, shadowed
 
 #: The rectangle is found in images by a grid of this many points per side.
 _OUTLINE_POINTS = 13
 
 
-class Moves(Protocol):
+class Trajectory(Protocol):
     """What says where a rectangle is, such as `drivers.simulated.scene.motion.Motion`."""
 
     def at(self, t: float) -> Placement:
@@ -40,7 +40,7 @@ class Rectangle:
 
     width: float
     height: float
-    motion: Moves
+    motion: Trajectory
     texture: Texture
     excursion: Excursion = field(default_factory=Excursion)
 
@@ -75,13 +75,13 @@ class PlacedRectangle:
         """See `Body.outline`."""
         return self.grid(_OUTLINE_POINTS, _OUTLINE_POINTS)
 
-    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> Appearance:
+    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> RayImage:
         """See `Body.cast`."""
         T_bs, shape = self._into_bend(T_rs), self._shape()
         sight, share = cast(rays, T_bs, shape)
-        soften_edges(rays, T_bs, shape, sight, share)
+        antialias_edges(rays, T_bs, shape, sight, share)
         distance, a, b, cosine = sight
-        return Appearance(share, distance, cosine, self.texture.at(a, b))
+        return RayImage(share, distance, cosine, self.texture.at(a, b))
 
     def shadowed(self, points_s: NDArray[np.float64], light_s: NDArray[np.float64], T_rs: Pose) -> NDArray[np.bool_]:
         """See `Body.shadowed`."""

@@ -14,7 +14,7 @@ _CLEARANCE = 2e-3
 
 
 @kernel
-def meet(
+def intersect_ribbon(
     ox: float,
     oy: float,
     oz: float,
@@ -64,7 +64,7 @@ def cast_ribbon(
         half_width: of the ribbon [m].
 
     Returns:
-        (4, height, width), as `meet`.
+        (4, height, width), as `intersect_ribbon`.
     """
     height, width = rays.shape[:2]
     sight = np.empty((4, height, width), np.float32)
@@ -75,7 +75,7 @@ def cast_ribbon(
             dx = T_ps[0, 0] * x + T_ps[0, 1] * y + T_ps[0, 2] * z
             dy = T_ps[1, 0] * x + T_ps[1, 1] * y + T_ps[1, 2] * z
             dz = T_ps[2, 0] * x + T_ps[2, 1] * y + T_ps[2, 2] * z
-            found = meet(ox, oy, oz, dx, dy, dz, nodes, half_width)
+            found = intersect_ribbon(ox, oy, oz, dx, dy, dz, nodes, half_width)
             sight[0, row, column], sight[1, row, column] = found[0], found[1]
             sight[2, row, column], sight[3, row, column] = found[2], found[3]
     return sight
@@ -93,6 +93,6 @@ def shadowed_by_ribbon(
         for column in range(width):
             x, y, z = points_p[row, column, 0] - ox, points_p[row, column, 1] - oy, points_p[row, column, 2] - oz
             length = np.sqrt(x * x + y * y + z * z)
-            found = meet(ox, oy, oz, x / length, y / length, z / length, nodes, half_width)
+            found = intersect_ribbon(ox, oy, oz, x / length, y / length, z / length, nodes, half_width)
             dark[row, column] = found[0] < length - _CLEARANCE
     return dark

@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
-from drivers.simulated.scene.body import Appearance
+from drivers.simulated.scene.body import RayImage
 from drivers.simulated.scene.excursion import Excursion
 from drivers.simulated.scene.motion import Oscillation
 from drivers.simulated.scene.texture import Texture
-from drivers.simulated.shapes.elastica import Profile, hang
+from drivers.simulated.shapes.antialiasing import cast_antialiased
+from drivers.simulated.shapes.elastica import Profile, solve_elastica
 from drivers.simulated.shapes.ribbon import cast_ribbon, shadowed_by_ribbon
-from drivers.simulated.shapes.soften import cast_softly
 
 #: Acceleration of free fall [m/s²]; it acts along the rig's y axis, which is down in the images.
 GRAVITY = 9.81
@@ -57,7 +57,7 @@ class Strip:
         # At rest the strip leaves the gripper towards the viewer and down: the profile's x axis is the rig's −z.
         T_rp = pose.from_rotation_vector((0, np.pi / 2 + self.TURNING * channels[4], 0), position)
         load = self.weight * GRAVITY / self.stiffness
-        profile = hang(self.length, load, float(self.TILT + self.TILTING * channels[3]))
+        profile = solve_elastica(self.length, load, float(self.TILT + self.TILTING * channels[3]))
         return PlacedStrip(self.width, self.texture, self.excursion.displaced(T_rp, t), profile)
 
     @cached_property
@@ -101,14 +101,14 @@ class PlacedStrip:
         """See `Body.outline`."""
         return self.grid(2, 33)
 
-    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> Appearance:
+    def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> RayImage:
         """See `Body.cast`."""
         T_ps, nodes = self._into_profile(T_rs), self._nodes()
-        sight, share = cast_softly(lambda rays_s: cast_ribbon(rays_s, T_ps, nodes, self.width / 2), rays)
+        sight, share = cast_antialiased(lambda rays_s: cast_ribbon(rays_s, T_ps, nodes, self.width / 2), rays)
         distance, place, across, cosine = sight
         chord = np.float32(self.profile.s[1])
         along = place * chord - np.float32(self.profile.s[-1] / 2)
-        return Appearance(share, distance, cosine, self.texture.at(along, across))
+        return RayImage(share, distance, cosine, self.texture.at(along, across))
 
     def shadowed(self, points_s: NDArray[np.float64], light_s: NDArray[np.float64], T_rs: Pose) -> NDArray[np.bool_]:
         """See `Body.shadowed`."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from abs_service.report.content import Section
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from evaluation.experiments.base import Context, Findings, UnavailableError
 from evaluation.experiments.recordings import azure, sigma_report, toy, toy_report
 
@@ -65,5 +65,5 @@ def _part(folder: Path, measure: Callable[[Path], Findings]) -> Findings:
         return Findings((), (Section(folder.name, (f"{folder.name} is not in the data folder.",)),))
     try:
         return measure(folder)
-    except FootageError as error:
+    except ForeignRecordingError as error:
         return Findings((), (Section(folder.name, (f"{folder.name} cannot be read: {error}",)),))

@@ -58,7 +58,7 @@ def read(folder: Path) -> Shot:
     """The frame in a folder with recording.mkv.
 
     Raises:
-        FootageError: it is not there or cannot be read, or PyAV is not installed.
+        ForeignRecordingError: it is not there or cannot be read, or PyAV is not installed.
     """
     footage = open_recording("azure", folder / "recording.mkv")
     frames: dict[Kind, Frame] = {}

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from abs_service.report.content import Column, Section, Table
-from drivers.encoding.foreign_recording import FootageError
+from drivers.encoding.foreign_recording import ForeignRecordingError
 from evaluation.experiments.base import Context, Findings, Goal, at_least, at_most
 from evaluation.experiments.recordings import azure
 from evaluation.experiments.warping import comparison, real, syntheses
@@ -117,5 +117,5 @@ def _real(context: Context, pool: ThreadPoolExecutor) -> Section:
         return Section(title, (f"{azure.FOLDER} is not in the data folder.",))
     try:
         return real.section(azure.read(context.data / azure.FOLDER), pool)
-    except FootageError as error:
+    except ForeignRecordingError as error:
         return Section(title, (str(error),))

@@ -10,7 +10,7 @@ import pytest
 from drivers.contract.device import Device
 from drivers.contract.errors import SdkMissingError
 from drivers.realsense import library
-from drivers.realsense.opening import about, of_device
+from drivers.realsense.opening import device_info, of_device
 from tests.drivers.conformance import BEFORE, Fault
 from tests.drivers.software_realsense import SoftwareCamera
 
@@ -42,7 +42,7 @@ class RealsenseBench:
         if serial in self.cameras:
             self.cameras[serial].halt()
         camera = self.cameras[serial] = SoftwareCamera(serial, fault=fault, after=40 + BEFORE)
-        info = about(camera.rs, camera.device)
+        info = device_info(camera.rs, camera.device)
         device = of_device(camera.rs, Pluggable(camera), info, time.monotonic_ns)
         camera.run()
         return device

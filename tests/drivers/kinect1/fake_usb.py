@@ -11,7 +11,7 @@ import numpy as np
 import usb.backend
 import usb.core
 
-from drivers.kinect1.transport.transfer import MICROFRAME_NS, GoneError, Transfer
+from drivers.kinect1.transport.transfer import MICROFRAME_NS, DisconnectedError, Transfer
 from tests.drivers.kinect1 import descriptors
 from tests.drivers.kinect1.emulator import EmulatedKinect
 
@@ -176,7 +176,7 @@ class FakeReader:
         time.sleep(max(passed_ns / fake.pace - (self._clock() - self._begin_ns), 0) * 1e-9)
         for endpoint in self._endpoints:
             if not fake.plugged:
-                raise GoneError("the camera was unplugged")
+                raise DisconnectedError("the camera was unplugged")
             packets, lengths = kinect.microframes(endpoint, fake.now, self.MICROFRAMES)
             fake.damage(fake.now, packets, lengths)
             yield Transfer(endpoint, packets, lengths, self._begin_ns + passed_ns)

@@ -26,7 +26,7 @@ FIRST_S = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
+class RemoteRig:
     """What was learned.
 
     Attributes:
@@ -50,7 +50,7 @@ def choose_rig(link: Link, address: Address) -> str:
     return choose(found, "remote", address.rig).info.serial
 
 
-def survey(link: Link, rig: str, address: Address) -> Survey:
+def probe(link: Link, rig: str, address: Address) -> RemoteRig:
     """Asks for the sensors of a rig and watches for a while what they deliver.
 
     Args:
@@ -65,18 +65,18 @@ def survey(link: Link, rig: str, address: Address) -> Survey:
     models = _models(link, rig, wanted)
     cameras = {name: _camera(rig, model) for name, model in models.items()}
     seen = _Seen()
-    link.listen(rig, IMAGES, seen.on_message)
+    link.subscribe(rig, IMAGES, seen.on_message)
     try:
         if seen.first.wait(FIRST_S):
             threading.Event().wait(address.learn_s)
     finally:
-        link.silence()
+        link.unsubscribe()
     streams = tuple(_stream(seen.frames[key]) for key in sorted(seen.frames) if key[0] in cameras)
     silent = sorted(set(wanted) - {stream.sensor for stream in streams})
     if silent:
         raise DeviceError(f'sensor {", ".join(silent)} of rig "{rig}" delivers nothing yet')
     clocks = {model.host_clock for model in models.values()}
-    return Survey(cameras, streams, same_clock=clocks == {host_clock()} and clocks != {""})
+    return RemoteRig(cameras, streams, same_clock=clocks == {host_clock()} and clocks != {""})
 
 
 @dataclass
@@ -98,7 +98,7 @@ class _Seen:
 def _configured(link: Link, rig: str) -> tuple[str, ...]:
     """The sensors that the rig's configuration names: more may be announced one after the other."""
     try:
-        configs = [tomllib.loads(Config.FromString(payload).toml) for payload in link.ask(rig, "config")]
+        configs = [tomllib.loads(Config.FromString(payload).toml) for payload in link.query(rig, "config")]
     except (DecodeError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(f'rig "{rig}" announces a configuration that is not understood: {error}') from error
     sensors = tuple(sorted({name for config in configs for name in config.get("sensors", {})}))
@@ -110,7 +110,7 @@ def _configured(link: Link, rig: str) -> tuple[str, ...]:
 def _models(link: Link, rig: str, wanted: Collection[str]) -> dict[str, SensorModel]:
     """What is announced of the wanted sensors, by name."""
     try:
-        models = [SensorModel.FromString(payload) for payload in link.ask(rig, "*/model")]
+        models = [SensorModel.FromString(payload) for payload in link.query(rig, "*/model")]
     except DecodeError as error:
         raise DeviceError(f'rig "{rig}" announces a sensor in a way that is not understood: {error}') from error
     announced = {model.sensor: model for model in models}

@@ -24,7 +24,7 @@ _STREAMS = {
 }
 
 
-def describe(stream: Stream, serial: str) -> StreamInfo:
+def stream_info(stream: Stream, serial: str) -> StreamInfo:
     """What a stream is to the service; all of a camera are stamped by its one counter."""
     clock = ClockInfo(f"kinect1 {serial}", TICK_HZ, bits=32)
     return StreamInfo(*_STREAMS[stream], stream.form.width, stream.form.height, stream.form.rate_hz, clock)
@@ -39,14 +39,14 @@ def camera_of(stream: Stream, plane: ReferencePlane) -> Camera:
 
 
 @dataclass(frozen=True, eq=False)
-class Stamped:
+class StampedFrame:
     """A frame without its epoch, and whether the device's clock has jumped before it."""
 
     frame: Frame
     stepped: bool
 
 
-class Channel:
+class StreamDecoder:
     """Makes frames of one stream in one epoch.
 
     Args:
@@ -56,7 +56,7 @@ class Channel:
     """
 
     def __init__(self, stream: Stream, serial: str, plane: ReferencePlane) -> None:
-        self.info = describe(stream, serial)
+        self.info = stream_info(stream, serial)
         self._stream = stream
         self._table = plane.table()
         self._calib_id = camera_of(stream, plane).calib_id
@@ -76,13 +76,13 @@ class Channel:
             f"{self.info.stream}.missing_packets": float(self._assembler.missing),
         }
 
-    def take(self, transfer: Transfer, epoch: int) -> Iterator[Stamped]:
+    def decode(self, transfer: Transfer, epoch: int) -> Iterator[StampedFrame]:
         """The frames that a transfer completes."""
         for image in self._assembler.feed(transfer.packets, transfer.lengths):
             # What tells the time is the first packet; the last one comes a whole period later.
             stamp = self._clock.stamp(image.ticks, transfer.arrival_ns(image.row))
             is_depth = self._stream == Stream.DEPTH
-            yield Stamped(
+            yield StampedFrame(
                 Frame(
                     sensor=self.info.sensor,
                     stream=self.info.stream,

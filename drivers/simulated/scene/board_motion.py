@@ -20,7 +20,7 @@ _SEEN = (0.37, 0.29)
 
 
 @dataclass(frozen=True)
-class Handling:
+class BoardMotion:
     """A flat board in one pose after another; see `drivers.simulated.scene.motion.Motion`.
 
     The first pose faces the rig from 0.7 m. The others are drawn so that the board is turned by up to 40° about an axis
@@ -45,23 +45,23 @@ class Handling:
         """The placement at time `t` [s] after the start."""
         number, since = divmod(max(t * self.speed, 0.0), self.hold_s + MOVE_S)
         part = smooth_step((since - self.hold_s) / MOVE_S)
-        return Placement(_between(self.held(int(number)), self.held(int(number) + 1), part))
+        return Placement(_between(self.pose_at(int(number)), self.pose_at(int(number) + 1), part))
 
-    def held(self, number: int) -> Pose:
+    def pose_at(self, number: int) -> Pose:
         """The pose `T_rp` of the board's middle that is held after `number` moves."""
         return _held(self, number)
 
 
 @lru_cache(maxsize=256)
-def _held(handling: Handling, number: int) -> Pose:
+def _held(board_motion: BoardMotion, number: int) -> Pose:
     if number == 0:
         return pose.from_rotation_vector((0, 0, 0), (0, 0, 0.7))
-    generator = np.random.default_rng([handling.seed, 5, number])
+    generator = np.random.default_rng([board_motion.seed, 5, number])
     distance = generator.uniform(NEAREST, FARTHEST)
     axis, angle = generator.uniform(0, 2 * np.pi), TILT * np.sqrt(generator.uniform(0.05, 1))
     roll = Rotation.from_rotvec([0, 0, generator.uniform(-ROLL, ROLL)])
     turned = Rotation.from_rotvec(angle * np.array([np.cos(axis), np.sin(axis), 0])) * roll
-    room = handling.reach * np.array(_SEEN) * distance - 0.5 * np.array([handling.width, handling.height])
+    room = board_motion.reach * np.array(_SEEN) * distance - 0.5 * np.array([board_motion.width, board_motion.height])
     x, y = np.maximum(room, 0) * generator.uniform(-1, 1, 2)
     return pose.from_rotation_vector(turned.as_rotvec(), (x, y, distance))
 

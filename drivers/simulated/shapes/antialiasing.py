@@ -12,7 +12,7 @@ _SUBRAYS = 4
 Cast = Callable[[NDArray[np.float64]], NDArray[np.float32]]
 
 
-def cast_softly(cast: Cast, rays: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def cast_antialiased(cast: Cast, rays: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """What pixels see of a body: through their centres, and where the rim crosses a pixel the mean of all it sees.
 
     Directions between pixels are interpolated from the neighbours', which is exact to second order in a pixel's size.

@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 Item = TypeVar("Item")
 
 
-class Inbox(Generic[Item]):
+class FrameQueue(Generic[Item]):
     """The newest few items; the oldest one is dropped rather than let anybody wait.
 
     Args:

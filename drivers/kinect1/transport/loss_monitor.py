@@ -10,7 +10,7 @@ CONDITION = "lost images"
 _REMEDY = "attach the Kinect to a USB controller of its own, without hubs, and check its cable"
 
 
-class LossWatch:
+class LossMonitor:
     """Warns when more than `TOLERATED` of the images of a window were dropped, and takes it back when they are not.
 
     Args:
@@ -25,7 +25,7 @@ class LossWatch:
         self._before = (0, 0)
         self._warned = False
 
-    def see(self, delivered: int, dropped: int) -> None:
+    def update(self, delivered: int, dropped: int) -> None:
         """Takes how many images were delivered and dropped so far."""
         if self._clock() - self._begin_ns < WINDOW_NS:
             return
