@@ -5,6 +5,7 @@ import tomllib
 from functools import partial
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import tomli_w
 from pydantic import ValidationError
@@ -52,8 +53,23 @@ def loads(text: str, source: str, base: Path) -> ServiceConfig:
         file = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
+    return from_tables(file, source, base)
+
+
+def from_tables(file: dict[str, Any], source: str, base: Path) -> ServiceConfig:
+    """The configuration in the tables of a TOML file.
+
+    Args:
+        file: the tables.
+        source: where they came from, for messages.
+        base: folder that relative paths start from.
+
+    Raises:
+        ConfigError: names all that is wrong.
+    """
     file = merge(file, source, base)
-    file.setdefault("record", {})  # its default directory starts from `base`, so it has to be made here
+    # The default directory of recordings starts from `base`, so it has to be made here.
+    file = {"record": {}} | file
     problems = references.check(file)
     try:
         # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.

@@ -1,15 +1,12 @@
 """A recording as a sequence of frames and truths, without a clock: nothing dropped, the same result each time."""
 
-import heapq
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import numpy as np
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from google.protobuf.message import DecodeError
-from mcap.records import Message
 
 from calib.camera import Camera
 from drivers.contract.device import Truth
@@ -17,7 +14,8 @@ from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.codec import CodecError
 from drivers.encoding.sensor_model import decode_camera
-from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk, scan
+from drivers.replay.contents import Contents, RecordingError, scan
+from drivers.replay.messages import messages
 
 MODEL_SCHEMA = SensorModel.DESCRIPTOR.full_name
 
@@ -67,7 +65,9 @@ class Recording:
             RecordingError: a damaged part, or a message that is no frame or truth.
         """
         waiting: dict[tuple[str, int, int], bytes] = {}
-        for topic, message in self._messages({codec.IMAGE_SCHEMA, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}):
+        for topic, message in messages(
+            self.path, self._contents, {codec.IMAGE_SCHEMA, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}
+        ):
             try:
                 if topic.schema == codec.TRUTH_SCHEMA:
                     yield codec.decode_truth(message.data)
@@ -84,30 +84,8 @@ class Recording:
                 raise RecordingError(f"{self.path}: {topic.name} at {message.log_time} ns: {error}") from error
         self.unpaired = len(waiting)
 
-    def _messages(self, schemas: set[str]) -> Iterator[tuple[Topic, Message]]:
-        """Messages of the given schemas by log time; those of one time in the order they were written."""
-        wanted = {channel for channel, topic in self._contents.topics.items() if topic.schema in schemas}
-        chunks = self._contents.chunks
-        # A message may go out as soon as no chunk that is still to be read begins earlier.
-        starts = np.array([*(chunk.start_ns for chunk in chunks), np.iinfo(np.int64).max], np.int64)
-        earliest = np.minimum.accumulate(starts[::-1])[::-1]
-        held: list[tuple[int, int, int, Message]] = []
-        with self.path.open("rb") as stream:
-            for number, chunk in enumerate(chunks):
-                try:
-                    records = read_chunk(stream, chunk)
-                except DAMAGE as error:
-                    where = f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error})"
-                    raise RecordingError(f"{where}; `abs-service recover` saves the rest") from error
-                for position, record in enumerate(records):
-                    if isinstance(record, Message) and record.channel_id in wanted:
-                        heapq.heappush(held, (record.log_time, number, position, record))
-                while held and held[0][0] <= earliest[number + 1]:
-                    message = heapq.heappop(held)[-1]
-                    yield self._contents.topics[message.channel_id], message
-
     def _wall_offset(self) -> int:
-        for _, message in self._messages({codec.INFO_SCHEMA}):
+        for _, message in messages(self.path, self._contents, {codec.INFO_SCHEMA}):
             try:
                 return message.log_time - FrameInfo.FromString(message.data).header.t_host_ns
             except DecodeError as error:
@@ -120,7 +98,7 @@ class Recording:
             topic.name for topic in self._contents.topics.values() if topic.schema == MODEL_SCHEMA and topic.count
         }
         models: dict[str, SensorModel] = {}
-        for topic, message in self._messages({MODEL_SCHEMA}) if missing else ():
+        for topic, message in messages(self.path, self._contents, {MODEL_SCHEMA}) if missing else ():
             if topic.name in missing:
                 missing.discard(topic.name)
                 try:

@@ -1,0 +1,41 @@
+"""The messages of an MCAP file in the order of their times."""
+
+import heapq
+from collections.abc import Iterator, Set
+from pathlib import Path
+
+import numpy as np
+from mcap.records import Message
+
+from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk
+
+
+def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tuple[Topic, Message]]:
+    """Messages of the given schemas by log time; those of one time in the order they were written.
+
+    Args:
+        path: of the file.
+        contents: its survey.
+        schemas: full names of protobuf messages.
+
+    Raises:
+        RecordingError: a damaged chunk.
+    """
+    wanted = {channel for channel, topic in contents.topics.items() if topic.schema in schemas}
+    # A message may go out as soon as no chunk that is still to be read begins earlier.
+    starts = np.array([*(chunk.start_ns for chunk in contents.chunks), np.iinfo(np.int64).max], np.int64)
+    earliest = np.minimum.accumulate(starts[::-1])[::-1]
+    held: list[tuple[int, int, int, Message]] = []
+    with path.open("rb") as stream:
+        for number, chunk in enumerate(contents.chunks):
+            try:
+                records = read_chunk(stream, chunk)
+            except DAMAGE as error:
+                where = f"{path}: the chunk at byte {chunk.offset} is damaged ({error})"
+                raise RecordingError(f"{where}; `abs-service recover` saves the rest") from error
+            for position, record in enumerate(records):
+                if isinstance(record, Message) and record.channel_id in wanted:
+                    heapq.heappush(held, (record.log_time, number, position, record))
+            while held and held[0][0] <= earliest[number + 1]:
+                message = heapq.heappop(held)[-1]
+                yield contents.topics[message.channel_id], message
