@@ -1,4 +1,4 @@
-"""Opens devices, and other programs' recordings, by name, and finds what is attached; a scheme names a module."""
+"""Opens devices and other programs' recordings, and discovers attached devices; a scheme names a driver module."""
 
 import importlib
 import pkgutil
@@ -14,7 +14,7 @@ from drivers.contract.device import AddressError, Device, DeviceInfo
 from drivers.contract.discovery import Availability, Found
 from drivers.encoding.foreign_recording import ForeignRecording
 
-#: What a driver may take longer than it was given before it is left behind [s].
+#: Time beyond its timeout after which a driver is abandoned [s].
 _GRACE_S = 1.0
 
 
@@ -26,7 +26,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        AddressError: no such driver, or the driver does not understand the address.
+        AddressError: no such driver, or an invalid address.
         DeviceError: the driver cannot open the device now.
     """
     scheme = urlsplit(uri).scheme
@@ -38,7 +38,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
 
 
 def open_recording(program: str, path: Path) -> ForeignRecording:
-    """Opens a file that another program recorded with `drivers.<program>.open_recording`; only that driver is imported.
+    """Opens a recording of another program with `drivers.<program>.open_recording`; only that driver is imported.
 
     Raises:
         ForeignRecordingError: it cannot be read.
@@ -52,17 +52,17 @@ def available() -> list[str]:
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """What is attached, of all drivers, which look at the same time; never raises.
+    """Attached devices of all drivers, which search concurrently; never raises.
 
     Args:
-        timeout_s: time that each driver has. One that takes longer, or breaks, is reported as faulty.
+        timeout_s: timeout of each driver. A driver that exceeds it or raises is reported as faulty.
     """
     searches = {scheme: _search(scheme, timeout_s) for scheme in available()}
     return [one for scheme, search in searches.items() for one in _result(scheme, search, timeout_s + _GRACE_S)]
 
 
 def _search(scheme: str, timeout_s: float) -> Future[list[Found]]:
-    """Looks from a daemon thread: a driver that hangs must not keep the process from ending."""
+    """Searches in a daemon thread, so that a hanging driver does not block the end of the process."""
     result: Future[list[Found]] = Future()
 
     def run() -> None:

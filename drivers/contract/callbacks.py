@@ -1,4 +1,4 @@
-"""Declaring what a library calls back from threads of its own."""
+"""Declaration of zenoh callbacks from a non-daemon thread."""
 
 import threading
 from collections.abc import Callable
@@ -9,11 +9,11 @@ T = TypeVar("T")
 
 
 def from_non_daemon_thread(declare: Callable[[], T]) -> T:
-    """Declares something with a callback to zenoh, from a thread that is no daemon; raises what `declare` raises.
+    """Calls `declare`, which registers a callback with zenoh, from a non-daemon thread; raises what `declare` raises.
 
-    The thread in which zenoh calls back is a daemon if the declaring thread is one. The interpreter does not wait for
-    daemons when it ends: such a thread, awakened by the session's close, would return from Rust to an interpreter that
-    is gone, and abort the process ("FATAL: exception not rethrown").
+    zenoh's callback thread inherits the daemon flag of the declaring thread, and the interpreter does not join daemon
+    threads at exit. When the session closes, such a thread would return from Rust into a finalized interpreter and
+    abort the process ("FATAL: exception not rethrown").
     """
     declared: Future[T] = Future()
 

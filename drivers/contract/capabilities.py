@@ -1,4 +1,4 @@
-"""What a device can do, as plain data: its streams, their clocks, what can be set, how it can be synchronised."""
+"""Capabilities of a device as plain data: streams, clocks, controls and synchronisation roles."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +8,7 @@ from drivers.contract.frame import Kind
 
 
 class SyncRole(StrEnum):
-    """What part a device can take in a group whose exposures are triggered by wire or network."""
+    """Role of a device in a group whose exposures are triggered by wire or network."""
 
     FREE = "free"
     MASTER = "master"
@@ -17,12 +17,12 @@ class SyncRole(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ClockInfo:
-    """The clock that stamps a stream. Streams of one device may have clocks that drift apart.
+    """The clock that timestamps a stream. Clocks of one device's streams may drift apart.
 
     Attributes:
-        domain: its name; stamps of equal domains may be compared. "host" is CLOCK_MONOTONIC itself.
+        domain: its name; timestamps are comparable within a domain. "host" is CLOCK_MONOTONIC itself.
         tick_hz: its rate, 0 if it has no ticks of its own.
-        bits: width of its counter, which begins anew at 2 ** bits ticks; 0 if it never does.
+        bits: width of its counter, which wraps at 2 ** bits ticks; 0 if it never wraps.
     """
 
     domain: str = "host"
@@ -30,7 +30,7 @@ class ClockInfo:
     bits: int = 0
 
 
-#: The clock of streams that the host stamps.
+#: The clock of streams that are timestamped by the host.
 HOST_CLOCK = ClockInfo()
 
 
@@ -55,13 +55,13 @@ class StreamInfo:
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a device can do in the mode in which it was opened; does not change until it is closed.
+    """Capabilities of a device in the mode in which it was opened; constant until it is closed.
 
     Attributes:
-        streams: what it delivers.
-        controls: what can be set while it is open.
-        sync_roles: parts that it can take among other devices; the one it takes is its control `sync_role`.
-        regular: whether its streams keep coming at their rates, so that silence is a fault; not so in a recording.
+        streams: the streams that it delivers.
+        controls: parameters that can be set while it is open.
+        sync_roles: supported synchronisation roles; the active one is the control `sync_role`.
+        regular: True if its streams are periodic, so that silence is a fault; False for a recording.
     """
 
     streams: tuple[StreamInfo, ...]

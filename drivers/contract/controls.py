@@ -1,7 +1,7 @@
-"""What can be set on a device while it is open: exposure, gain, laser power, modulation range and the like.
+"""Controls: parameters of an open device, such as exposure, gain, laser power and modulation range.
 
-The names end in their SI unit (`exposure_s`); two devices with a control of one name mean the same by it. Usual ones:
-`exposure_s`, `auto_exposure`, `gain`, `laser_power` (share of the greatest, 0 to 1), `modulation`, `sync_role`.
+Names end in their SI unit (`exposure_s`) and mean the same on every device. Common controls:
+`exposure_s`, `auto_exposure`, `gain`, `laser_power` (fraction of the maximum, 0 to 1), `modulation`, `sync_role`.
 """
 
 import json
@@ -16,24 +16,24 @@ Value = bool | int | float | str
 
 
 class ControlKind(StrEnum):
-    """What values a control takes."""
+    """Type of a control's values."""
 
     SWITCH = "switch"  # true or false
     WHOLE = "whole"  # int
     NUMBER = "number"  # float
-    CHOICE = "choice"  # one of some words
+    CHOICE = "choice"  # one of several strings
 
 
 @dataclass(frozen=True, slots=True)
 class ControlInfo:
-    """What one control is and allows.
+    """Type and limits of one control.
 
     Attributes:
         name: of the control.
         kind: of its values.
         unit: SI unit of a number, "" if it has none.
-        minimum, maximum: limits of a number, both included.
-        choices: the words of a choice.
+        minimum, maximum: limits of a number, inclusive.
+        choices: allowed strings of a choice.
     """
 
     name: str
@@ -45,7 +45,7 @@ class ControlInfo:
 
     @property
     def allowed(self) -> str:
-        """What may be given, in plain words."""
+        """Description of the allowed values for error messages."""
         match self.kind:
             case ControlKind.SWITCH:
                 return "true or false"
@@ -55,10 +55,10 @@ class ControlInfo:
         return f"{noun} from {self.minimum:g} to {self.maximum:g} {self.unit}".rstrip()
 
     def checked(self, value: Value) -> Value:
-        """`value` as the device takes it: a float for a number, even if a whole one was given.
+        """Validated value, converted to the control's type: an int for a NUMBER becomes a float.
 
         Raises:
-            ControlError: not of this kind, not finite, or out of range; says what is allowed.
+            ControlError: wrong type, not finite, or out of range; names what is allowed.
         """
         match self.kind, value:
             case (ControlKind.SWITCH, bool()):
@@ -78,9 +78,9 @@ class ControlInfo:
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """A control with the functions that reach the device; either may raise `DeviceError` if the device does not answer.
+    """A control with its read and write functions; both may raise `DeviceError` if the device does not answer.
 
-    A driver that reaches its device only while it streams keeps the value and sends it when it starts.
+    A driver that can only access its device while it streams keeps the value and sends it at start.
     """
 
     info: ControlInfo
@@ -89,9 +89,9 @@ class Control:
 
 
 class Controls:
-    """All controls of one device. Nothing reaches the device that the control does not allow.
+    """All controls of one device; values are validated before they are sent to the device.
 
-    `Controls()` is what a device has that can set nothing.
+    `Controls()` is the null object of a device without controls.
 
     Args:
         controls: of the device; each name once.
@@ -102,14 +102,14 @@ class Controls:
 
     @property
     def infos(self) -> tuple[ControlInfo, ...]:
-        """What can be set, for `drivers.contract.capabilities.Capabilities`."""
+        """All controls, for `drivers.contract.capabilities.Capabilities`."""
         return tuple(control.info for control in self._controls.values())
 
     def get(self, name: str) -> Value:
-        """What the control is set to.
+        """Current value of a control.
 
         Raises:
-            ControlError: no such control; names those that there are.
+            ControlError: no such control; names the existing ones.
             DeviceError: the device does not answer.
         """
         return self._find(name).read()
@@ -118,7 +118,7 @@ class Controls:
         """Sets the control.
 
         Raises:
-            ControlError: no such control, or a value that it does not take; says what is allowed.
+            ControlError: no such control, or a value that is not allowed; names what is allowed.
             DeviceError: the device does not answer.
         """
         control = self._find(name)

@@ -1,13 +1,13 @@
 """The contract between the service and every device.
 
-A driver is a module or package of `drivers`, named like the scheme of its addresses, with two functions:
+A driver is a module or package of `drivers`, named after the scheme of its addresses, with two functions:
 
-- `open_device(uri: str, clock: Callable[[], int]) -> Device`: `clock` is CLOCK_MONOTONIC [ns]; what has to be chosen
-  before opening (sizes, rates, mode) stands in the query of the address. `scheme://` alone is the only device attached.
+- `open_device(uri: str, clock: Callable[[], int]) -> Device`: `clock` is CLOCK_MONOTONIC [ns]; settings that must be
+  chosen before opening (sizes, rates, mode) are in the query of the address. `scheme://` opens the only attached one.
 - `discover(timeout_s: float) -> list[Found]`, see `drivers.contract.discovery`.
 
-A driver opens, delivers, and says when it cannot go on. The device supervisor (`abs_service.capture.device_supervisor`)
-notices silence and opens it again. No driver reconnects by itself. docs/devices.md says the same at more length.
+A driver opens a device, delivers frames and reports failure. It never reconnects: the device supervisor
+(`abs_service.capture.device_supervisor`) detects stalls and reopens the device. See docs/devices.md.
 """
 
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ __all__ = [
 
 
 class DeviceState(StrEnum):
-    """Where a device is in its life. Drivers report CLOSED, OPENING, STREAMING and FAILED; their keeper the others."""
+    """Life cycle state. Drivers report CLOSED, OPENING, STREAMING and FAILED; the device supervisor the others."""
 
     CLOSED = "closed"
     OPENING = "opening"
@@ -51,14 +51,14 @@ class DeviceState(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """Who a device is.
+    """Identity of a device.
 
     Attributes:
-        uri: address that opens this very device again, by its serial number, on whatever port it is then.
-        model: what it is called.
+        uri: address that reopens this device by its serial number, independent of the port.
+        model: product name.
         serial: its serial number, "" if it cannot be read.
         firmware: its version, "" if unknown.
-        link: how it is attached and how fast, "USB 3, 5 Gbit/s", say; "" if unknown.
+        link: connection and its speed, such as "USB 3, 5 Gbit/s"; "" if unknown.
     """
 
     uri: str
@@ -70,13 +70,13 @@ class DeviceInfo:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """What a simulated device knows: where a grid of a surface's material points is at the moment of an exposure.
+    """Ground truth of a simulated device: positions of a grid of material points at the time of an exposure.
 
     Attributes:
-        seq: exposure the truth belongs to.
+        seq: sequence number of the exposure.
         t_host_ns: its time, CLOCK_MONOTONIC [ns].
         points_r: (rows, columns, 3) rig coordinates [m]; entry (i, j) is the same material point in every frame.
-        surface: which of the device's surfaces, counted from 0; each has a truth of its own.
+        surface: index of the surface, from 0; each surface has its own truth.
     """
 
     seq: int
@@ -86,26 +86,26 @@ class Truth:
 
 
 class Sink(Protocol):
-    """Where a device delivers to. No method blocks or raises; a device may call them from any thread of its own."""
+    """Receiver of a device's callbacks. No method blocks or raises; a device may call them from any of its threads."""
 
     def on_frame(self, frame: Frame) -> None:
-        """Takes one frame."""
+        """Called with each frame."""
         ...
 
     def on_truth(self, truth: Truth) -> None:
-        """Takes what a simulated device knows about the exposure."""
+        """Called with the ground truth of each exposure of a simulated device."""
         ...
 
     def on_state(self, state: DeviceState, reason: str) -> None:
-        """Learns that the device changed its state, and why in plain words."""
+        """Called on each change of state, with the reason in plain words."""
         ...
 
     def on_warning(self, condition: str, message: str) -> None:
-        """Learns that something needs attention though the device streams; `message` "" says that it is over.
+        """Called when a condition needs attention while the device streams; an empty `message` clears it.
 
         Args:
-            condition: name of what is watched: "usb speed", "temperature".
-            message: what is wrong and what to do about it, in plain words.
+            condition: name of the condition: "usb speed", "temperature".
+            message: the problem and its remedy, in plain words.
         """
         ...
 
@@ -113,18 +113,18 @@ class Sink(Protocol):
 class Device(Protocol):
     """A source of frames, opened. All methods may be called from any thread.
 
-    Driver threads never wait for anyone: a frame that cannot be delivered is dropped and counted by its cause. What is
-    incomplete or of the wrong size is never delivered.
+    Driver threads never block: a frame that cannot be delivered is dropped and counted by cause. Incomplete frames and
+    frames of the wrong size are never delivered.
     """
 
     @property
     def info(self) -> DeviceInfo:
-        """Who the device is."""
+        """Identity of the device."""
         ...
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it delivers and what can be set."""
+        """Streams and controls."""
         ...
 
     @property
@@ -134,26 +134,26 @@ class Device(Protocol):
 
     @property
     def controls(self) -> Controls:
-        """What can be set, from opening to closing."""
+        """Controls, usable from opening to closing."""
         ...
 
     @property
     def state(self) -> DeviceState:
-        """Where the device is in its life: CLOSED before `start` and after `stop`."""
+        """Life cycle state: CLOSED before `start` and after `stop`."""
         ...
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and frames dropped by cause; they only grow while the device is open."""
+        """`frames` delivered, and frames dropped by cause; monotonic while the device is open."""
         ...
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """What it measures of itself; names end in their unit: `temperature_c`, `clock.tof/depth.drift_ppm`."""
+        """Self-measurements; names end in their unit: `temperature_c`, `clock.tof/depth.drift_ppm`."""
         ...
 
     def start(self, sink: Sink) -> None:
-        """Begins to deliver to `sink` from a thread of the device's own, in a new epoch. Nothing if it is running.
+        """Starts delivery to `sink` from the device's own threads, in a new epoch; no effect while it is running.
 
         Raises:
             DeviceError: the device cannot stream, or was closed.
@@ -161,9 +161,9 @@ class Device(Protocol):
         ...
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again. May be called at any time, and by the sink."""
+        """Stops delivery; the sink is not called after it returns. May be called at any time, also from the sink."""
         ...
 
     def close(self) -> None:
-        """Stops and releases the device, also while another thread reads or starts it; any number of times."""
+        """Stops and releases the device, also while another thread reads or starts it; idempotent."""
         ...

@@ -1,7 +1,7 @@
-"""What a driver finds attached, and which of it an address means.
+"""Discovery of attached devices, and selection of the device that an address names.
 
-Every driver has a function `discover(timeout_s: float) -> list[Found]`. It never raises, opens nothing for longer than
-it must, and also reports what it sees but could not open.
+Every driver has a function `discover(timeout_s: float) -> list[Found]`. It never raises, keeps nothing open longer than
+necessary, and also reports devices that cannot be opened.
 """
 
 from collections.abc import Sequence
@@ -11,12 +11,12 @@ from enum import StrEnum
 from drivers.contract.device import DeviceInfo
 from drivers.contract.errors import DeviceError
 
-#: What to do when a user may not open a device on USB.
+#: Remedy for missing permission to open a USB device.
 UDEV_REMEDY = "abs-service devices --udev | sudo tee /etc/udev/rules.d/60-abs-service.rules  and plug it in again"
 
 
 class Availability(StrEnum):
-    """Whether a device could be opened now, and if not, what kind of obstacle there is."""
+    """READY if a device can be opened now, else the kind of obstacle."""
 
     READY = "ready"
     BUSY = "in use"
@@ -27,14 +27,13 @@ class Availability(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A device that is attached, or a driver that cannot look for any.
+    """An attached device, or a driver whose discovery failed.
 
     Attributes:
-        info: who it is. `uri` opens this device and no other, on whatever port it is next time; what the driver cannot
-            find out without opening it is "".
-        availability: whether it can be opened.
-        reason: why not, in plain words; "" if it can.
-        remedy: what to do about it, a command where there is one; "" if nothing is to be done.
+        info: its identity. `uri` opens this device and no other, on any port; what is unknown before opening is "".
+        availability: READY, or the kind of obstacle.
+        reason: the obstacle in plain words; "" if READY.
+        remedy: how to remove the obstacle, if possible as a command; "" if there is none.
     """
 
     info: DeviceInfo
@@ -44,15 +43,15 @@ class Found:
 
 
 def choose(found: Sequence[Found], scheme: str, serial: str) -> Found:
-    """The device that `scheme://serial` means; without a serial number the only one that is attached.
+    """The device that `scheme://serial` names; without a serial number the only attached one.
 
     Args:
-        found: what the driver's `discover` has found.
+        found: result of the driver's `discover`.
         scheme: of the driver.
         serial: wanted serial number, "" for the only device.
 
     Raises:
-        DeviceError: there is none, there are several to choose from, or it cannot be opened; says what to do.
+        DeviceError: no match, several matches, or it cannot be opened; names the remedy.
     """
     fitting = [one for one in found if serial in {"", one.info.serial}]
     there_are = ", ".join(one.info.uri for one in found) or "none"

@@ -1,24 +1,24 @@
-"""What can be wrong with a device, sorted by what helps."""
+"""Device errors, classified by whether a retry can help."""
 
 
 class DeviceError(Exception):
-    """A device cannot be opened or stopped working; the message says what to do about it. Trying again may help."""
+    """A device cannot be opened or stopped working; the message names the remedy. A retry may help."""
 
 
 class FinalError(DeviceError):
-    """Trying again is of no use: the address, the settings or the installation have to be changed first."""
+    """A retry cannot help: the address, the settings or the installation must be changed first."""
 
 
 class AddressError(FinalError):
-    """An address that no device can have, now or later."""
+    """An invalid address."""
 
 
 class SdkMissingError(FinalError):
     """A driver whose library is not installed.
 
     Args:
-        package: what cannot be imported.
-        extra: the extra of this project that brings it.
+        package: the package that cannot be imported.
+        extra: the extra of this project that installs it.
     """
 
     def __init__(self, package: str, extra: str) -> None:
@@ -28,12 +28,12 @@ class SdkMissingError(FinalError):
 
 
 class ControlError(FinalError):
-    """A control that the device does not have, or a value that the control cannot take.
+    """An unknown control, or a value that the control does not allow.
 
     Args:
         control: name of the control.
-        given: the value, as the user would write it; "" if the name is already wrong.
-        allowed: what may stand there instead, in plain words.
+        given: the value, as the user would write it; "" if the name is unknown.
+        allowed: description of the allowed values.
     """
 
     def __init__(self, control: str, given: str, allowed: str) -> None:

@@ -1,4 +1,4 @@
-"""What a device delivers: one image with everything needed to interpret it."""
+"""Frames: images with the metadata needed to interpret them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 
 class Kind(StrEnum):
-    """What the numbers of an image mean; a `DEVIATION` is what the sensor says of the depth beside it, as σ."""
+    """Quantity that an image holds; a `DEVIATION` is the sensor's own σ of the depth image of the same exposure."""
 
     DEPTH = "depth"
     AMPLITUDE = "amplitude"
@@ -25,7 +25,7 @@ class Kind(StrEnum):
 
 
 class Geometry(StrEnum):
-    """Which length a depth image holds; `NONE` for images that hold no length."""
+    """Type of distance in a depth image; `NONE` for other images."""
 
     NONE = "none"
     Z = "z"
@@ -33,7 +33,7 @@ class Geometry(StrEnum):
 
 
 class Reference(StrEnum):
-    """Which moment of the exposure the host time refers to."""
+    """Point of the exposure that the host time refers to."""
 
     START = "start"
     MIDDLE = "middle"
@@ -41,10 +41,10 @@ class Reference(StrEnum):
 
 
 class FrameError(ValueError):
-    """A frame that contradicts itself."""
+    """An inconsistent frame."""
 
 
-#: The unit of an image that declares none, by its kind; the others hold numbers that only the device understands.
+#: Default unit by kind; all other kinds are in device-specific digital numbers.
 _UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.DEVIATION: "m", Kind.BINARY: "1"}
 
 #: Pixel encodings as in foxglove.RawImage, with the array they hold: (dtype, channels).
@@ -69,28 +69,28 @@ class Frame:
     Attributes:
         sensor: name of the optical head in the rig; all streams of a sensor share one camera model.
         stream: name of the stream, unique within its sensor.
-        kind: what the numbers mean.
+        kind: quantity that the image holds.
         data: pixels as measured, read-only, shape (height, width) or (height, width, 3), dtype given by `encoding`.
         encoding: one of `ENCODINGS`.
         t_host_ns: host time of the exposure on CLOCK_MONOTONIC [ns].
-        t_arrival_ns: when the host had the frame, CLOCK_MONOTONIC [ns].
+        t_arrival_ns: host time at which the frame arrived, CLOCK_MONOTONIC [ns].
         seq: counts the device's exposures; depth and amplitude of one exposure share it; gaps are losses.
-        epoch: grows by one with each reconnect or clock step; seq and ticks start anew.
+        epoch: incremented by each reconnect or clock step; seq and ticks restart.
         scale: value, in `unit`, of one step of `data`.
-        unit: what `data` times `scale` is measured in: "m" for lengths, "1" for yes (1) and no (0), "dn" for numbers
-            that only the device knows the meaning of; by default what fits the kind.
-        geometry: which length a depth image holds.
+        unit: unit of `data` times `scale`: "m" for lengths, "1" for binary values, "dn" for device-specific digital
+            numbers; the default depends on the kind.
+        geometry: type of distance in a depth image.
         invalid: the value of `data` that means "no return"; NaN always does; None if every value is a measurement.
-        t_device_ticks, tick_hz: the device's own stamp and its rate; rate 0 if the device has no clock.
-        clock_domain: name of the clock that made the ticks.
+        t_device_ticks, tick_hz: the device's timestamp and its rate; rate 0 if the device has no clock.
+        clock_domain: name of the clock of the ticks.
         t_sigma_ns: standard deviation of `t_host_ns` [ns].
-        t_reference: moment of the exposure that the stamps refer to.
+        t_reference: point of the exposure that the timestamps refer to.
         exposure_s, gain, temperature_c: settings during the exposure; NaN if unknown.
         modulation: modulation or range profile of a time-of-flight sensor, "" if none.
-        calib_id: hash of the camera model the device had in mind, "" if unknown.
-        undistorted: whether the device removed the lens distortion.
-        aligned_to: sensor into whose view the device warped the image, "" if it is the sensor's own.
-        filters: names of the filters that the device applied, in order.
+        calib_id: hash of the device's camera model, "" if unknown.
+        undistorted: True if the device removed the lens distortion.
+        aligned_to: sensor to whose view the device registered the image, "" if it is in the sensor's own view.
+        filters: filters applied by the device, in order.
         incomplete, saturated: flags of the device.
     """
 
@@ -158,14 +158,14 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameSet:
-    """Frames of several streams that show one moment.
+    """Synchronised frames of several streams.
 
     Attributes:
-        seq: counts the sets that a synchroniser formed.
+        seq: sequence number of the set.
         stamp_ns: host time of the reference stream's frame, CLOCK_MONOTONIC [ns].
         frames: the members by (sensor, stream).
-        missing: streams that were expected and have no frame within the tolerance.
-        spread_ns: largest difference between a member's stamp and `stamp_ns` [ns].
+        missing: expected streams without a frame within the tolerance.
+        spread_ns: maximum difference between a member's timestamp and `stamp_ns` [ns].
     """
 
     seq: int

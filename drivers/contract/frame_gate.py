@@ -1,6 +1,6 @@
-"""What lies between a driver's threads and the sink: lets through what fits, counts the rest, and ends when it is told.
+"""Gate between a driver's threads and the sink: validates frames, counts drops, and keeps state and epoch.
 
-Every driver has one; the contract's promises about counting, states and the end of delivery are kept here.
+Every driver has one; it implements the contract's guarantees about counters, states and the end of delivery.
 """
 
 import threading
@@ -11,22 +11,22 @@ from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import DeviceError, DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
-#: States in which nothing comes until the device is started again.
+#: States without delivery until the next start.
 _ENDED = frozenset({DeviceState.CLOSED, DeviceState.FAILED})
 
 
 class FrameGate:
-    """The way from one device to its sink. Every method may be called from any thread.
+    """Passes frames and states of one device to its sink. Thread-safe.
 
     Args:
-        streams: what the device has promised; a frame that contradicts them is dropped and counted.
-        causes: reasons for dropping frames that the driver knows of; they are counted from 0 on.
+        streams: declared streams; a frame that does not match them is dropped and counted.
+        causes: the driver's own reasons for drops; their counters exist from the start.
     """
 
     def __init__(self, streams: Iterable[StreamInfo], causes: Iterable[str] = ()) -> None:
         self._streams = {stream.key: stream for stream in streams}
         self._counters = Counter({"frames": 0, **dict.fromkeys(causes, 0)})
-        # Reentrant, because the sink may stop the device from within `on_frame`.
+        # Reentrant, because the sink may stop the device in `on_frame`.
         self._lock = threading.RLock()
         self._sink: Sink | None = None
         self._state = DeviceState.CLOSED
@@ -36,25 +36,25 @@ class FrameGate:
 
     @property
     def state(self) -> DeviceState:
-        """What was reported last."""
+        """The state that was reported last."""
         return self._state
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and dropped ones by cause."""
+        """`frames` delivered, and drops by cause."""
         with self._lock:
             return dict(self._counters)
 
     @property
     def epoch(self) -> int:
-        """The epoch of the frames that are delivered now; 0 after the first start."""
+        """Current epoch; 0 after the first start."""
         return self._epoch
 
     def begin(self, sink: Sink, reason: str) -> threading.Event | None:
-        """Begins a new epoch, in the state OPENING; None, and nothing happens, if it delivers already.
+        """Opens the gate with a new epoch in the state OPENING; None, without effect, if it is open already.
 
         Returns:
-            What will be set as soon as delivery ends: the sign for the driver's thread to stop.
+            Stop event of the driver's thread, set when delivery ends.
 
         Raises:
             DeviceError: the device was closed.
@@ -71,7 +71,7 @@ class FrameGate:
             return ended
 
     def end(self, reason: str) -> None:
-        """Reports CLOSED, unless the end was reported already, and lets nothing through any more once it returns."""
+        """Reports CLOSED, unless an end was reported already; nothing is delivered after it returns."""
         with self._lock:
             if self._state not in _ENDED:
                 self.report_state(DeviceState.CLOSED, reason)
@@ -80,18 +80,18 @@ class FrameGate:
             self._ended.set()
 
     def release(self) -> None:
-        """Ends for good: `begin` raises from now on."""
+        """Ends delivery permanently: `begin` raises from now on."""
         with self._lock:
             self._released = True
             self.end("closed")
 
     def begin_epoch(self) -> None:
-        """Begins a new epoch without a pause, because the device's clock has jumped."""
+        """Increments the epoch after a step of the device's clock."""
         with self._lock:
             self._epoch += 1
 
     def report_state(self, state: DeviceState, reason: str) -> None:
-        """Reports a state; ignored when nothing is being delivered, so that a late thread cannot revive a device."""
+        """Reports a state; ignored while the gate is closed, so that a late thread cannot revive a device."""
         with self._lock:
             if self._sink is not None:
                 self._state = state
@@ -104,13 +104,13 @@ class FrameGate:
                 self._sink.on_warning(condition, message)
 
     def deliver_truth(self, truth: Truth) -> None:
-        """Delivers what a simulated device knows."""
+        """Delivers ground truth of a simulated device."""
         with self._lock:
             if self._sink is not None:
                 self._sink.on_truth(truth)
 
     def deliver(self, frame: Frame) -> None:
-        """Delivers a frame, or counts it as dropped: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
+        """Delivers a frame, or counts the drop: `after_stop`, `unknown_stream`, `wrong_size`, `wrong_encoding`."""
         with self._lock:
             cause = self._drop_cause(frame)
             if cause:
@@ -120,7 +120,7 @@ class FrameGate:
                 self._sink.on_frame(frame)
 
     def drop(self, cause: str, number: int = 1) -> None:
-        """Counts frames that the driver could not deliver."""
+        """Counts frames that the driver itself dropped."""
         with self._lock:
             self._counters[cause] += number
 

@@ -1,4 +1,4 @@
-"""Whose CLOCK_MONOTONIC this process reads: stamps of processes that share it need no mapping."""
+"""Identity of the host's CLOCK_MONOTONIC: timestamps of processes that share it are comparable."""
 
 import os
 from functools import cache
@@ -7,9 +7,9 @@ from pathlib import Path
 
 @cache
 def host_clock() -> str:
-    """Names the clock: the boot of the kernel, and the time namespace, which a container may have of its own.
+    """Identifier of the clock: kernel boot id and time namespace (a container may have its own).
 
-    "" where the system does not tell; then nobody shares it.
+    "" if it cannot be read; such a clock is never shared.
     """
     try:
         boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()

@@ -1,7 +1,7 @@
-"""Frames and truths as bytes, and back: `foxglove.RawImage`, `absmsg.v1.FrameInfo` and `absmsg.v1.SurfaceTruth`.
+"""Serialisation of frames and ground truth: `foxglove.RawImage`, `absmsg.v1.FrameInfo` and `absmsg.v1.SurfaceTruth`.
 
-An image travels as two messages: what every viewer understands (RawImage) and what only we need (FrameInfo). Decoding
-trusts nothing: whatever the bytes are, the result is a valid frame or a `CodecError` that names what is wrong.
+An image is two messages: RawImage, which every viewer displays, and FrameInfo, with our own metadata. The input is
+untrusted: decoding yields a valid frame or a `CodecError` that names the problem.
 """
 
 import math
@@ -39,14 +39,14 @@ _AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
 
 class CodecError(ValueError):
-    """Bytes that are no frame or truth; the message names what is wrong."""
+    """Malformed bytes of a frame or truth; the message names the problem."""
 
 
 def encode_image(frame: Frame, wall_ns: int) -> bytes:
     """The pixels of a frame as foxglove.RawImage.
 
     Args:
-        frame: what to encode.
+        frame: the frame.
         wall_ns: wall-clock time of the exposure [ns since the Unix epoch]; viewers show it.
     """
     height, width = frame.data.shape[:2]
@@ -63,11 +63,11 @@ def encode_image(frame: Frame, wall_ns: int) -> bytes:
 
 
 def encode_info(frame: Frame, header: Header) -> bytes:
-    """Everything about a frame but its pixels as absmsg.v1.FrameInfo.
+    """Metadata of a frame as absmsg.v1.FrameInfo.
 
     Args:
-        frame: what to describe.
-        header: who speaks and when in wall-clock time; its `t_host_ns` and `frame_id` are taken from the frame.
+        frame: the frame.
+        header: sender and wall-clock time; its `t_host_ns` and `frame_id` are taken from the frame.
     """
     info = FrameInfo(
         header=header,
@@ -106,7 +106,7 @@ def decode(image: bytes, info: bytes) -> Frame:
     """The frame of a serialized foxglove.RawImage and its absmsg.v1.FrameInfo; pixels are not copied.
 
     Raises:
-        CodecError: the bytes are no such messages, contradict each other or themselves.
+        CodecError: malformed or inconsistent messages.
     """
     picture, about = _parse(RawImage, image), _parse(FrameInfo, info)
     name = f"{about.sensor}/{about.stream}"
@@ -149,7 +149,7 @@ def decode(image: bytes, info: bytes) -> Frame:
 
 
 def encode_truth(truth: Truth, header: Header) -> bytes:
-    """A truth as absmsg.v1.SurfaceTruth; `header.t_host_ns` is taken from the truth."""
+    """Ground truth as absmsg.v1.SurfaceTruth; `header.t_host_ns` is taken from the truth."""
     rows, columns = truth.points_r.shape[:2]
     message = SurfaceTruth(
         header=header,
@@ -164,10 +164,10 @@ def encode_truth(truth: Truth, header: Header) -> bytes:
 
 
 def decode_truth(payload: bytes) -> Truth:
-    """The truth in a serialized absmsg.v1.SurfaceTruth.
+    """Ground truth from a serialized absmsg.v1.SurfaceTruth.
 
     Raises:
-        CodecError: the bytes are no such message or hold another number of points than they declare.
+        CodecError: malformed message, or a number of points that differs from the declared one.
     """
     message = _parse(SurfaceTruth, payload)
     expected = message.rows * message.columns * 3 * 4

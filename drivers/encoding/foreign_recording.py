@@ -1,4 +1,4 @@
-"""What other programs recorded, as frames: the form in which every format of theirs is read."""
+"""Interface of recordings made by other programs."""
 
 from collections.abc import Iterator, Mapping
 from typing import Protocol
@@ -8,11 +8,11 @@ from drivers.contract.frame import Frame
 
 
 class ForeignRecordingError(Exception):
-    """A recording of another program that cannot be read; names the file and what is wrong with it."""
+    """An unreadable recording of another program; names the file and the problem."""
 
 
 class ForeignRecording(Protocol):
-    """Frames of a few sensors, with what took them. Their host times count from wherever the recording's do."""
+    """Frames and cameras of a recording. Host times have the recording's own origin."""
 
     @property
     def cameras(self) -> Mapping[str, Camera]:
@@ -21,11 +21,11 @@ class ForeignRecording(Protocol):
 
     @property
     def total(self) -> int | None:
-        """How many frames there are; None if only reading them tells."""
+        """Number of frames; None if it is only known after reading all of them."""
         ...
 
     def frames(self) -> Iterator[Frame]:
-        """Every frame in the order of its time, read when it is asked for.
+        """All frames in order of time, read lazily.
 
         Raises:
             ForeignRecordingError: the recording is damaged.

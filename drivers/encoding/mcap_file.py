@@ -1,4 +1,4 @@
-"""One MCAP file being written: topics and protobuf schemas appear in it as soon as they are first used."""
+"""Writer of MCAP files; channels and protobuf schemas are registered on first use."""
 
 from collections.abc import Callable, Mapping
 from enum import StrEnum
@@ -13,7 +13,7 @@ from absmsg.v1 import (  # noqa: F401
     surface_truth_pb2,
 )
 
-# Importing a message module enters its schema into the default descriptor pool, where `write` looks names up.
+# Importing a message module registers its schema in the default descriptor pool, which `write` uses.
 from foxglove_schemas_protobuf import CameraCalibration_pb2, FrameTransforms_pb2, RawImage_pb2  # noqa: F401
 from google.protobuf import descriptor_pool
 from google.protobuf.descriptor import FileDescriptor
@@ -21,16 +21,17 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 
-#: Uncompressed bytes after which a chunk is closed; what a reader must decompress to reach one message. Four times
-#: as many cost the recorder twice the time, since such buffers come from the system anew for every chunk.
+#: Uncompressed size at which a chunk is closed, and so the amount a reader decompresses to reach one message. With four
+#: times as much the recorder takes twice the time, since the allocator gets such buffers from the system for every
+#: chunk.
 CHUNK_SIZE = 1 << 20
 
-#: Name of the metadata records that repeat what each channel is: its id, topic and schema.
+#: Name of the metadata records with id, topic and schema of each channel, redundant to the channel records.
 CHANNEL_METADATA = "abs.channel"
 
 
 class Compression(StrEnum):
-    """How chunks are compressed; `LZ4` costs half the time of `ZSTD` and saves half as much."""
+    """Compression of chunks; `LZ4` takes half the time of `ZSTD` and saves half as much."""
 
     NONE = "none"
     LZ4 = "lz4"
@@ -45,17 +46,17 @@ _COMPRESSION = {
 
 
 class McapFileError(Exception):
-    """A message that cannot be written as asked, or a file that an earlier error has already spoiled."""
+    """An invalid message, or a file that has failed after an earlier error."""
 
 
 class McapFile:
     """Writes protobuf messages, unchanged, to an MCAP stream.
 
-    The first `OSError` (a full disk, say) spoils the file for good: it is re-raised, and every later call raises
-    `McapFileError`. A writer that went on would leave a file that looks complete and is corrupt.
+    The first `OSError` (such as a full disk) is final: it is re-raised, and every later call raises
+    `McapFileError`. Writing on would leave a file that looks complete and is corrupt.
 
     Args:
-        stream: binary stream opened for writing, positioned at its beginning; stays the caller's to close.
+        stream: binary stream opened for writing, at its beginning; closed by the caller.
         compression: of the chunks.
         chunk_size: uncompressed bytes per chunk.
     """
@@ -67,22 +68,22 @@ class McapFile:
         self._writer = Writer(stream, chunk_size=chunk_size, compression=_COMPRESSION[compression])
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, tuple[str, int]] = {}
-        self._spoiled = ""
+        self._failure = ""
         self._writer.start(profile="", library="abs-service")
 
     def write(self, topic: str, schema_name: str, payload: bytes, log_time_ns: int, sequence: int) -> None:
         """Appends one message.
 
         Args:
-            topic: MCAP topic, `/sensor/stream/image`, say; carries one schema only.
-            schema_name: full name of the protobuf message, `absmsg.v1.FrameInfo`, say.
-            payload: the serialized message, written as it is.
-            log_time_ns: wall-clock time of what the message tells of [ns]; log and publish time in the file.
+            topic: MCAP topic, such as `/sensor/stream/image`; one schema per topic.
+            schema_name: full name of the protobuf message, such as `absmsg.v1.FrameInfo`.
+            payload: the serialized message, written unchanged.
+            log_time_ns: wall-clock time that the message refers to [ns]; log and publish time in the file.
             sequence: the sender's counter; its lower 32 bits are stored.
 
         Raises:
-            McapFileError: unknown schema name, a second schema on the topic, or a spoiled file.
-            OSError: the stream does not take the data; the file is spoiled.
+            McapFileError: unknown schema name, a second schema on the topic, or a failed file.
+            OSError: the stream cannot be written; the file has failed.
         """
         channel = self._channel(topic, schema_name)
         self._attempt(
@@ -90,33 +91,33 @@ class McapFile:
         )
 
     def attach(self, name: str, media_type: str, data: bytes, time_ns: int) -> None:
-        """Adds an attachment; attached at the beginning, it survives a later crash. Raises as `write` does."""
+        """Adds an attachment; one that is added at the beginning survives a later crash. Raises as `write`."""
         self._attempt(lambda: self._writer.add_attachment(time_ns, time_ns, name, media_type, data))
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
-        """Adds a metadata record. Raises as `write` does."""
+        """Adds a metadata record. Raises as `write`."""
         self._attempt(lambda: self._writer.add_metadata(name, dict(values)))
 
     def flush(self) -> None:
-        """Closes the open chunk and hands everything to the operating system. Raises as `write` does.
+        """Closes the open chunk and flushes it to the operating system. Raises as `write`.
 
-        Chunks close by size only, so that a quiet topic would stay in memory for a minute without it. What was
-        written before a flush can be read back after this process was killed; call it once a second.
+        Otherwise chunks are closed by size only, and a low-rate topic would stay in memory for a minute. Messages
+        written before a flush are readable after the process was killed; call it once a second.
         """
         self._attempt(self._writer.flush)
 
     def finish(self) -> None:
-        """Writes index and footer, and flushes the stream. Raises as `write` does."""
+        """Writes index and footer, and flushes the stream. Raises as `write`."""
         self._attempt(self._writer.finish)
         self._attempt(self._stream.flush)
 
     def _attempt(self, action: Callable[[], None]) -> None:
-        if self._spoiled:
-            raise McapFileError(f"an earlier write failed ({self._spoiled}); start a new file")
+        if self._failure:
+            raise McapFileError(f"an earlier write failed ({self._failure}); start a new file")
         try:
             action()
         except OSError as error:
-            self._spoiled = str(error)
+            self._failure = str(error)
             raise
 
     def _channel(self, topic: str, schema_name: str) -> int:
@@ -126,7 +127,7 @@ class McapFile:
         if channel == 0:
             channel = self._writer.register_channel(topic, MessageEncoding.Protobuf, self._schema(schema_name))
             self._channels[topic] = (schema_name, channel)
-            # Until the file is finished, only one chunk says what the channel is. If that one is damaged, this helps.
+            # In an unfinished file one chunk alone has the channel record. This record serves if that chunk is damaged.
             self.describe(CHANNEL_METADATA, {"id": str(channel), "topic": topic, "schema": schema_name})
         return channel
 
@@ -137,10 +138,10 @@ class McapFile:
 
 
 def file_descriptor_set(schema_name: str) -> bytes:
-    """Serialized FileDescriptorSet of a message and all it depends on, dependencies first.
+    """Serialized FileDescriptorSet of a message and its dependencies, dependencies first.
 
     Raises:
-        McapFileError: no such message is known to this process.
+        McapFileError: unknown message.
     """
     try:
         file = descriptor_pool.Default().FindMessageTypeByName(schema_name).file

@@ -1,4 +1,4 @@
-"""Ticks become host times: drift and delays that are only ever late are told apart, wraps and jumps are noticed."""
+"""Clock mapping: drift is separated from one-sided delays, wraps are unwrapped and steps are detected."""
 
 import numpy as np
 import pytest
