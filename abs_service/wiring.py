@@ -13,7 +13,7 @@ from calib.noise.base import DepthNoise
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
-from calib.rig import Noise, PictureNoise, Rig, Sensor
+from calib.rig import ImageNoise, Noise, Rig, Sensor
 
 
 class PlanError(Exception):
@@ -97,14 +97,14 @@ def noise(settings: Any, range_m: float | None) -> Noise:
     return made
 
 
-def texture(settings: Any) -> PictureNoise:
+def texture(settings: Any) -> ImageNoise:
     """The noise model of what a depth sensor sees of the surface besides its distance.
 
     Raises:
         PlanError: it is one of distances or of light barriers.
     """
     made = settings.build()
-    if not isinstance(made, PictureNoise):
+    if not isinstance(made, ImageNoise):
         kind = plugins.table(settings)["type"]
         raise PlanError(f'type "{kind}" is no texture: intensity, color, grey and bayer are')
     return made

@@ -1,1 +1,1 @@
-"""What is known of a sensor: projection, lens, pose, noise. Arrays in, arrays out; no I/O."""
+"""Sensor model: projection, lens, pose, noise. Arrays in, arrays out; no I/O."""

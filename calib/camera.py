@@ -1,4 +1,4 @@
-"""A calibrated camera: multi-sensor projection of eq. 10 and its inverse."""
+"""Calibrated camera: projection of eq. 10 and its inverse."""
 
 import functools
 import hashlib
@@ -13,7 +13,7 @@ from calib.pose import Pose
 
 
 class CameraError(ValueError):
-    """Numbers that describe no camera."""
+    """Invalid camera parameters."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +53,23 @@ class Camera:
 
     @functools.cached_property
     def T_sr(self) -> Pose:
-        """Pose that maps rig coordinates to sensor coordinates; cannot be written to."""
+        """Pose that maps rig coordinates to sensor coordinates; read-only."""
         inverse = pose.inverse(self.T_rs)
         inverse.setflags(write=False)
         return inverse
 
     @property
     def calib_id(self) -> str:
-        """Short hash of everything that defines the projection; frames and estimates carry it."""
+        """Short hash of all parameters of the projection; part of frames and estimates."""
         numbers = [self.width, self.height, self.fx, self.fy, self.cx, self.cy, *self.lens.coefficients]
         payload = np.concatenate([numbers, self.T_rs.ravel()]).astype("<f8").tobytes()
-        # Recordings from before there was a second model have ids without a name.
+        # The name of the first lens model is left out, so that ids in older recordings stay valid.
         kind = b"" if isinstance(self.lens, Lens) else self.lens.name.encode()
         return hashlib.sha256(payload + kind).hexdigest()[:16]
 
     @functools.cached_property
     def lookup(self) -> lookup.Lookup:
-        """Where every pixel looks; built when it is first asked for.
+        """Viewing direction of every pixel; computed on first use.
 
         Raises:
             LensError: if the lens has no inverse somewhere on the image.
@@ -78,9 +78,9 @@ class Camera:
 
     @property
     def field_radius(self) -> float:
-        """Largest x/z and y/z, as a radius, that the camera sees, with a margin of a pixel.
+        """Largest radius of (x/z, y/z) in the field of view, with a margin of one pixel.
 
-        Beyond, the polynomial of a lens may fold back into the image, or leave the range of numbers.
+        Outside it, the distortion polynomial may map points back into the image or overflow.
 
         Raises:
             LensError: if the lens has no inverse somewhere on the image.
@@ -88,7 +88,7 @@ class Camera:
         return self.lookup.radius * (1 + 2 / min(self.width, self.height)) + 1 / min(self.fx, self.fy)
 
     def project(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points at or behind the camera plane."""
+        """Pixel coordinates (…, 2) of rig points (…, 3) [m], eq. 10; NaN for points on or behind the camera plane."""
         points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
         depth = points_s[..., 2:]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -96,14 +96,14 @@ class Camera:
         return self.lens.distort(ideal) * (self.fx, self.fy) + (self.cx, self.cy)
 
     def projection_jacobian(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 3) of `project` by rig points (…, 3) before the camera [px/m]."""
+        """Jacobian (…, 2, 3) of `project` with respect to rig points (…, 3) in front of the camera [px/m]."""
         points_s = pose.transform(self.T_sr, np.asarray(points_r, np.float64))
         depth = points_s[..., 2, None, None]
         ideal = points_s[..., :2] / depth[..., 0]
         by_ideal = self.lens.jacobian(ideal) * np.array([[self.fx], [self.fy]]) / depth
         by_depth = -np.sum(by_ideal * ideal[..., None, :], axis=-1, keepdims=True)
         by_point = np.concatenate([by_ideal, by_depth], axis=-1)
-        # One product of matrices for all points: n small ones take several times as long.
+        # One matrix product for all points is several times faster than n small ones.
         return (by_point.reshape(-1, 3) @ self.T_rs[:3, :3].T).reshape(by_point.shape)
 
     def distance(self, points_r: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Fisheye lenses: Kannala and Brandt's polynomial of the angle from the optical axis, as in `cv2.fisheye`."""
+"""Fisheye lens: Kannala and Brandt's polynomial in the angle from the optical axis, as in `cv2.fisheye`."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -6,11 +6,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lens import FARTHEST, filled, proven
+from calib.lens import FARTHEST, padded, require_inverse
 
 COEFFICIENTS = ("k1", "k2", "k3", "k4")
 
-#: Below this radius, in normalised coordinates, the lens is its limit on the axis to the last digit.
+#: Below this radius, in normalised coordinates, the scale is 1 to machine precision.
 _ON_AXIS = 1e-8
 
 
@@ -32,11 +32,11 @@ class KannalaBrandt:
     coefficients: NDArray[np.float64] = field(default_factory=lambda: np.zeros(4))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", filled(self.coefficients, COEFFICIENTS))
+        object.__setattr__(self, "coefficients", padded(self.coefficients, COEFFICIENTS))
 
     @property
     def is_pinhole(self) -> bool:
-        """Never: without coefficients it is equidistant."""
+        """Always false: with zero coefficients the projection is equidistant."""
         return False
 
     def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -46,7 +46,7 @@ class KannalaBrandt:
         return ideal * self._scale(radius)
 
     def jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 2) of `distort` by the ideal normalised coordinates (…, 2)."""
+        """Jacobian (…, 2, 2) of `distort` with respect to the ideal normalised coordinates (…, 2)."""
         ideal = np.asarray(xy, np.float64)
         radius = np.linalg.norm(ideal, axis=-1, keepdims=True)
         scale = self._scale(radius)
@@ -56,7 +56,7 @@ class KannalaBrandt:
         return scale[..., None] * np.eye(2) + outward[..., None] * ideal[..., :, None] * ideal[..., None, :]
 
     def coefficient_jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 4) of `distort` at ideal normalised coordinates (…, 2) by the coefficients."""
+        """Jacobian (…, 2, 4) of `distort` at ideal normalised coordinates (…, 2) with respect to the coefficients."""
         ideal = np.asarray(xy, np.float64)
         radius = np.linalg.norm(ideal, axis=-1, keepdims=True)
         theta = np.arctan(radius)
@@ -64,7 +64,7 @@ class KannalaBrandt:
         return direction[..., None] * (theta ** [3, 5, 7, 9])[..., None, :]
 
     def inverse(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The ideal coordinates whose distortion is `xy`, shape (…, 2); NaN where none are: at 90° or past the fold."""
+        """Ideal coordinates (…, 2) whose distortion is `xy`; NaN where there are none: at 90° or beyond the fold."""
         distorted = np.asarray(xy, np.float64)
         radius = np.linalg.norm(distorted, axis=-1, keepdims=True)
         theta = self._angle(radius)
@@ -72,12 +72,12 @@ class KannalaBrandt:
         return distorted * ratio
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The ideal coordinates whose distortion is `xy`, shape (…, 2).
+        """Ideal coordinates (…, 2) whose distortion is `xy`.
 
         Raises:
             LensError: where there are none.
         """
-        return proven(self, xy, self.inverse(xy))
+        return require_inverse(self, xy, self.inverse(xy))
 
     def _bent(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distorted radius at an angle [rad]."""
@@ -86,17 +86,17 @@ class KannalaBrandt:
         return theta * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
 
     def _slope(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivative of the distorted radius by the angle."""
+        """Derivative of the distorted radius with respect to the angle."""
         k1, k2, k3, k4 = self.coefficients
         t2 = theta * theta
         return 1 + t2 * (3 * k1 + t2 * (5 * k2 + t2 * (7 * k3 + t2 * 9 * k4)))
 
     def _scale(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distorted by ideal radius."""
+        """Ratio of distorted to ideal radius."""
         return np.where(radius < _ON_AXIS, 1, self._bent(np.arctan(radius)) / np.maximum(radius, _ON_AXIS))
 
     def _widest(self) -> float:
-        """Angle up to which the distorted radius grows [rad], less than 90°; beyond, pixels have two solutions."""
+        """Largest angle [rad], less than 90°, up to which the distorted radius increases."""
         slope = np.array([9, 7, 5, 3]) * self.coefficients[::-1]
         slope[np.abs(slope) < 1e-12] = 0  # up to 90° it adds nothing, and as a leading coefficient it spoils the roots
         roots = np.roots([*slope, 1.0])  # in θ²
@@ -104,7 +104,7 @@ class KannalaBrandt:
         return float(min(np.arctan(FARTHEST), np.sqrt(real.min(initial=np.inf))))
 
     def _angle(self, radius: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle [rad] at a distorted radius, NaN where it has none: Newton's method between bounds that close in."""
+        """Angle [rad] at a distorted radius by bracketed Newton iterations; NaN where there is none."""
         widest = self._widest()
         low, high = np.zeros_like(radius), np.full_like(radius, widest)
         theta = np.minimum(radius, 0.5 * widest)

@@ -1,4 +1,4 @@
-"""Forward distortion in single precision: of single points, for kernels that project many, and of images of them."""
+"""Forward distortion in single precision: kernels for single points and for images of points."""
 
 from collections.abc import Callable
 
@@ -9,15 +9,15 @@ from calib.fisheye import KannalaBrandt
 from calib.jit import composed, kernel
 from calib.lens import LensModel
 
-#: Below this radius, in normalised coordinates, a fisheye does not bend in single precision.
+#: Below this radius, in normalised coordinates, fisheye distortion vanishes in single precision.
 _ON_AXIS = 1e-4
 
 
 @kernel
-def bend_fisheye(
+def distort_fisheye(
     x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """Distorted from ideal normalised coordinates, for the four coefficients of a fisheye."""
+    """Fisheye distortion of ideal normalised coordinates; four coefficients."""
     one = np.float32(1)
     radius = np.sqrt(x * x + y * y)
     theta = np.arctan(radius)
@@ -28,22 +28,22 @@ def bend_fisheye(
 
 
 @kernel
-def eight(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
-    """The coefficients of a lens, for `bend`, as numbers, which stay where elements are read again."""
+def brown_conrady_coefficients(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
+    """Brown–Conrady coefficients as scalars, which stay in registers."""
     return lens[0], lens[1], lens[2], lens[3], lens[4], lens[5], lens[6], lens[7]
 
 
 @kernel
-def four(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
-    """The same of a fisheye, for `bend_fisheye`."""
+def fisheye_coefficients(lens: NDArray[np.float32]) -> tuple[np.float32, ...]:
+    """Fisheye coefficients as scalars, which stay in registers."""
     return lens[0], lens[1], lens[2], lens[3]
 
 
 @kernel
-def bend(
+def distort(
     x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """Distorted from ideal normalised coordinates, for the eight coefficients of any other lens."""
+    """Brown–Conrady distortion of ideal normalised coordinates; brown_conrady_coefficients coefficients."""
     one, two = np.float32(1), np.float32(2)
     k1, k2, p1, p2, k3, k4, k5, k6 = lens
     r2 = x * x + y * y
@@ -53,26 +53,26 @@ def bend(
 
 
 @kernel
-def straight(
+def without_distortion(
     x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """What `bend` is without distortion, whose coefficients are ignored."""
+    """Identity in place of `distort` for a lens without distortion."""
     return x, y
 
 
 @kernel
-def straighten(
+def undistort_step(
     x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """The small step (right, down) from (x, y) on as it is: what a lens other than a fisheye bends it by is little."""
+    """Undistorted small step (right, down) at (x, y); approximated by the step itself."""
     return right, down
 
 
 @kernel
-def straighten_fisheye(
+def undistort_step_fisheye(
     x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
-    """The step in ideal coordinates from (x, y) on that the lens bends into a small step (right, down)."""
+    """Undistorted small step at (x, y): the step in ideal coordinates that the fisheye maps to (right, down)."""
     one = np.float32(1)
     radius = np.sqrt(x * x + y * y)
     if not radius > np.float32(_ON_AXIS):
@@ -90,14 +90,14 @@ def straighten_fisheye(
 
 
 def projector(lens: LensModel) -> Callable[..., None]:
-    """The kernel that takes ideal coordinates (h, w, 2) to pixels, in place; then come matrix and coefficients."""
+    """Kernel that maps ideal coordinates (h, w, 2) to pixels in place; its arguments end in matrix and coefficients."""
     if isinstance(lens, KannalaBrandt):
         return _to_pixels_fisheye
     return _to_pixels_pinhole if lens.is_pinhole else _to_pixels
 
 
-#: What a lens has; `composed` puts those of another in its place.
-coefficients = eight
+#: Reads the coefficients of the lens; `composed` replaces it.
+coefficients = brown_conrady_coefficients
 
 
 @kernel
@@ -105,10 +105,12 @@ def _to_pixels(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: ND
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     for r in range(place.shape[0]):
         for c in range(place.shape[1]):
-            x, y = bend(place[r, c, 0], place[r, c, 1], own_lens)
+            x, y = distort(place[r, c, 0], place[r, c, 1], own_lens)
             place[r, c, 0] = fx * x + cx
             place[r, c, 1] = fy * y + cy
 
 
-_to_pixels_pinhole: Callable[..., None] = composed(_to_pixels, bend=straight)
-_to_pixels_fisheye: Callable[..., None] = composed(_to_pixels, bend=bend_fisheye, coefficients=four)
+_to_pixels_pinhole: Callable[..., None] = composed(_to_pixels, distort=without_distortion)
+_to_pixels_fisheye: Callable[..., None] = composed(
+    _to_pixels, distort=distort_fisheye, coefficients=fisheye_coefficients
+)

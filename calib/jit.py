@@ -1,4 +1,4 @@
-"""The one place where kernel compilation is configured."""
+"""Configuration of kernel compilation, in one place."""
 
 import functools
 import hashlib
@@ -10,44 +10,43 @@ from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-#: Sums may be reordered so that loops vectorise; not-a-number still behaves as one, because missing returns are NaN.
+#: Sums may be reordered for vectorisation; NaN keeps its meaning, because it marks missing returns.
 _FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 
-#: The range of a loop whose turns do not need each other: those over a population. Kernels divide it among as many
-#: threads as the environment says; those that another kernel calls do not, since that one has divided the work. The
-#: code for one and for several threads is compiled apart, so that sums may differ between them in the last digits of
-#: single precision. With one, equal input gives equal bits; with several it does in processes that read the compiled
-#: code from the cache, but not always in the one that compiled it.
+#: Parallel loop over a population. A kernel divides its iterations among as many threads as the environment sets;
+#: kernels called by another kernel run serially. Serial and parallel code are compiled separately, so that sums may
+#: differ in the last digits of single precision. Results with one thread are reproducible bit by bit; results with
+#: several are in processes that load the code from the cache, but not always in the process that compiled it.
 prange = range
 
-#: Says how many threads a kernel has; the compiler's own name for it. One if it is not set.
+#: Environment variable with the number of threads of a kernel, as Numba names it; one if it is not set.
 THREADS = "NUMBA_NUM_THREADS"
 
 
 def kernel(function: Function) -> Function:
-    """Compiles `function` at its first call, caches the machine code on disk and runs it without interpreter lock.
+    """Compiles `function` at its first call; caches the machine code on disk; releases the interpreter lock.
 
-    Kernels take contiguous arrays and scalars only; divisions follow IEEE rules instead of raising. The compiler takes
-    a second to import, so whoever only reads a module's settings does not pay for it.
+    Kernels take contiguous arrays and scalars; divisions follow IEEE rules and do not raise. Numba is imported at the
+    first call, because the import takes a second.
     """
     return cast(Function, _Kernel(function, {}))
 
 
 @functools.cache
 def composed(template: Function, **parts: Callable[..., Any] | int) -> Function:
-    """A kernel like `template`, with other kernels and constants in place of the globals that have these names.
+    """Kernel like `template`, with other kernels and constants in place of the globals with these names.
 
-    They are compiled into it, as if they had been written there: nothing is looked up or decided while it runs.
+    The parts are compiled into it as if they had been written there, without dispatch at run time.
 
     Args:
         template: a kernel.
-        parts: other kernels, or constants, by the names of the template's globals.
+        parts: other kernels or constants, by the names of the template's globals.
     """
     return cast(Function, _Kernel(cast(_Kernel, template).function, parts))
 
 
 class _Kernel:
-    """A function that becomes machine code at its first call."""
+    """Function that is compiled at its first call."""
 
     def __init__(self, function: Callable[..., Any], parts: Mapping[str, Any]):
         functools.update_wrapper(self, function)
@@ -59,18 +58,18 @@ class _Kernel:
 
     @functools.cached_property
     def _compiled(self) -> Callable[..., Any]:
-        """The compiler's dispatcher."""
+        """Numba's dispatcher."""
         if "prange" not in self.function.__code__.co_names or int(os.environ.get(THREADS, "1")) == 1:
             return self.undivided
         from numba import config, prange  # noqa: PLC0415
 
-        # OpenMP's threads wait ready for a moment, and several threads may call what they do.
+        # OpenMP is the threading layer that several threads may enter at once; its idle workers spin briefly.
         config.THREADING_LAYER = "omp"  # pyright: ignore[reportAttributeAccessIssue]
         return self._compile("_divided", {"prange": prange}, parallel=True)
 
     @functools.cached_property
     def undivided(self) -> Callable[..., Any]:
-        """The same for one thread, which other kernels may call."""
+        """Single-threaded variant, which other kernels may call."""
         return self._compile("", {})
 
     def _compile(self, suffix: str, replaced: dict[str, Any], *, parallel: bool = False) -> Callable[..., Any]:
@@ -85,9 +84,9 @@ class _Kernel:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Of all that the machine code is made from, and its name in the compiler's cache.
+        """Hash of everything that determines the machine code; its key in Numba's cache.
 
-        By itself, the compiler would look only at the file that the function is in.
+        Numba's own key covers only the file that contains the function.
         """
         used = ((name, value.digest if isinstance(value, _Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
@@ -95,14 +94,14 @@ class _Kernel:
 
     @functools.cached_property
     def _globals(self) -> dict[str, Any]:
-        """What the function uses of its module, or in place of that."""
+        """Globals that the function uses, with the replaced parts."""
         used = set(self.function.__code__.co_names)
         known = self.function.__globals__ | dict(self._parts)
         return {name: value for name, value in known.items() if name in used}
 
 
 def _readable(function: Callable[..., Any]) -> tuple[object, ...]:
-    """What a function does, without where it is written and what is said about it."""
+    """Code of a function without its location and docstring."""
     code = function.__code__
     constants = [repr(constant) for constant in code.co_consts if constant != function.__doc__]
     return code.co_code, code.co_names, code.co_varnames, constants

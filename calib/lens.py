@@ -1,4 +1,4 @@
-"""Lens distortion `D_s` of eq. 10, on normalised image coordinates (x/z, y/z), and its inverse."""
+"""Lens distortion `D_s` of eq. 10 in normalised image coordinates (x/z, y/z), and its inverse."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
@@ -8,23 +8,23 @@ from numpy.typing import ArrayLike, NDArray
 
 COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
-#: Normalised coordinates that no pixel has; an iteration that goes there finds nothing any more.
+#: Bound on normalised coordinates; an iteration beyond it has diverged.
 FARTHEST = 1e6
 
-#: How well an inverse is the inverse, in normalised coordinates.
+#: Convergence tolerance of the inverse, in normalised coordinates.
 TOLERANCE = 1e-10
 
 
 class LensError(ValueError):
-    """Coefficients that are no lens, or a point for which the distortion has no inverse."""
+    """Invalid coefficients, or a point at which the distortion has no inverse."""
 
 
 class LensModel(Protocol):
-    """What a camera, a calibration and a warping need of a lens.
+    """Lens model as used by cameras, calibration and warping.
 
     Attributes:
-        name: what rig files and recordings call the model.
-        coefficients: as many as the model has, dimensionless; they cannot be written to.
+        name: name of the model in rig files and recordings.
+        coefficients: dimensionless, read-only; their number depends on the model.
     """
 
     name: ClassVar[str]
@@ -36,7 +36,7 @@ class LensModel(Protocol):
 
     @property
     def is_pinhole(self) -> bool:
-        """Whether the lens does not distort at all."""
+        """True if the lens does not distort."""
         ...
 
     def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -44,19 +44,19 @@ class LensModel(Protocol):
         ...
 
     def jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 2) of `distort` by the ideal normalised coordinates (…, 2)."""
+        """Jacobian (…, 2, 2) of `distort` with respect to the ideal normalised coordinates (…, 2)."""
         ...
 
     def coefficient_jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, n) of `distort` at ideal normalised coordinates (…, 2) by the n coefficients."""
+        """Jacobian (…, 2, n) of `distort` at ideal normalised coordinates (…, 2) with respect to the n coefficients."""
         ...
 
     def inverse(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Backward distortion: the ideal coordinates whose distortion is `xy`, shape (…, 2); NaN where none are."""
+        """Backward distortion: ideal coordinates (…, 2) whose distortion is `xy`; NaN where there are none."""
         ...
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """As `inverse`.
+        """Same as `inverse`, but raises where there is no solution.
 
         Raises:
             LensError: at least one point has no inverse; names one.
@@ -64,8 +64,8 @@ class LensModel(Protocol):
         ...
 
 
-def filled(given: ArrayLike, names: tuple[str, ...]) -> NDArray[np.float64]:
-    """Coefficients with zeros in place of the trailing ones that were not given, which cannot be written to.
+def padded(given: ArrayLike, names: tuple[str, ...]) -> NDArray[np.float64]:
+    """Coefficients padded with zeros, read-only.
 
     Raises:
         LensError: too many, or not finite.
@@ -79,11 +79,11 @@ def filled(given: ArrayLike, names: tuple[str, ...]) -> NDArray[np.float64]:
     return full
 
 
-def proven(lens: LensModel, xy: NDArray[np.floating], ideal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The ideal coordinates that a lens found for distorted ones, both (…, 2).
+def require_inverse(lens: LensModel, xy: NDArray[np.floating], ideal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ideal coordinates (…, 2) computed for distorted ones `xy` (…, 2), checked for NaN.
 
     Raises:
-        LensError: somewhere it found none; names the first such point.
+        LensError: NaN at some point; names the first one.
     """
     missing = np.isnan(ideal).any(axis=-1)
     if missing.any():
@@ -96,8 +96,8 @@ def proven(lens: LensModel, xy: NDArray[np.floating], ideal: NDArray[np.float64]
 class Lens:
     """Brown–Conrady distortion with an optional rational part; OpenCV's first eight coefficients, in its order.
 
-    All coefficients zero is the ideal pinhole. Missing trailing coefficients are zero, so the usual 4, 5 and 8 numbers
-    can be given as they are.
+    All coefficients zero is the ideal pinhole. Missing trailing coefficients are zero, so the common sets of 4, 5 and 8
+    numbers are accepted.
 
     Attributes:
         coefficients: (k1, k2, p1, p2, k3, k4, k5, k6), dimensionless, shape (8,).
@@ -107,11 +107,11 @@ class Lens:
     coefficients: NDArray[np.float64] = field(default_factory=lambda: np.zeros(8))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "coefficients", filled(self.coefficients, COEFFICIENTS))
+        object.__setattr__(self, "coefficients", padded(self.coefficients, COEFFICIENTS))
 
     @property
     def is_pinhole(self) -> bool:
-        """Whether the lens does not distort at all."""
+        """True if the lens does not distort."""
         return not np.any(self.coefficients)
 
     def distort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -129,7 +129,7 @@ class Lens:
         )
 
     def jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 2) of `distort` by the ideal normalised coordinates (…, 2)."""
+        """Jacobian (…, 2, 2) of `distort` with respect to the ideal normalised coordinates (…, 2)."""
         k1, k2, p1, p2, k3, k4, k5, k6 = self.coefficients
         x, y = np.moveaxis(np.asarray(xy, np.float64), -1, 0)
         r2 = x * x + y * y
@@ -144,7 +144,7 @@ class Lens:
         return result
 
     def coefficient_jacobian(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Derivatives (…, 2, 8) of `distort` at ideal normalised coordinates (…, 2) by the coefficients."""
+        """Jacobian (…, 2, 8) of `distort` at ideal normalised coordinates (…, 2) with respect to the coefficients."""
         k1, k2, _, _, k3, k4, k5, k6 = self.coefficients
         x, y = np.moveaxis(np.asarray(xy, np.float64), -1, 0)
         r2 = x * x + y * y
@@ -160,7 +160,7 @@ class Lens:
         return result
 
     def inverse(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The ideal coordinates whose distortion is `xy`, shape (…, 2), by Newton's method; NaN where it finds none."""
+        """Ideal coordinates (…, 2) whose distortion is `xy`, by Newton's method; NaN where it does not converge."""
         target = np.ascontiguousarray(xy, np.float64).reshape(-1, 2)
         ideal = target.copy()
         if self.is_pinhole:
@@ -180,18 +180,18 @@ class Lens:
         return ideal.reshape(np.shape(xy))
 
     def undistort(self, xy: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The ideal coordinates whose distortion is `xy`, shape (…, 2).
+        """Ideal coordinates (…, 2) whose distortion is `xy`.
 
         Raises:
             LensError: where there are none.
         """
-        return proven(self, xy, self.inverse(xy))
+        return require_inverse(self, xy, self.inverse(xy))
 
     def _is_before_fold(self, xy: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether the distortion is one-to-one from the centre to each point (n, 2).
+        """True for points (n, 2) up to which the distortion is one-to-one along the ray from the centre.
 
-        A barrel's polynomial turns back at some radius. Beyond it every pixel has a second solution, from where no
-        light reaches the sensor.
+        Barrel distortion folds back at some radius. Beyond it a pixel has a second solution, from which no light
+        reaches the sensor.
         """
         before = np.ones(len(xy), np.bool_)
         for part in (0.25, 0.5, 0.75, 1.0):
@@ -201,7 +201,7 @@ class Lens:
 
 
 def _solved(matrices: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Solutions (n, 2) of systems (n, 2, 2) by Cramer's rule; not finite for a singular one, which spoils no other."""
+    """Solutions (n, 2) of linear systems (n, 2, 2) by Cramer's rule; a singular system gives non-finite values."""
     a, b, c, d = np.moveaxis(matrices.reshape(-1, 4), -1, 0)
     x, y = right.T
     return np.stack([d * x - b * y, a * y - c * x], axis=-1) / (a * d - b * c)[:, None]

@@ -1,4 +1,4 @@
-"""The lens models there are, by the names that rig files, addresses and recordings use."""
+"""Lens models by the names that rig files, addresses and recordings use."""
 
 from typing import Literal, get_args
 
@@ -8,15 +8,15 @@ from numpy.typing import ArrayLike
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens, LensError, LensModel
 
-#: What `lens_model` may be.
+#: Values of `lens_model`.
 LensName = Literal["brown_conrady", "fisheye"]
 
 
 def lens_of(name: str, coefficients: ArrayLike) -> LensModel:
-    """The lens of a model with its coefficients; missing trailing ones are zero.
+    """Lens of a model with its coefficients; missing trailing ones are zero.
 
     Raises:
-        LensError: no such model, or no coefficients of it; names what is allowed.
+        LensError: unknown model or invalid coefficients; names what is allowed.
     """
     numbers = np.asarray(coefficients, np.float64)
     match name:

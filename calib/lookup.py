@@ -1,4 +1,4 @@
-"""The distortion-corrected lookup of one sensor, its backward distortion: where every pixel looks, found once."""
+"""Lookup table of one camera: ideal viewing direction of every pixel, computed once by inverting the distortion."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from calib.lens import LensError, LensModel
 
-#: So near to its pixel's centre the lens has to take every direction of the table back [px].
+#: Largest error of the inverse at a pixel centre [px].
 ACCURACY_PX = 1e-3
 
-#: Rows of an image whose directions are found together.
+#: Image rows that are inverted together.
 _ROWS = 8
 
 
@@ -26,12 +26,12 @@ class Lookup:
 
     @property
     def ray_length(self) -> NDArray[np.float64]:
-        """Radial distance per z of every pixel (height, width)."""
+        """Ratio of radial distance to z of every pixel (height, width)."""
         return np.sqrt(1 + np.sum(self.ideal**2, axis=-1))
 
     @property
     def rays(self) -> NDArray[np.float64]:
-        """Unit direction of every pixel's line of sight in sensor coordinates (height, width, 3)."""
+        """Unit viewing direction of every pixel in sensor coordinates (height, width, 3)."""
         directions = np.concatenate([self.ideal, np.ones((*self.ideal.shape[:2], 1))], axis=-1)
         return directions / self.ray_length[..., None]
 
@@ -42,16 +42,16 @@ class Lookup:
 
 
 def build(size: tuple[int, int], matrix: tuple[float, float, float, float], lens: LensModel) -> Lookup:
-    """The lookup of an image of a size (width, height) with a camera matrix (fx, fy, cx, cy) [px].
+    """Lookup table of an image of size (width, height) with camera matrix (fx, fy, cx, cy) [px].
 
     Raises:
-        LensError: not everywhere on the image is there a direction that the lens takes to the pixel within
-            `ACCURACY_PX`; tells where, and from which radius on.
+        LensError: the inverse is missing or less accurate than `ACCURACY_PX` at some pixel; names the pixel and the
+            radius from which on it fails.
     """
     focal, center = np.array(matrix[:2]), np.array(matrix[2:])
     pixels = np.stack(np.meshgrid(*(np.arange(length, dtype=float) for length in size)), axis=-1)
     ideal, error = np.empty_like(pixels), np.empty(pixels.shape[:2])
-    for rows in np.array_split(np.arange(size[1]), -(-size[1] // _ROWS)):  # few enough to stay in the cache
+    for rows in np.array_split(np.arange(size[1]), -(-size[1] // _ROWS)):  # blocks that fit into the cache
         ideal[rows] = lens.inverse((pixels[rows] - center) / focal)
         error[rows] = np.linalg.norm(lens.distort(ideal[rows]) * focal + center - pixels[rows], axis=-1)
     wrong = ~(error <= ACCURACY_PX)
@@ -62,7 +62,7 @@ def build(size: tuple[int, int], matrix: tuple[float, float, float, float], lens
 
 
 def _complaint(lens: LensModel, wrong: NDArray[np.bool_], radius: NDArray[np.float64]) -> str:
-    """What to say of pixels (height, width) that the lens cannot reach, so far from the principal point [px]."""
+    """Error message for pixels (height, width) without an inverse; `radius` is from the principal point [px]."""
     row, column = np.unravel_index(np.argmin(np.where(wrong, radius, np.inf)), wrong.shape)
     return (
         f"the {lens.name} distortion {lens.coefficients.tolist()} has no inverse to {ACCURACY_PX} px at "

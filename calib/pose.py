@@ -1,4 +1,4 @@
-"""Rigid poses as 4×4 matrices. `T_ab` maps coordinates in b to coordinates in a; lengths in metres, angles in rad."""
+"""Rigid poses as 4 × 4 matrices. `T_ab` maps coordinates in b to coordinates in a; lengths in metres, angles in rad."""
 
 import numpy as np
 import scipy  # its parts are imported when they are first used
@@ -6,17 +6,17 @@ from numpy.typing import ArrayLike, NDArray
 
 Pose = NDArray[np.float64]
 
-#: Matrices (3, 3, 3): the k-th times a vector is the cross product of the k-th axis with it.
+#: Cross-product matrices (3, 3, 3) of the axes: `_CROSS[k] @ v` is the k-th axis × v.
 _CROSS = np.cross(np.eye(3)[:, None], np.eye(3)).transpose(0, 2, 1)
 
 
 def identity() -> Pose:
-    """The pose that maps every point to itself."""
+    """Identity pose."""
     return np.eye(4)
 
 
 def from_rotation_vector(rotation_vector: ArrayLike, translation: ArrayLike) -> Pose:
-    """The pose with the given rotation vector [rad] (axis times angle) and translation [m], both of shape (3,)."""
+    """Pose with a rotation vector [rad] (axis times angle) and translation [m], both of shape (3,)."""
     T_ab = np.eye(4)
     T_ab[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(np.asarray(rotation_vector, float)).as_matrix()
     T_ab[:3, 3] = np.asarray(translation, float)
@@ -24,12 +24,12 @@ def from_rotation_vector(rotation_vector: ArrayLike, translation: ArrayLike) -> 
 
 
 def to_rotation_vector(T_ab: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The rotation vector [rad] and translation [m] of a pose; inverse of `from_rotation_vector`."""
+    """Rotation vector [rad] and translation [m] of a pose; inverse of `from_rotation_vector`."""
     return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_rotvec(), T_ab[:3, 3].copy()
 
 
-def turning(rotation_vector: ArrayLike, turned: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Derivatives (n, 3, 3) of turned points R p by the rotation vector (3,) that R is of: −[R p]× J.
+def rotated_points_jacobian(rotation_vector: ArrayLike, turned: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Jacobian (n, 3, 3) of rotated points R p with respect to the rotation vector (3,) of R: −[R p]× J.
 
     J = I + (1 − cos θ)/θ² [r]× + (θ − sin θ)/θ³ [r]×² is the left Jacobian of the rotations (T. D. Barfoot, State
     Estimation for Robotics, eq. 7.77).
@@ -48,12 +48,12 @@ def turning(rotation_vector: ArrayLike, turned: NDArray[np.floating]) -> NDArray
 
 
 def to_quaternion(T_ab: Pose) -> NDArray[np.float64]:
-    """The unit quaternion (x, y, z, w) of a pose's rotation."""
+    """Unit quaternion (x, y, z, w) of a pose's rotation."""
     return scipy.spatial.transform.Rotation.from_matrix(T_ab[:3, :3]).as_quat()
 
 
 def from_quaternion(quaternion: ArrayLike, translation: ArrayLike) -> Pose:
-    """The pose with the rotation of a quaternion (x, y, z, w) of any length but 0, and a translation (3,) [m].
+    """Pose with the rotation of a quaternion (x, y, z, w) of any length but 0, and a translation (3,) [m].
 
     Raises:
         ValueError: a quaternion of length 0.
@@ -63,7 +63,7 @@ def from_quaternion(quaternion: ArrayLike, translation: ArrayLike) -> Pose:
 
 
 def from_rotation(rotation: ArrayLike, translation: ArrayLike, tolerance: float = 1e-3) -> Pose:
-    """The pose with the rotation nearest to a matrix (3, 3), which devices store rounded, and a translation (3,) [m].
+    """Pose with the rotation nearest to a rounded rotation matrix (3, 3), and a translation (3,) [m].
 
     Raises:
         ValueError: the matrix is farther from a rotation than `tolerance`.
@@ -80,7 +80,7 @@ def from_rotation(rotation: ArrayLike, translation: ArrayLike, tolerance: float 
 
 
 def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)) -> Pose:
-    """The pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
+    """Pose `T_rs` of a camera at `eye` whose optical axis passes through `target`; image rows run along `down`."""
     eye_r = np.asarray(eye, float)
     forward = np.asarray(target, float) - eye_r
     forward = forward / np.linalg.norm(forward)
@@ -93,7 +93,7 @@ def look_at(eye: ArrayLike, target: ArrayLike, down: ArrayLike = (0.0, 1.0, 0.0)
 
 
 def inverse(T_ab: Pose) -> Pose:
-    """The pose `T_ba`."""
+    """Inverse pose `T_ba`."""
     T_ba = np.eye(4)
     T_ba[:3, :3] = T_ab[:3, :3].T
     T_ba[:3, 3] = -T_ab[:3, :3].T @ T_ab[:3, 3]
@@ -101,12 +101,12 @@ def inverse(T_ab: Pose) -> Pose:
 
 
 def transform(T_ab: Pose, points_b: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Points of shape (…, 3) [m], given in b, expressed in a."""
+    """Points of shape (…, 3) [m], given in b, in coordinates of a."""
     return points_b @ T_ab[:3, :3].T + T_ab[:3, 3]
 
 
 def is_pose(T_ab: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
-    """Whether a (4, 4) matrix is a rigid pose: orthonormal rotation of determinant one, last row (0, 0, 0, 1)."""
+    """True if a (4, 4) matrix is a rigid pose: orthonormal rotation of determinant one, last row (0, 0, 0, 1)."""
     rotation = T_ab[:3, :3]
     return bool(
         T_ab.shape == (4, 4)

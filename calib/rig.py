@@ -12,24 +12,23 @@ from calib.noise.color import GaussianColor
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
 
-#: Noise models of what an image shows of a surface, and no length.
-PictureNoise = GaussianColor | GaussianGrey | GaussianBayer | GaussianIntensity
-Noise = DepthNoise | PictureNoise | LightBarrier
+#: Noise models of an image of colour, grey or intensity.
+ImageNoise = GaussianColor | GaussianGrey | GaussianBayer | GaussianIntensity
+Noise = DepthNoise | ImageNoise | LightBarrier
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor s of the paper, one kind of measurement of one optical head: where it is, how it projects, how it errs.
+    """Sensor s of the paper: one kind of measurement of one optical head, with its camera and noise model.
 
-    A head that delivers two, such as a time-of-flight camera with its amplitudes, is two sensors with one camera.
+    A head that delivers two kinds, such as a time-of-flight camera with amplitudes, is two sensors with one camera.
 
-    Attributes:
-        name: name in the rig: that of the head, `tof`, with the stream, `tof/amplitude`, if it is the head's second.
-        camera: projection `P_s`.
-        noise: noise model of what it measures, and so what that is.
-        outlier_share: share of its measurements that come from anywhere, 0…1; None if nobody knows better than the
-            objective.
-        range_m: distances that it can report at all, if it is a depth sensor [m]; None likewise.
+    name: name in the rig: the head's, `tof`; with the stream, `tof/amplitude`, for the second of a head.
+        noise: noise model of the measurement; its type determines the kind of measurement.
+        outlier_share: fraction of outliers among the measurements, 0…1; None for the objective's default.
+        range_m: largest distance that a depth sensor reports [m]; None for the default.
+            depth_offset, depth_scale: systematic error of a depth sensor, which measures (1 + scale) · distance +
+                offset [1, m]; the noise model describes the remaining error.
         depth_offset, depth_scale: a depth sensor measures (1 + scale) · distance + offset [1, m]; the noise model is
             about what is left when that is taken off.
     """
@@ -50,14 +49,14 @@ class Sensor:
 
 @dataclass(frozen=True)
 class Rig:
-    """All sensors that look at the scene, by name, calibrated into one common frame."""
+    """All sensors of a rig by name, calibrated into one common frame."""
 
     name: str
     sensors: Mapping[str, Sensor]
 
     @property
     def calib_id(self) -> str:
-        """Short hash of all cameras; changes whenever one of them does."""
+        """Short hash of all cameras."""
         cameras = {sensor.head: sensor.camera.calib_id for sensor in self.sensors.values()}
         parts = "".join(f"{name}:{calib_id};" for name, calib_id in sorted(cameras.items()))
         return hashlib.sha256(parts.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What a calibration starts from: a board as the sensors of a rig saw it, moment by moment.
+"""Input of a calibration: observations of a board by the sensors of a rig.
 
 The frame b of a board has its origin in the centre of the board's first corner, x along the first row of corners, y
 along the first column, z into the board (away from a camera that sees its printed side), so that `T_rb` of a board in

@@ -27,7 +27,7 @@ from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
 from abs_service.tracking.vertex_offsets import FixedRelief, Relief
 from abs_service.tracking.vertex_offsets import Settings as ReliefSettings
-from calib.rig import PictureNoise, Rig, Sensor
+from calib.rig import ImageNoise, Rig, Sensor
 from drivers.contract.frame import FrameSet
 
 
@@ -180,7 +180,7 @@ class Tracking:
         self._relief = self._plan.relief.build(tracker.model, self._rig.sensors[self._plan.reference])
         # What these see of the surface is not known: as soon as one of them delivers, it is time to begin anew.
         sensors = self._rig.sensors
-        self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, PictureNoise))
+        self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
         self.mesh_version += 1
 
     def _sight(self, observation: Observation) -> Sighting:

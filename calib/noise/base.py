@@ -1,4 +1,4 @@
-"""What a noise model is, and the texture into which every depth noise model is rendered (eqs. 17–19)."""
+"""Interface of noise models, and the texture into which every depth noise model is rendered (eqs. 17–19)."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,23 +7,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from calib.jit import kernel
 
-#: Texels describe the density for |measured − mean offset − synthesised| up to this [m]; beyond, they keep their edge
-#: value.
+#: Half width of the interval of measured − mean offset − synthesised distance that a texel describes [m]; outside, the
+#: edge value applies.
 WINDOW_M = 0.05
 
-#: No surface is nearer than this [m]; keeps the window's near end in front of the camera.
-LEAST_DISTANCE_M = 1e-3
+#: Smallest distance of a surface [m]; keeps the near end of the interval in front of the camera.
+MIN_DISTANCE_M = 1e-3
 
-#: Pixels that are rendered at once: so many that calls cost little, so few that what lies between them stays in the
-#: processor's memory.
+#: Pixels rendered in one call: few enough that intermediate results stay in the cache, many enough to amortise the
+#: call.
 _BLOCK = 32768
 
 LOG_SQRT_2PI = 0.5 * np.log(2 * np.pi)
 
-#: Values that a channel of a colour can have.
+#: Number of values of a colour channel.
 LEVELS = 256.0
 
-#: Rows and columns of the pixels that measured, each (n,).
+#: Rows and columns of measuring pixels, each (n,).
 Pixels = tuple[NDArray[np.integer], NDArray[np.integer]]
 
 
@@ -39,19 +39,19 @@ def pixels_where(mask: NDArray[np.bool_]) -> Pixels:
 
 @runtime_checkable
 class DepthNoise(Protocol):
-    """Gaussian noise of a distance measured by pixel p, given the real distance x [m] and the measured amplitude a.
+    """Gaussian noise of the distance measured by pixel p, given the true distance x [m] and the measured amplitude a.
 
-    For a sensor that tells the σ of each measurement itself, a is that [m]. Arrays x may be (n,), one distance for each
-    of n pixels, or (…, n), several; a is (n,).
+    If the sensor reports its own σ per measurement, a is that σ [m]. Arrays x are (n,), one distance for each of n
+    pixels, or (…, n), several; a is (n,).
     """
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether μ or σ depends on the amplitude, so that a frame without one cannot be judged."""
+        """True if μ or σ depends on the amplitude, so that frames without amplitudes cannot be used."""
         ...
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """Mean offset μ_p(x, a) of a measurement from the real distance [m], in the shape of x."""
+        """Mean offset μ_p(x, a) of a measurement from the true distance [m], in the shape of x."""
         ...
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
@@ -60,7 +60,7 @@ class DepthNoise(Protocol):
 
 
 def log_density(model: DepthNoise, measured: ArrayLike, x: ArrayLike, a: ArrayLike, p: Pixels) -> NDArray[np.float64]:
-    """Logarithm of eq. 18: density of measuring `measured` [m] at pixel p when the real distance is `x` [m]."""
+    """Logarithm of eq. 18: density of measuring `measured` [m] at pixel p when the true distance is `x` [m]."""
     x, a = np.asarray(x, np.float64), np.asarray(a, np.float64)
     deviation = model.deviation(x, a, p)
     normalized = (np.asarray(measured) - x - model.mean(x, a, p)) / deviation
@@ -70,15 +70,15 @@ def log_density(model: DepthNoise, measured: ArrayLike, x: ArrayLike, a: ArrayLi
 def sample(
     model: DepthNoise, generator: np.random.Generator, x: ArrayLike, a: ArrayLike, p: Pixels
 ) -> NDArray[np.float64]:
-    """Draws one measurement [m] for every real distance `x` [m] and amplitude `a` at the pixels `p`."""
+    """Random measurement [m] for every true distance `x` [m] and amplitude `a` at the pixels `p`."""
     x, a = np.asarray(x, np.float64), np.asarray(a, np.float64)
     return x + model.mean(x, a, p) + model.deviation(x, a, p) * generator.standard_normal(x.shape)
 
 
-def without_offset(
+def subtract_mean_offset(
     model: DepthNoise, distance: NDArray[np.floating], amplitude: NDArray[np.floating]
 ) -> NDArray[np.float32]:
-    """A depth image (height, width) [m] without the mean offset that each distance has if it is right."""
+    """Depth image (height, width) [m] minus the mean offset, evaluated at the measured distance."""
     x, a = distance.astype(np.float64).ravel(), amplitude.astype(np.float64).ravel()
     rows, columns = np.indices(distance.shape)
     return (x - model.mean(x, a, (rows.ravel(), columns.ravel()))).reshape(distance.shape).astype(np.float32)
@@ -93,15 +93,15 @@ def write_texture(
 ) -> None:
     """Renders eq. 18 for a part of an image into the coefficients that the likelihood kernel reads.
 
-    Every noise model becomes the same texture, so all of them run at the same speed. With y the measurement without
-    the mean offset that it has if it is right, and t = y − x, a texel holds [y, m0, m1, s0, s1, s2, n0, n1]: mean
-    offset beyond that one m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and the negative logarithm of the normaliser
-    n0 + n1 t. Pixels without a return keep what they hold.
+    Every noise model becomes the same texture, so all have the same cost per vertex. With y the measurement minus the
+    mean offset evaluated at y itself, and t = y − x, a texel holds [y, m0, m1, s0, s1, s2, n0, n1]: remaining mean
+    offset m0 + m1 t, inverse deviation s0 + s1 t + s2 t², and negative logarithm of the normaliser n0 + n1 t. Pixels
+    without a return keep their previous content.
 
     Args:
         model: the noise model.
         distance: measured radial distances (rows, columns) [m], NaN without return.
-        amplitude: measured amplitudes (rows, columns); ignored where the model does not depend on them.
+        amplitude: measured amplitudes (rows, columns); ignored if the model does not use them.
         corner: row and column of the part's first pixel in the image.
         texture: of the whole image, with a border of one pixel (height + 2, width + 2, 8).
     """
@@ -118,7 +118,7 @@ def _render_rows(
     corner: tuple[int, int],
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes the texels of so few pixels that what lies between the steps stays in the processor's memory."""
+    """Writes the texels of a block small enough for the cache."""
     pixels, returns = np.empty((2, distance.size), np.int64), np.empty((2, distance.size))
     n = _returns(
         np.ascontiguousarray(distance, np.float32),
@@ -129,9 +129,9 @@ def _render_rows(
         returns,
     )
     p, (measured, a) = (pixels[0, :n], pixels[1, :n]), returns[:, :n]
-    offset = model.mean(measured, a, p)  # may be larger than the window, which has to lie where the surface is
+    offset = model.mean(measured, a, p)  # may exceed the interval, which is centred on the surface
     center = measured - offset
-    nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), LEAST_DISTANCE_M)
+    nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), MIN_DISTANCE_M)
     _write_texels(*p, center, model.mean(nodes, a, p) - offset, model.deviation(nodes, a, p), texture)
 
 
@@ -145,9 +145,9 @@ def _returns(
     pixels: NDArray[np.int64],
     returns: NDArray[np.float64],
 ) -> int:
-    """Lists the pixels (2, n) that can be judged with what they measured (2, n), and tells how many there are.
+    """Writes valid pixels (2, n) and their measurements (2, n); returns n.
 
-    Some devices report infinity, and some a negative distance, for what is out of range.
+    Some devices report infinity or a negative distance for a return out of range.
     """
     n = 0
     for row in range(distance.shape[0]):
@@ -169,14 +169,14 @@ def _write_texels(
     deviation: NDArray[np.float64],
     texture: NDArray[np.float32],
 ) -> None:
-    """Coefficients in t from the values (3, n) at t = −WINDOW_M, 0, WINDOW_M; texels have single precision only."""
+    """Coefficients in t, in single precision, from values (3, n) at t = −WINDOW_M, 0, WINDOW_M."""
     slope, curvature = 1 / (2 * WINDOW_M), 1 / (2 * WINDOW_M**2)
     last, normalizer, growth = np.zeros(3), np.float32(0), 0.0
     for k in range(center.size):
         texel = texture[rows[k] + 1, columns[k] + 1]
         near, here, far = deviation[0, k], deviation[1, k], deviation[2, k]
         below, middle, above = 1 / near, 1 / here, 1 / far
-        if near != last[0] or here != last[1] or far != last[2]:  # a logarithm takes as long as all the rest
+        if near != last[0] or here != last[1] or far != last[2]:  # the logarithm is half of the cost
             last[0], last[1], last[2] = near, here, far
             normalizer = np.log(np.float32(here)) + np.float32(LOG_SQRT_2PI)
             growth = np.log(np.float32(far * below)) * slope

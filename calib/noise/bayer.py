@@ -8,26 +8,26 @@ from annotated_types import Ge, Gt
 from numpy.typing import ArrayLike, NDArray
 
 from calib.noise.base import LEVELS, NoiseError
-from calib.noise.fit import fitting, pictures
+from calib.noise.fit import fitting, image_noise
 
-#: Every filter lets its own colour through and nothing else.
+#: Ideal filters without crosstalk.
 IDEAL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class GaussianBayer:
-    """Every pixel deviates with one deviation from the one channel that its filter lets through.
+    """Gaussian noise of every pixel around the one channel that its filter passes.
 
-    What the optics and the filters do to a colour before it is measured is done to the colours of the vertices, never
-    undone in the measurement, where it would spread the noise of a pixel over its neighbours.
+    Optical blur and filter crosstalk are applied to the colours of the vertices and never inverted in the measurement,
+    where inversion would spread the noise of a pixel over its neighbours.
 
     Attributes:
         sigma: standard deviation of a pixel, in levels of 256.
-        crosstalk: shares of red, green and blue light (columns) in a pixel behind the red, green and blue filter
+        crosstalk: contributions of red, green and blue light (columns) to a pixel behind the red, green and blue filter
             (rows): leakage of the filters, and of light into neighbouring pixels.
-        defocus_px: how much more this sensor blurs than the one that the vertices' colours come from: deviation of a
-            Gaussian in pixels of this sensor. It does nothing to colours that come from this sensor itself, because
-            they are as blurred as what they are compared with.
+        defocus_px: additional blur of this sensor relative to the one that the vertices' colours come from: standard
+            deviation of a Gaussian in pixels of this sensor. No effect on colours that come from this sensor itself,
+            because they have the same blur as the measurement.
     """
 
     sigma: Annotated[float, Gt(0)] = 15.0
@@ -43,19 +43,19 @@ class GaussianBayer:
 
     @property
     def uniform(self) -> float:
-        """Negative log-density of a pixel that says nothing about the surface."""
+        """Negative log-density of an outlier: uniform over all values."""
         return float(np.log(LEVELS))
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Standard deviation of measured values, in their shape."""
         return np.full_like(values, self.sigma)
 
-    def filtered(self, colors: NDArray[np.floating]) -> NDArray[np.float64]:
-        """What the red, green and blue pixels (…, 3) make of colours (…, 3)."""
+    def apply_crosstalk(self, colors: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Values of red, green and blue pixels (…, 3) for colours (…, 3): crosstalk applied."""
         return colors.astype(np.float64) @ np.array(self.crosstalk).T
 
-    def unfiltered(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The colours (…, 3) of which red, green and blue pixels made (…, 3)."""
+    def remove_crosstalk(self, pixels: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Colours (…, 3) for values of red, green and blue pixels (…, 3): crosstalk inverted."""
         return pixels.astype(np.float64) @ np.linalg.inv(np.array(self.crosstalk)).T
 
     def build(self) -> "GaussianBayer":
@@ -67,28 +67,28 @@ Settings = GaussianBayer
 
 
 def fit(measured: ArrayLike, real: ArrayLike) -> GaussianBayer:
-    """The deviation of greatest likelihood; see `fit_crosstalk` for the filters.
+    """Maximum-likelihood deviation; see `fit_crosstalk` for the filters.
 
     Args:
-        measured: pixels of mosaics, in levels of 256; NaN where they do not count.
-        real: what they would have measured without noise, in the same shape.
+        measured: mosaic pixels, in levels of 256; NaN is ignored.
+        real: noise-free values, in the same shape.
 
     Raises:
-        NoiseError: no measured number comes with a real one.
+        NoiseError: no measured value has a finite true value.
     """
-    return GaussianBayer(pictures.fit_deviation(measured, real))
+    return GaussianBayer(image_noise.fit_deviation(measured, real))
 
 
 def fit_crosstalk(measured: ArrayLike, colors: ArrayLike, channel: ArrayLike) -> tuple[tuple[float, float, float], ...]:
-    """Shares of red, green and blue light behind every filter, from pixels that saw known colours (a colour chart).
+    """Contributions of red, green and blue light behind every filter, from pixels that measured known colours.
 
     Args:
         measured: pixels (n,) of a mosaic, in levels of 256.
-        colors: red, green and blue (n, 3) that each of them looked at, alike in the pixels around it.
-        channel: filter (n,) before each pixel: 0 red, 1 green, 2 blue.
+        colors: true red, green and blue (n, 3) at each pixel, uniform in its neighbourhood (a colour chart).
+        channel: filter (n,) of each pixel: 0 red, 1 green, 2 blue.
 
     Raises:
-        NoiseError: behind a filter there is no pixel, or the colours that it saw do not tell the three shares apart.
+        NoiseError: no pixel behind one of the filters, or its colours do not determine the three contributions.
     """
     pixels, known, filters = np.asarray(measured, np.float64), np.asarray(colors, np.float64), np.asarray(channel)
     for index, name in enumerate(("red", "green", "blue")):
@@ -97,7 +97,7 @@ def fit_crosstalk(measured: ArrayLike, colors: ArrayLike, channel: ArrayLike) ->
     rows = []
     for index in range(3):
         behind = filters == index
-        columns = fitting.Columns(known[behind], np.ones((np.count_nonzero(behind), 1)))
-        red, green, blue = fitting.maximize(pixels[behind], columns, span=LEVELS).mean.tolist()
+        columns = fitting.Design(known[behind], np.ones((np.count_nonzero(behind), 1)))
+        red, green, blue = fitting.maximize_likelihood(pixels[behind], columns, span=LEVELS).mean.tolist()
         rows.append((red, green, blue))
     return tuple(rows)

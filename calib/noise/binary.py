@@ -1,4 +1,4 @@
-"""Errors of a sensor that says yes or no: a light barrier that is interrupted or free."""
+"""Binary sensor: error rates of a light barrier that is interrupted or free."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,12 +14,12 @@ Rate = Annotated[float, Interval(gt=0, lt=0.5)]
 
 @dataclass(frozen=True)
 class LightBarrier:
-    """A beam from the sensor's centre along its z axis, and how often its receiver errs.
+    """Beam from the sensor's centre along its z axis, with the error rates of its receiver.
 
     Attributes:
         length_m: from the lamp to the receiver [m].
         miss: probability that an interrupted beam is reported as free.
-        false_alarm: probability that a free beam is reported as interrupted, by whatever is not the object as well.
+        false_alarm: probability that a free beam is reported as interrupted, including interruption by other objects.
     """
 
     length_m: Annotated[float, Gt(0)]
@@ -28,11 +28,11 @@ class LightBarrier:
 
     @property
     def uniform(self) -> float:
-        """Negative log-probability of a reading that says nothing about the surface."""
+        """Negative log-probability of an outlier: uniform over both readings."""
         return float(np.log(2))
 
     def cost(self, interrupted: bool) -> tuple[float, float]:
-        """−log P of a reading, for a mesh that leaves the beam free and for one that crosses it."""
+        """Negative log-probability of a reading, for a mesh that leaves the beam free and for one that crosses it."""
         free = self.false_alarm if interrupted else 1 - self.false_alarm
         crossing = 1 - self.miss if interrupted else self.miss
         return -float(np.log(free)), -float(np.log(crossing))
@@ -46,29 +46,29 @@ Settings = LightBarrier
 
 
 def log_probability(model: LightBarrier, interrupted: ArrayLike, crossing: ArrayLike) -> NDArray[np.float64]:
-    """Logarithm of the probability of readings, of beams that the object crosses or leaves free; both boolean."""
+    """Log-probability of readings (boolean), for beams that the object crosses or leaves free (boolean)."""
     costs = np.array([model.cost(False), model.cost(True)])
     return -costs[np.asarray(interrupted, int), np.asarray(crossing, int)]
 
 
 def sample(model: LightBarrier, generator: np.random.Generator, crossing: ArrayLike) -> NDArray[np.bool_]:
-    """Draws one reading for every beam that the object crosses or leaves free; True where it is interrupted."""
+    """Random reading for every beam that the object crosses or leaves free; True if interrupted."""
     crosses = np.asarray(crossing, np.bool_)
     return crosses ^ (generator.random(crosses.shape) < np.where(crosses, model.miss, model.false_alarm))
 
 
 def fit(interrupted: ArrayLike, crossing: ArrayLike, length_m: float) -> LightBarrier:
-    """Error rates from readings of which the truth is known: the means of their posterior (Jeffreys' prior).
+    """Error rates from readings with known truth: posterior means under Jeffreys' prior.
 
-    Errors that never happened in n readings are taken to happen once in 2 (n + 1), so that no reading is impossible.
+    Zero observed errors in n readings give the rate 1 / (2 (n + 1)), so that no reading is impossible.
 
     Args:
         interrupted: readings (n,), boolean.
-        crossing: whether the object crossed the beam (n,), boolean.
+        crossing: True where the object crossed the beam (n,).
         length_m: from the lamp to the receiver [m].
 
     Raises:
-        NoiseError: the beam was always free, or never; or the receiver errs at least as often as not.
+        NoiseError: the beam was always or never free, or an error rate is 0.5 or more.
     """
     readings, crosses = np.asarray(interrupted, np.bool_), np.asarray(crossing, np.bool_)
     miss = _rate("miss", ~readings[crosses], "crossed by the object")

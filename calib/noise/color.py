@@ -8,15 +8,15 @@ from annotated_types import Gt
 from numpy.typing import ArrayLike, NDArray
 
 from calib.noise.base import LEVELS
-from calib.noise.fit import pictures
+from calib.noise.fit import image_noise
 
 
 @dataclass(frozen=True)
 class GaussianColor:
-    """Every channel deviates independently, with one deviation.
+    """Gaussian noise of equal deviation, independent in every channel.
 
-    It covers the camera's noise and, much larger, what sparse synthesis leaves out: interpolation between pixels and
-    changes of illumination. That is why it is a number of the rig and not of the data sheet.
+    Covers camera noise and, much larger, errors of sparse synthesis: interpolation between pixels and changes of
+        illumination. Therefore it is a property of the rig and not of the data sheet.
 
     Attributes:
         sigma: standard deviation of a channel, in levels of 256.
@@ -26,7 +26,7 @@ class GaussianColor:
 
     @property
     def uniform(self) -> float:
-        """Negative log-density of a colour that says nothing about the surface."""
+        """Negative log-density of an outlier: uniform over all colours."""
         return float(3 * np.log(LEVELS))
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -42,13 +42,13 @@ Settings = GaussianColor
 
 
 def fit(measured: ArrayLike, real: ArrayLike) -> GaussianColor:
-    """The model of greatest likelihood.
+    """Maximum-likelihood model.
 
     Args:
-        measured: colours (…, 3), in levels of 256; NaN where they do not count.
-        real: what they would have been without noise, in the same shape.
+        measured: colours (…, 3), in levels of 256; NaN is ignored.
+        real: noise-free colours, in the same shape.
 
     Raises:
-        NoiseError: no measured number comes with a real one.
+        NoiseError: no measured value has a finite true value.
     """
-    return GaussianColor(pictures.fit_deviation(measured, real))
+    return GaussianColor(image_noise.fit_deviation(measured, real))

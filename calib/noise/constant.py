@@ -1,4 +1,4 @@
-"""One deviation and one mean offset for every distance: what there is before anything was measured."""
+"""Constant deviation and mean offset, independent of the distance: the default before any calibration."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -26,7 +26,7 @@ class Constant:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Nothing depends on it."""
+        """Always false."""
         return False
 
     def build(self) -> "Constant":
@@ -34,11 +34,11 @@ class Constant:
         return self
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """The mean offset [m]."""
+        """Mean offset [m]."""
         return np.full(np.shape(x), self.offset)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """The standard deviation [m]."""
+        """Standard deviation [m]."""
         return np.full(np.shape(x), self.sigma)
 
 
@@ -46,12 +46,12 @@ Settings = Constant
 
 
 def fit(samples: Samples) -> Constant:
-    """The constant of greatest likelihood.
+    """Maximum-likelihood constants.
 
     Raises:
         NoiseError: no sample has a distance.
     """
-    residual = fitting.thinned(samples.returns(with_amplitude=False)).residual
+    residual = fitting.subsampled(samples.returns(with_amplitude=False)).residual
     one = np.ones((len(residual), 1))
-    law = fitting.maximize(residual, fitting.Columns(one, one))
+    law = fitting.maximize_likelihood(residual, fitting.Design(one, one))
     return Constant(float(law.spread[0]), float(law.mean[0]))

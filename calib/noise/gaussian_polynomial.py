@@ -17,11 +17,12 @@ from calib.noise.fit.samples import Samples
 class GaussianPolynomial:
     """μ(x, a) = Σ mu[i][j] xⁱ aʲ and σ(x, a) = Σ sigma[i][j] xⁱ aʲ, x in metres, a in the sensor's amplitude unit.
 
-    Outside the calibrated domain the polynomials keep their value at its edge, and σ never falls below `least_sigma`,
-    so that an extrapolation can neither turn negative nor explode.
+    Arguments are clamped to the calibrated domain and σ is at least `least_sigma`, so that extrapolation stays positive
+    and bounded.
 
     Attributes:
-        sigma: coefficients of the deviation [m]; row i belongs to the distance's power i, column j to the amplitude's.
+        sigma: coefficients of the deviation [m]; row i for the distance's power i, column j for the amplitude's power
+            j.
         mu: coefficients of the mean offset [m].
         distances: calibrated range of distances [m].
         amplitudes: calibrated range of amplitudes.
@@ -42,7 +43,7 @@ class GaussianPolynomial:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether a power of the amplitude occurs."""
+        """True if a power of the amplitude occurs."""
         return len(self.sigma[0]) > 1 or len(self.mu[0]) > 1
 
     def build(self) -> "GaussianPolynomial":
@@ -67,15 +68,15 @@ Settings = GaussianPolynomial
 
 
 def fit(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tuple[int, int]) -> GaussianPolynomial:
-    """The model of greatest likelihood; its domain is where the samples lie.
+    """Maximum-likelihood model; its domain is that of the samples.
 
     Args:
         samples: measurements.
-        sigma_degrees, mu_degrees: highest powers of the distance and of the amplitude.
+        sigma_degrees, mu_degrees: degrees in distance and amplitude.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
-            too little for so many powers.
+        NoiseError: no sample has a distance or, if the polynomials use it, an amplitude; or the samples vary too little
+            for these degrees.
     """
     law = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     sigma, mu = fitting.table(law.sigma[..., 0]), fitting.table(law.mu[..., 0])

@@ -1,4 +1,4 @@
-"""Noise of a grey pixel around the grey of the vertex that it shows."""
+"""Noise of a grey pixel around the grey value of its vertex."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,14 +8,14 @@ from annotated_types import Gt
 from numpy.typing import ArrayLike, NDArray
 
 from calib.noise.base import LEVELS
-from calib.noise.fit import pictures
+from calib.noise.fit import image_noise
 
 
 @dataclass(frozen=True)
 class GaussianGrey:
-    """One deviation for every pixel of a monochrome camera, or of a colour camera whose channels are summed to grey.
+    """Gaussian noise of a monochrome camera, or of a colour camera whose channels are averaged.
 
-    As for colour, it covers what sparse synthesis leaves out more than the camera's own noise.
+    As for colour, errors of sparse synthesis dominate the camera's own noise.
 
     Attributes:
         sigma: standard deviation of a pixel, in levels of 256.
@@ -25,7 +25,7 @@ class GaussianGrey:
 
     @property
     def uniform(self) -> float:
-        """Negative log-density of a pixel that says nothing about the surface."""
+        """Negative log-density of an outlier: uniform over all values."""
         return float(np.log(LEVELS))
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -41,13 +41,13 @@ Settings = GaussianGrey
 
 
 def fit(measured: ArrayLike, real: ArrayLike) -> GaussianGrey:
-    """The model of greatest likelihood.
+    """Maximum-likelihood model.
 
     Args:
-        measured: grey of pixels, in levels of 256; NaN where it does not count.
-        real: what they would have measured without noise, in the same shape.
+        measured: grey values, in levels of 256; NaN is ignored.
+        real: noise-free values, in the same shape.
 
     Raises:
-        NoiseError: no measured number comes with a real one.
+        NoiseError: no measured value has a finite true value.
     """
-    return GaussianGrey(pictures.fit_deviation(measured, real))
+    return GaussianGrey(image_noise.fit_deviation(measured, real))

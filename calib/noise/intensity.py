@@ -1,4 +1,4 @@
-"""Noise of an amplitude, intensity or infra-red image around what the vertex's reflectivity makes of the light."""
+"""Noise of an amplitude, intensity or infra-red image around the value predicted from the vertex's reflectivity."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -7,28 +7,28 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import ArrayLike, NDArray
 
-from calib.noise.fit import fitting, pictures
+from calib.noise.fit import fitting, image_noise
 
-#: Streams of one number per pixel that tell of reflectivity.
+#: Single-channel streams that depend on reflectivity.
 Stream = Literal["amplitude", "intensity", "ir"]
 
 
 @dataclass(frozen=True)
 class GaussianIntensity:
-    """A constant deviation and one in proportion to the measured value, which grow together as variances.
+    """Sum of a constant variance and one proportional to the squared measured value.
 
-    The constant part is the sensor's noise; the proportional one is what sparse synthesis leaves out (a texture is read
-    between two pixels, a light flickers), and that is more where it is brighter. The tracker takes both at the measured
-    value, which it knows before it searches, and not at the one that it compares it with: their densities differ by a
-    factor of 1 + relative² in sum, and by their skewness.
+    The constant part is sensor noise; the proportional part covers errors of sparse synthesis (interpolation between
+    pixels, flicker), which grow with brightness. The tracker evaluates both at the measured value, which is known
+    before the search, instead of the synthesised one; the densities differ by a factor of 1 + relative² in total, and
+    in skewness.
 
     Attributes:
-        stream: of the sensor's streams, the one that is meant.
+        stream: stream of the sensor.
         sigma: constant part of the standard deviation, in units of the stream.
         relative: proportional part of the standard deviation.
-        illumination: `active` if the sensor brings its own light, so that a surface is fainter the farther away it is
-            and the more it is inclined; `passive` if the light is the room's, so that it looks the same everywhere.
-        full_scale: largest value of the stream; a value that says nothing about the surface is uniform up to it.
+        illumination: `active` for the sensor's own light, whose return falls with distance and angle of incidence;
+            `passive` for ambient light, under which a surface looks the same from everywhere.
+        full_scale: largest value of the stream; outliers are uniform up to it.
     """
 
     stream: Stream
@@ -39,7 +39,7 @@ class GaussianIntensity:
 
     @property
     def uniform(self) -> float:
-        """Negative log-density of a value that says nothing about the surface."""
+        """Negative log-density of an outlier: uniform up to full scale."""
         return float(np.log(self.full_scale))
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -55,23 +55,25 @@ Settings = GaussianIntensity
 
 
 def fit(measured: ArrayLike, real: ArrayLike, stream: Stream, full_scale: float = 65535.0) -> GaussianIntensity:
-    """The model of greatest likelihood; its illumination is the usual one, `active`.
+    """Maximum-likelihood model with the default illumination, `active`.
 
     Args:
-        measured: numbers of pixels, in units of the stream; NaN where they do not count.
-        real: what they would have measured without noise, in the same shape; dark and bright ones.
-        stream: of the sensor's streams, the one that is meant.
+        measured: pixel values, in units of the stream; NaN is ignored.
+        real: noise-free values, in the same shape; dark and bright ones.
+        stream: stream of the sensor.
         full_scale: largest value of the stream.
 
     Raises:
-        NoiseError: no measured number comes with a real one, or all are equally bright.
+        NoiseError: no measured value has a finite true value, or all have the same brightness.
     """
-    residual, brightness = pictures.residuals(measured, real)
+    residual, brightness = image_noise.residuals(measured, real)
     spread = np.column_stack([np.ones(len(residual)), brightness**2])
     none = spread[:, :0]
-    law = fitting.maximize(residual, fitting.Columns(none, spread), power=2, span=full_scale).spread
-    if law[1] < 0:  # brighter pixels err less: nothing that this model could say
-        law = fitting.maximize(residual, fitting.Columns(none, spread[:, :1]), power=2, span=full_scale).spread
+    law = fitting.maximize_likelihood(residual, fitting.Design(none, spread), power=2, span=full_scale).spread
+    if law[1] < 0:  # errors that decrease with brightness contradict the model; use the constant part only
+        law = fitting.maximize_likelihood(
+            residual, fitting.Design(none, spread[:, :1]), power=2, span=full_scale
+        ).spread
     least = 1e-6 * float(np.mean(brightness**2)) * float(law[1:].sum())  # variance is never 0, not even in the dark
     sigma = np.sqrt(max(float(law[0]), least))
     return GaussianIntensity(stream, float(sigma), float(np.sqrt(law[1:].sum())), full_scale=full_scale)

@@ -1,4 +1,4 @@
-"""The deviation that the sensor itself tells for every measurement, in an image beside its distances."""
+"""Deviation that the sensor itself reports for every measurement, in an image beside its distances."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -11,7 +11,7 @@ from calib.noise.base import Pixels
 from calib.noise.fit import fitting
 from calib.noise.fit.samples import Samples
 
-#: A deviation beyond any sensor's range says no more than this [m], for which single precision has room.
+#: Upper bound of a reported deviation [m]; beyond any sensor's range.
 LARGEST_M = 100.0
 
 
@@ -19,14 +19,14 @@ LARGEST_M = 100.0
 class Measured:
     """σ² = (factor a)² + floor², where a [m] is the sensor's own σ of this measurement; no mean offset.
 
-    Sensors know of shot noise and ambient light, pixel by pixel and frame by frame, what no law of distance and
-    amplitude does. They do not know what the mesh leaves out, nor how their errors hang together from pixel to
-    pixel; so `floor` adds to σ, and `factor` scales it.
+    A sensor's own σ includes shot noise and ambient light per pixel and frame, which no function of distance and
+    amplitude does. It excludes detail finer than the mesh and the correlation of errors between pixels; `floor` adds to
+    σ and `factor` scales it to account for both.
 
     Attributes:
-        factor: on the sensor's own deviation.
-        floor: deviation of a measurement that the sensor takes for exact [m]: relief finer than the mesh, systematic
-            errors that nobody calibrated.
+        factor: scale of the sensor's own deviation.
+        floor: deviation of a measurement with reported σ of 0 [m]: detail finer than the mesh, uncalibrated systematic
+            errors.
     """
 
     factor: Annotated[float, Gt(0)] = 1.0
@@ -34,7 +34,7 @@ class Measured:
 
     @property
     def uses_amplitude(self) -> bool:
-        """The sensor's own deviation takes the place of the amplitude; without one, a pixel cannot be judged."""
+        """Always true: the sensor's own deviation takes the place of the amplitude and is required for every pixel."""
         return True
 
     def build(self) -> "Measured":
@@ -42,7 +42,7 @@ class Measured:
         return self
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """No mean offset [m]."""
+        """Zero mean offset [m]."""
         return np.zeros_like(x)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
@@ -55,16 +55,16 @@ Settings = Measured
 
 
 def fit(samples: Samples) -> Measured:
-    """The model of greatest likelihood.
+    """Maximum-likelihood model.
 
     Args:
-        samples: measurements, with the sensor's own deviations [m] in the place of amplitudes.
+        samples: measurements, with the sensor's own deviations [m] as amplitudes.
 
     Raises:
         NoiseError: no sample has a distance and a deviation, or all have the same deviation.
     """
-    samples = fitting.thinned(samples.returns(with_amplitude=True))
+    samples = fitting.subsampled(samples.returns(with_amplitude=True))
     spread = np.column_stack([samples.amplitude**2, np.ones(len(samples))])
-    law = fitting.maximize(samples.residual, fitting.Columns(spread[:, :0], spread), power=2)
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread), power=2)
     scaled, floor = np.sqrt(np.maximum(law.spread, 0))
     return Measured(max(float(scaled), 1e-3), max(float(floor), 1e-6))

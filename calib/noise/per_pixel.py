@@ -1,4 +1,4 @@
-"""Any law of the whole image, with a mean offset and a factor on the deviation that every pixel has for itself."""
+"""Any noise model of the whole image, with an own mean offset and factor on the deviation for every pixel."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from calib.noise.fit.polynomial import Span, evaluate
 from calib.noise.fit.samples import Samples, domain
 from calib.noise.fit.shrinkage import ONCE, Repeats
 
-#: The amplitude does not occur in a pixel's own offset.
+#: Domain of the amplitude, which a pixel's own offset does not use.
 _ANY: Span = (0.0, 1.0)
 
 
@@ -21,14 +21,14 @@ _ANY: Span = (0.0, 1.0)
 class PerPixel:
     """μ_p(x, a) = μ(x, a) + Σ offset[k, p] tᵏ and σ_p(x, a) = factor[p] σ(x, a).
 
-    The law says how errors depend on distance and amplitude, the maps how pixels differ. So it is right as far as the
-    law is, which polynomials with coefficients of every pixel's own are not where the amplitude varies much.
+    The image's model gives the dependence on distance and amplitude, the maps the differences between pixels. Where the
+    amplitude varies much, this is more accurate than polynomials with separate coefficients for every pixel.
 
     Attributes:
-        law: μ and σ of the image.
+        law: noise model of the image.
         offset: coefficients of a pixel's own mean offset (k, height, width) [m] in powers of t, which is −1 at the
-            first and 1 at the second of `distances`, and keeps its edge value beyond.
-        factor: on the deviation (height, width).
+            first and 1 at the second of `distances`, and clamped outside.
+        factor: factor on the deviation (height, width).
         distances: calibrated domain, shape (2,).
     """
 
@@ -39,12 +39,12 @@ class PerPixel:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether the law does."""
+        """True if the image's model uses it."""
         return self.law.uses_amplitude
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width of the images that it is for."""
+        """Height and width of the images."""
         height, width = self.factor.shape
         return height, width
 
@@ -61,7 +61,7 @@ class PerPixel:
         return self.factor[p] * self.law.deviation(x, a, p)
 
     def save(self, file: Path) -> None:
-        """Writes the .npz that `Settings` reads, which does not hold the law."""
+        """Writes the .npz that `Settings` reads; the image's model is not part of it."""
         np.savez_compressed(file, offset=self.offset, factor=self.factor, distances=self.distances)
 
 
@@ -71,17 +71,17 @@ class Settings:
 
     Attributes:
         file: an .npz with the arrays offset (k, height, width) [m], factor (height, width) and distances (2,) [m].
-        law: another noise model, a table with its `type` and keys.
+        law: noise model of the image, a table with its `type` and keys.
     """
 
     file: Path
     law: Any = field(metadata={"parts": "calib.noise"})
 
     def build(self) -> PerPixel:
-        """Builds the law and loads the maps.
+        """Builds the image's model and loads the maps.
 
         Raises:
-            NoiseError: the file or one of its arrays is missing or has the wrong shape, or the law is none of depth.
+            NoiseError: missing file or array, wrong shape, or `law` is not a depth noise model.
         """
         law = self.law.build()
         if not isinstance(law, DepthNoise):
@@ -105,24 +105,24 @@ def fit(
     own_degree: int = 1,
     repeats: Repeats = ONCE,
 ) -> PerPixel:
-    """How regions differ from the image as a law describes it, and pixels from their region, as far as samples tell.
+    """Fits regions relative to the image's model, and pixels relative to their region, with shrinkage.
 
     Args:
         samples: measurements, or means of many measurements by one pixel.
-        law: μ and σ of the image, fitted to the same measurements.
-        labels: region (height, width) of every pixel, 0 and up; such as `region_polynomial.blocks`.
-        own_degree: highest power of the distance in a region's or a pixel's own mean offset.
-        repeats: measurements that every sample is the mean of.
+        law: noise model of the image, fitted to the same measurements.
+        labels: region (height, width) of every pixel, from 0; for example `region_polynomial.blocks`.
+        own_degree: degree of a region's or a pixel's own mean offset in the distance.
+        repeats: replicates of the samples.
 
     Raises:
-        NoiseError: no sample has a distance or, where the law depends on it, an amplitude.
+        NoiseError: no sample has a distance or, if the model uses it, an amplitude.
     """
     regions = fit_regions(samples, law, labels, own_degree, repeats)
     residual, deviation = _from(regions, samples)
     basis = shrinkage.basis_of(samples.true, tuple(regions.distances), own_degree)
     place = samples.row * labels.shape[1] + samples.column
-    offsets, factors = shrinkage.own(residual, deviation, basis, place, labels.size, repeats)
-    factors[np.bincount(place, minlength=labels.size) == 0] = 1.0  # of those nothing is known, least of all an offset
+    offsets, factors = shrinkage.shrink(residual, deviation, basis, place, labels.size, repeats)
+    factors[np.bincount(place, minlength=labels.size) == 0] = 1.0  # pixels without samples equal their region
     return PerPixel(
         law,
         regions.offset + offsets.T.reshape(-1, *labels.shape),
@@ -138,14 +138,14 @@ def fit_regions(
     own_degree: int = 1,
     repeats: Repeats = ONCE,
 ) -> PerPixel:
-    """The same with pixels that are like their region; arguments and errors as of `fit`."""
+    """Like `fit`, but with pixels equal to their region."""
     samples.returns(with_amplitude=law.uses_amplitude)
     distances = domain(samples.true)
     residual = samples.residual - law.mean(samples.true, samples.amplitude, samples.pixels)
     deviation = law.deviation(samples.true, samples.amplitude, samples.pixels)
     basis = shrinkage.basis_of(samples.true, distances, own_degree)
     places = int(labels.max()) + 1
-    offsets, factors = shrinkage.own(residual, deviation, basis, labels[samples.pixels], places, repeats)
+    offsets, factors = shrinkage.shrink(residual, deviation, basis, labels[samples.pixels], places, repeats)
     return PerPixel(law, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances))
 
 

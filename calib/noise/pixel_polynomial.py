@@ -1,4 +1,4 @@
-"""Mean and deviation as polynomials in distance and amplitude (eq. 18) with coefficients of every pixel's own."""
+"""Mean and deviation as polynomials in distance and amplitude (eq. 18) with separate coefficients for every pixel."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +14,11 @@ from calib.noise.fit.samples import Samples
 
 @dataclass(frozen=True, eq=False)
 class PixelPolynomial:
-    """μ_p(x, a) = Σ mu[i, j, p] xⁱ aʲ, likewise σ_p; the form in which the paper's calibration (5.1) is stored.
+    """μ_p(x, a) = Σ mu[i, j, p] xⁱ aʲ, likewise σ_p; the paper's calibration (section 5.1).
 
     Attributes:
         sigma, mu: coefficients (i, j, height, width) [m].
-        distances, amplitudes: calibrated domain, shape (2,); the polynomials keep their edge value outside.
+        distances, amplitudes: calibrated domain, shape (2,); arguments are clamped to it.
         least_sigma: lower bound of the deviation [m].
     """
 
@@ -30,12 +30,12 @@ class PixelPolynomial:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether a power of the amplitude occurs."""
+        """True if a power of the amplitude occurs."""
         return self._polynomials.use_amplitude
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width of the images that it is for."""
+        """Height and width of the images."""
         height, width = self.sigma.shape[2:]
         return height, width
 
@@ -72,8 +72,8 @@ class Settings:
     """TOML keys.
 
     Attributes:
-        file: an .npz with the arrays sigma, mu (i, j, height, width), distances (2,), amplitudes (2,) and, if it is not
-            1e-4, least_sigma ().
+        file: an .npz with the arrays sigma, mu (i, j, height, width), distances (2,), amplitudes (2,) and optionally
+            least_sigma (), by default 1e-4.
     """
 
     file: Path
@@ -82,7 +82,7 @@ class Settings:
         """Loads the maps.
 
         Raises:
-            NoiseError: the file or one of its arrays is missing or has the wrong shape.
+            NoiseError: missing file or array, or wrong shape.
         """
         arrays = maps.load(self.file, {"sigma", "mu"})
         sigma, mu = arrays["sigma"], arrays["mu"]
@@ -98,21 +98,20 @@ def fit(
     mu_degrees: tuple[int, int],
     own_degree: int = 1,
 ) -> PixelPolynomial:
-    """The image's polynomials, and how each region differs from them, and each pixel from its region.
+    """Fits the image's polynomials, each region relative to them, and each pixel relative to its region.
 
-    What the samples of a region or of a pixel do not tell is that of the image or of the region: 15 sequences are
-    plenty for an image and few for a pixel.
+    Shrinkage fills in for regions and pixels with few samples: 15 sequences are plenty for an image and few for a
+        pixel.
 
     Args:
         samples: measurements.
-        labels: region (height, width) of every pixel, 0 and up; such as `region_polynomial.blocks`.
-        sigma_degrees, mu_degrees: the image's highest powers of the distance and of the amplitude.
-        own_degree: highest power of the distance in a region's or a pixel's own mean offset. Their own deviation is a
-            factor.
+        labels: region (height, width) of every pixel, from 0; for example `region_polynomial.blocks`.
+        sigma_degrees, mu_degrees: the image's degrees in distance and amplitude.
+        own_degree: degree of a region's or a pixel's own mean offset in the distance. Their own deviation is a factor.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
-            too little for so many powers.
+        NoiseError: no sample has a distance or, if the polynomials use it, an amplitude; or the samples vary too little
+            for these degrees.
     """
     image = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     samples = samples.returns(with_amplitude=image.use_amplitude)

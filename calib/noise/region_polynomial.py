@@ -14,12 +14,12 @@ from calib.noise.fit.samples import Samples
 
 @dataclass(frozen=True, eq=False)
 class RegionPolynomial:
-    """μ_r(x, a) = Σ mu[i, j, r] xⁱ aʲ, likewise σ_r, for the region r that the pixel lies in.
+    """μ_r(x, a) = Σ mu[i, j, r] xⁱ aʲ, likewise σ_r, for the region r that contains the pixel.
 
     Attributes:
         labels: region (height, width) of every pixel, 0 to regions − 1.
         sigma, mu: coefficients (i, j, regions) [m].
-        distances, amplitudes: calibrated domain, shape (2,); the polynomials keep their edge value outside.
+        distances, amplitudes: calibrated domain, shape (2,); arguments are clamped to it.
         least_sigma: lower bound of the deviation [m].
     """
 
@@ -32,12 +32,12 @@ class RegionPolynomial:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether a power of the amplitude occurs."""
+        """True if a power of the amplitude occurs."""
         return self._polynomials.use_amplitude
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width of the images that it is for."""
+        """Height and width of the images."""
         height, width = self.labels.shape
         return height, width
 
@@ -72,16 +72,16 @@ class Settings:
 
     Attributes:
         file: an .npz with the arrays labels (height, width), sigma, mu (i, j, regions), distances (2,), amplitudes (2,)
-            and, if it is not 1e-4, least_sigma ().
+            and optionally least_sigma (), by default 1e-4.
     """
 
     file: Path
 
     def build(self) -> RegionPolynomial:
-        """Loads the map and the tables.
+        """Loads labels and coefficients.
 
         Raises:
-            NoiseError: the file or one of its arrays is missing or has the wrong shape, or a region has no table.
+            NoiseError: missing file or array, wrong shape, or a region without coefficients.
         """
         arrays = maps.load(self.file, {"labels", "sigma", "mu"})
         labels, sigma, mu = arrays["labels"], arrays["sigma"], arrays["mu"]
@@ -111,17 +111,17 @@ def fit(
     mu_degrees: tuple[int, int],
     own_degree: int = 1,
 ) -> RegionPolynomial:
-    """The image's polynomials, and how each region differs from them as far as its samples tell.
+    """Fits the image's polynomials, and each region relative to them, with shrinkage.
 
     Args:
         samples: measurements.
-        labels: region (height, width) of every pixel, 0 and up; such as `blocks`.
-        sigma_degrees, mu_degrees: the image's highest powers of the distance and of the amplitude.
-        own_degree: highest power of the distance in a region's own mean offset. Its own deviation is a factor.
+        labels: region (height, width) of every pixel, from 0; for example `blocks`.
+        sigma_degrees, mu_degrees: the image's degrees in distance and amplitude.
+        own_degree: degree of a region's own mean offset in the distance. Its own deviation is a factor.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
-            too little for so many powers.
+        NoiseError: no sample has a distance or, if the polynomials use it, an amplitude; or the samples vary too little
+            for these degrees.
     """
     image = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     samples = samples.returns(with_amplitude=image.use_amplitude)

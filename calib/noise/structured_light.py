@@ -1,4 +1,4 @@
-"""Structured light and stereo: random error and quantisation that grow with the square of the distance."""
+"""Structured light and stereo: random error and quantisation proportional to the squared distance."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -16,15 +16,15 @@ from calib.noise.fit.samples import Samples
 class StructuredLight:
     """σ²(x) = (noise x²)² + (step x²)² / 12 + floor², no mean offset.
 
-    A disparity error of constant size is an error ∝ x² in distance (Khoshelham and Elberink, Sensors 2012: 1.425e-3 / m
-    for a Kinect v1). The disparity is quantised, so distances come in steps ∝ x² as well, about two deviations
-    wide; a uniform error of that width adds its variance step² / 12. Distances are taken along the ray; for
-    a sensor that measures z the difference to z is below 10 % of σ within 25° of the optical axis.
+    A constant disparity error is a distance error ∝ x² (Khoshelham and Elberink, Sensors 2012: 1.425e-3 / m for a
+    Kinect v1). The disparity is quantised, so distances have steps ∝ x², about two deviations wide; a uniform error of
+    that width has the variance step² / 12. Distances are radial; for a sensor that measures z the difference is below
+    10 % of σ within 25° of the optical axis.
 
     Attributes:
-        noise: deviation of the random part per squared distance [1/m].
+        noise: deviation of the random error per squared distance [1/m].
         step: quantisation step per squared distance [1/m].
-        floor: deviation at any distance [m]: fine relief of the surface that the mesh cannot represent.
+        floor: deviation at any distance [m]: detail of the surface finer than the mesh.
     """
 
     noise: Annotated[float, Gt(0)] = 1.425e-3
@@ -33,7 +33,7 @@ class StructuredLight:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Structured light has no amplitude."""
+        """Always false."""
         return False
 
     def build(self) -> "StructuredLight":
@@ -41,12 +41,12 @@ class StructuredLight:
         return self
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
-        """No mean offset [m]."""
+        """Zero mean offset [m]."""
         return np.zeros_like(x)
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ(x) [m]."""
-        square = x * x  # a general power of an array costs ten times as much
+        square = x * x  # ten times faster than a general power
         return np.sqrt((self.noise**2 + self.step**2 / 12) * (square * square) + self.floor**2)
 
 
@@ -54,10 +54,10 @@ Settings = StructuredLight
 
 
 def fit(samples: Samples, step: float) -> StructuredLight:
-    """The model of greatest likelihood.
+    """Maximum-likelihood model.
 
-    Residuals tell the sum of random error and quantisation, not how much of it is which; so the step has to be known:
-    from the data sheet, or from the distances themselves, whose inverses are multiples of it.
+    Residuals determine only the sum of random error and quantisation; the step must be known from the data sheet or
+    from the distances themselves, whose inverses are multiples of it.
 
     Args:
         samples: measurements.
@@ -66,10 +66,10 @@ def fit(samples: Samples, step: float) -> StructuredLight:
     Raises:
         NoiseError: no sample has a distance.
     """
-    samples = fitting.thinned(samples.returns(with_amplitude=False))
+    samples = fitting.subsampled(samples.returns(with_amplitude=False))
     spread = np.column_stack([samples.true**4, np.ones(len(samples))])
-    law = fitting.maximize(samples.residual, fitting.Columns(spread[:, :0], spread), power=2)
-    if law.spread[1] <= 0:  # no floor, or one that is hidden by the rest
-        law = fitting.maximize(samples.residual, fitting.Columns(spread[:, :0], spread[:, :1]), power=2)
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread), power=2)
+    if law.spread[1] <= 0:  # no floor above the other errors
+        law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread[:, :1]), power=2)
     random = max(float(law.spread[0]) - step**2 / 12, (1e-3 * step) ** 2, 1e-12)
     return StructuredLight(float(np.sqrt(random)), step, float(np.sqrt(law.spread[1:].sum())))

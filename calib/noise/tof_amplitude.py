@@ -1,4 +1,4 @@
-"""Time of flight: the fainter a return, the larger its error (Frank et al., Optical Engineering 2009)."""
+"""Time of flight: error that grows as the amplitude falls (Frank et al., Optical Engineering 2009)."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -18,11 +18,11 @@ from calib.noise.fit.samples import Samples, domain
 class TofAmplitude:
     """σ(x, a) = Σ sigma[i] xⁱ + sigma_amplitude / a and μ(x, a) = Σ mu[i] xⁱ + mu_amplitude / a.
 
-    A phase is read from four charges; the deviation of its angle, and so of the distance, is that of a charge over the
-    amplitude. What does not depend on it (jitter of the light source, digits) is the polynomial in the distance. In
-    `mu` that polynomial takes the slow part of the periodic ("wiggling") error, and mu_amplitude / a the offset of
-    dark surfaces. Fewer parameters than a polynomial in the amplitude, and right to its limits. Outside the calibrated
-    domain both keep their value at its edge, and σ never falls below `least_sigma`.
+    The phase is computed from four charges; the deviation of its angle, and so of the distance, is that of a charge
+    over the amplitude. Errors that do not depend on it (jitter of the light source, rounding) are the polynomial in the
+    distance. In `mu` the polynomial covers the slow part of the periodic ("wiggling") error, and mu_amplitude / a the
+    offset of dark surfaces. This has fewer parameters than a polynomial in the amplitude and extrapolates correctly.
+    Arguments are clamped to the calibrated domain, and σ is at least `least_sigma`.
 
     Attributes:
         sigma: deviation of a bright return, coefficients of the powers of the distance [m].
@@ -53,7 +53,7 @@ class TofAmplitude:
 
     @property
     def uses_amplitude(self) -> bool:
-        """Whether anything depends on it."""
+        """True if a coefficient of 1/a is not zero."""
         return self.sigma_amplitude != 0 or self.mu_amplitude != 0
 
     def build(self) -> "TofAmplitude":
@@ -71,7 +71,7 @@ class TofAmplitude:
     def _law(
         self, powers: tuple[float, ...], per_amplitude: float, x: NDArray[np.float64], a: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """A polynomial of first degree in 1/a, so that it runs like every other one."""
+        """Polynomial of degree one in 1/a, evaluated by the common kernel."""
         table = np.zeros((len(powers), 2 if per_amplitude else 1, 1))
         table[:, 0, 0] = powers
         table[0, 1:, 0] = per_amplitude
@@ -84,22 +84,22 @@ Settings = TofAmplitude
 
 
 def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmplitude:
-    """The model of greatest likelihood; its domain is where the samples lie.
+    """Maximum-likelihood model; its domain is that of the samples.
 
     Args:
         samples: measurements with amplitudes.
-        sigma_degree, mu_degree: highest powers of the distance.
+        sigma_degree, mu_degree: degrees in the distance.
 
     Raises:
-        NoiseError: no sample has a distance and an amplitude, or they vary too little for so many powers.
+        NoiseError: no sample has a distance and an amplitude, or they vary too little for these degrees.
     """
-    samples = fitting.thinned(samples.returns(with_amplitude=True))
+    samples = fitting.subsampled(samples.returns(with_amplitude=True))
     distances, amplitudes = domain(samples.true), domain(samples.amplitude)
     x, inverse = np.clip(samples.true, *distances), 1 / np.clip(samples.amplitude, *amplitudes)
     mean, spread = (np.column_stack([polyvander(x, degree), inverse]) for degree in (mu_degree, sigma_degree))
-    law = fitting.maximize(samples.residual, fitting.Columns(mean, spread))
-    if law.spread[-1] < 0:  # brighter returns err more: not this sensor's physics, so nothing is read from it
-        law = fitting.maximize(samples.residual, fitting.Columns(mean, spread[:, :-1]))
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread))
+    if law.spread[-1] < 0:  # errors that grow with amplitude contradict the model; use the distance only
+        law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread[:, :-1]))
     per_amplitude = float(law.spread[sigma_degree + 1]) if len(law.spread) > sigma_degree + 1 else 0.0
     return TofAmplitude(
         sigma=tuple(law.spread[: sigma_degree + 1].tolist()),

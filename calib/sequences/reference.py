@@ -62,7 +62,7 @@ def known(static: Static, depth: float, region: NDArray[np.bool_], generator: np
     return _of(Kind.KNOWN, q, static, pixels)
 
 
-def without_offset(reference: Reference, static: Static, model: DepthNoise) -> Reference:
+def subtract_mean_offset(reference: Reference, static: Static, model: DepthNoise) -> Reference:
     """A known distance's target turned anew, with the mean offsets of the pixels removed that a model now tells."""
     pixels = np.isfinite(reference.distance)
     x, a, p = reference.distance[pixels], static.brightness[pixels], pixels_where(pixels)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from calib.noise.base import DepthNoise, NoiseError
-from calib.noise.fit.quality import Quality, judge
+from calib.noise.fit.quality import Quality, goodness_of_fit
 from calib.sequences.candidates import Candidate
 from calib.sequences.evidence import Evidence, thinned, together
 
@@ -74,7 +74,7 @@ def attempt(candidate: Candidate, parts: Sequence[Evidence], generator: np.rando
         for known, held_out in _folds(parts):
             model = candidate.fit(lean(together(known), generator))
             for part in held_out:
-                qualities.append(judge(model, thinned(part.samples, ENOUGH, generator)))
+                qualities.append(goodness_of_fit(model, thinned(part.samples, ENOUGH, generator)))
                 scores.append(qualities[-1].log_likelihood)
     except NoiseError as error:
         return Trial(candidate, (), _NO_QUALITY, str(error))

@@ -9,7 +9,7 @@ many others are held out. Errors are the largest over the domain, the worst of t
 import numpy as np
 
 from calib.noise import constant, gaussian_polynomial, structured_light, tof_amplitude
-from calib.noise.fit.quality import judge
+from calib.noise.fit.quality import goodness_of_fit
 from tests.calib import laws
 
 SEEDS = range(10)
@@ -28,7 +28,7 @@ def time_of_flight(fit) -> list[float]:
     p = laws.somewhere(len(x))
     for seed in SEEDS:
         model = fit(laws.time_of_flight(seed, outliers=OUTLIERS))
-        quality = judge(model, laws.time_of_flight(seed + 100, outliers=OUTLIERS))
+        quality = goodness_of_fit(model, laws.time_of_flight(seed + 100, outliers=OUTLIERS))
         sigma = np.abs(model.deviation(x, a, p) / laws.TOF.sigma(x, a) - 1).max() * 100
         mean = np.abs(model.mean(x, a, p) - laws.TOF.mu(x, a)).max() * 1e3
         rows.append([sigma, mean, *_told(quality)])
@@ -40,7 +40,7 @@ def kinect() -> list[float]:
     x, rows = np.linspace(0.6, 3.5, 100), []
     for seed in SEEDS:
         model = structured_light.fit(laws.structured_light(seed, outliers=OUTLIERS), laws.KINECT.step)
-        quality = judge(model, laws.structured_light(seed + 100, outliers=OUTLIERS))
+        quality = goodness_of_fit(model, laws.structured_light(seed + 100, outliers=OUTLIERS))
         sigma = model.deviation(x, x, laws.somewhere(100)) / laws.structured_light_deviation(x)
         rows.append([np.abs(sigma - 1).max() * 100, 0.0, *_told(quality)])
     return _over_seeds(rows)

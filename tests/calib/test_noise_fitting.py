@@ -10,7 +10,7 @@ from abs_service.config import plugins
 from calib.noise import constant, gaussian_polynomial, measured, structured_light, tof_amplitude
 from calib.noise.base import NoiseError
 from calib.noise.fit import fitting
-from calib.noise.fit.quality import judge
+from calib.noise.fit.quality import goodness_of_fit
 from calib.noise.fit.samples import Samples, domain, from_images, joined
 from tests.calib import laws
 
@@ -94,7 +94,7 @@ FITS = {
 
 def test_the_more_a_model_says_of_the_sensor_the_likelier_are_samples_that_it_never_saw():
     known, held_out = laws.time_of_flight(1, outliers=0.05), laws.time_of_flight(2, outliers=0.05)
-    likelihood = [judge(fit(known), held_out).log_likelihood for fit in FITS.values()]
+    likelihood = [goodness_of_fit(fit(known), held_out).log_likelihood for fit in FITS.values()]
     assert sorted(likelihood) == likelihood
     assert likelihood[-1] > likelihood[0] + 0.2
 
@@ -106,7 +106,7 @@ def test_as_many_unseen_samples_as_promised_lie_within_one_and_two_deviations(se
         (lambda samples: structured_light.fit(samples, laws.KINECT.step), laws.structured_light),
     ]
     for fit, law in pairs:
-        quality = judge(fit(law(seed, outliers=0.05)), law(seed + 100, outliers=0.05))
+        quality = goodness_of_fit(fit(law(seed, outliers=0.05)), law(seed + 100, outliers=0.05))
         assert quality.within_one == pytest.approx(0.683, abs=0.02)
         assert quality.within_95 == pytest.approx(0.95, abs=0.01)
         assert quality.variance == pytest.approx(1, abs=0.05)
@@ -118,14 +118,14 @@ def test_a_model_that_is_wrong_by_a_factor_is_told_by_the_variance():
     half = dataclasses.replace(
         right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, least_sigma=1e-4
     )
-    quality = judge(half, laws.time_of_flight(2))
+    quality = goodness_of_fit(half, laws.time_of_flight(2))
     assert quality.variance == pytest.approx(4, rel=0.1)
     assert quality.within_95 < 0.75
 
 
 def test_a_model_that_explains_nothing_is_no_reason_to_fail():
     far = constant.Constant(1e-4, offset=1.0)
-    quality = judge(far, laws.time_of_flight(1))
+    quality = goodness_of_fit(far, laws.time_of_flight(1))
     assert quality.outlier_share == 0.5
     assert np.isfinite(quality.log_likelihood)
     assert np.isnan(quality.variance)
@@ -198,7 +198,7 @@ def test_more_samples_than_needed_are_thinned_and_tell_the_same(monkeypatch):
     samples = laws.time_of_flight(5)
     everything = tof_amplitude.fit(samples)
     monkeypatch.setattr(fitting, "LARGEST", 5000)
-    assert len(fitting.thinned(samples)) == 5000
+    assert len(fitting.subsampled(samples)) == 5000
     x, a = laws.grid()
     p = laws.somewhere(len(x))
     ratio = tof_amplitude.fit(samples).deviation(x, a, p) / everything.deviation(x, a, p)
@@ -226,9 +226,9 @@ def test_samples_that_vary_too_little_for_a_model_are_no_reason_to_guess(name):
 @pytest.mark.parametrize("power", [1, 2])
 def test_the_gradients_of_the_fit_are_the_slopes_of_its_cost(power):
     generator = np.random.default_rng(1)
-    columns = fitting.Columns(generator.normal(size=(50, 2)), generator.uniform(0.5, 2, (50, 3)))
+    columns = fitting.Design(generator.normal(size=(50, 2)), generator.uniform(0.5, 2, (50, 3)))
     samples = fitting._Samples(generator.normal(size=50), columns, power, 0.01)
-    imagined = fitting._Imagined(0.3, columns, power)
+    imagined = fitting._PseudoSamples(0.3, columns, power)
     at, steps = np.array([0.2, -0.1, 0.5, 0.3, 0.4, -2.0]), 1e-6 * np.eye(6)
     for cost in (lambda p: samples.cost(p[:2], p[2:5], p[5]), lambda p: imagined.cost(p[:2], p[2:5])):
         slopes = [(cost(at + step)[0] - cost(at - step)[0]) / 2e-6 for step in steps]

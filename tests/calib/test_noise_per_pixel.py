@@ -10,7 +10,7 @@ from abs_service.config import plugins
 from abs_service.config.problems import ProblemsError
 from calib.noise import per_pixel, tof_amplitude
 from calib.noise.base import NoiseError
-from calib.noise.fit.quality import judge
+from calib.noise.fit.quality import goodness_of_fit
 from calib.noise.fit.samples import Samples
 from calib.noise.fit.shrinkage import Repeats
 from calib.noise.region_polynomial import blocks
@@ -61,7 +61,7 @@ def test_pixels_are_found_again_and_explain_what_no_law_of_the_image_does(head: 
     assert offsets[0] > 2 * offsets[2]
     assert offsets[2] < 0.8e-3
     assert sigmas[2] < 0.14 < sigmas[0]
-    likelihoods = [judge(model, unseen).log_likelihood for model in (law, regions, pixels)]
+    likelihoods = [goodness_of_fit(model, unseen).log_likelihood for model in (law, regions, pixels)]
     assert sorted(likelihoods) == likelihoods
 
 

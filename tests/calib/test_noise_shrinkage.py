@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.noise import gaussian_polynomial, pixel_polynomial, region_polynomial
-from calib.noise.fit.quality import judge
+from calib.noise.fit.quality import goodness_of_fit
 from calib.noise.fit.samples import Samples, from_images
 from calib.noise.region_polynomial import blocks
 
@@ -70,7 +70,7 @@ def test_each_level_explains_unseen_samples_better_than_the_one_above(head, held
         region_polynomial.fit(samples, LABELS, *DEGREES),
         pixel_polynomial.fit(samples, LABELS, *DEGREES),
     ]
-    image, region, pixel = (judge(model, held_out) for model in models)
+    image, region, pixel = (goodness_of_fit(model, held_out) for model in models)
     assert image.log_likelihood + 0.02 < region.log_likelihood < pixel.log_likelihood - 0.02
     assert pixel.variance == pytest.approx(1, abs=0.25 if frames == 1 else 0.1)
     assert pixel.within_one == pytest.approx(0.683, abs=0.03)

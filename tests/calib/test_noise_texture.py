@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calib.noise.base import log_density, without_offset
+from calib.noise.base import log_density, subtract_mean_offset
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
 from calib.noise.tof_amplitude import TofAmplitude
@@ -82,4 +82,6 @@ def test_beyond_the_window_the_density_still_falls():
 def test_the_mean_offset_can_be_taken_out_of_an_image():
     distance, amplitude = np.array([[1.0, np.nan, 2.0]], np.float32), np.array([[3000.0, 3000.0, 500.0]], np.float32)
     offsets = [0.10 - 0.02 * 1 + 2e-6 * 3000, np.nan, 0.10 - 0.02 * 2 + 2e-6 * 500]
-    np.testing.assert_allclose(without_offset(BIASED, distance, amplitude), distance - np.array([offsets]), rtol=1e-6)
+    np.testing.assert_allclose(
+        subtract_mean_offset(BIASED, distance, amplitude), distance - np.array([offsets]), rtol=1e-6
+    )

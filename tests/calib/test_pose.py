@@ -82,4 +82,4 @@ def test_turned_points_follow_the_rotation_vector_as_their_derivatives_say(rotat
     )
     turned = pose.transform(pose.from_rotation_vector(rotation_vector, (0, 0, 0)), point[None])
     expected = (np.array(ahead) - behind).T / 2e-6
-    np.testing.assert_allclose(pose.turning(rotation_vector, turned)[0], expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(pose.rotated_points_jacobian(rotation_vector, turned)[0], expected, rtol=0, atol=1e-8)

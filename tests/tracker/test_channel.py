@@ -15,7 +15,7 @@ from abs_service.tracker.terms.photometric.illumination import Active, Passive, 
 from calib.noise.bayer import GaussianBayer
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
-from calib.rig import PictureNoise, Rig, Sensor
+from calib.rig import ImageNoise, Rig, Sensor
 from tests import reference
 from tests.tracker.scenes import CAMERA, as_surface, in_sight, observation, sheet, sparse
 from tests.tracker.test_kernels import decided
@@ -31,7 +31,7 @@ NOISES = {
 }
 
 
-def term(noise: PictureNoise, looks: np.ndarray, share: float = SHARE) -> ChannelTerm:
+def term(noise: ImageNoise, looks: np.ndarray, share: float = SHARE) -> ChannelTerm:
     """The term of single points that look like this."""
     active = isinstance(noise, GaussianIntensity) and noise.illumination == "active"
     bounds = likelihood.Settings(share).bounds(Sensor("color", CAMERA, noise))

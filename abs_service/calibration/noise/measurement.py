@@ -181,7 +181,7 @@ def _turned(
     """Known distances' targets, turned with the mean offsets that a law tells: the law is fitted anew each time."""
     for _ in range(_TURNS if references[0].kind is Kind.KNOWN else 0):
         model = law.fit(lean(together(_evidence(statics, references)), generator))
-        references = [reference.without_offset(one, static, model) for static, one in zip(statics, references)]
+        references = [reference.subtract_mean_offset(one, static, model) for static, one in zip(statics, references)]
     return references
 
 

@@ -6,7 +6,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import Sighting, SightingError
 from abs_service.tracker.detection.regions.base import Region
-from calib.noise.base import DepthNoise, without_offset
+from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
 
 
@@ -20,6 +20,6 @@ def sight(observation: Observation, rig: Rig, reference: str, region: Region, ve
     if not (isinstance(image, DepthImage) and isinstance(noise, DepthNoise)):
         raise SightingError(f"no depth image from {reference} yet")
     camera = rig.sensors[reference].camera
-    distance = without_offset(noise, image.distance, image.amplitude)
+    distance = subtract_mean_offset(noise, image.distance, image.amplitude)
     inside = region.select(camera.unproject(distance), distance)
     return Sighting(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices, distance)

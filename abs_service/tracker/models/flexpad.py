@@ -127,7 +127,7 @@ class FlexPad:
         result = np.empty((len(turned), 3, DIMENSION))
         sheet = self._points, np.matmul(turn, self._rotation), self._per_bend, self._half
         slopes(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
-        result[:, :, ROTATION] = pose.turning(theta[ROTATION], turned)
+        result[:, :, ROTATION] = pose.rotated_points_jacobian(theta[ROTATION], turned)
         result[:, :, TRANSLATION] = np.eye(3)
         return result
 

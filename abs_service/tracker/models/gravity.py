@@ -113,7 +113,7 @@ class Gravity:
         if len(theta) == self.segments:
             return by_bends
         arms = self.deform(theta[None]).vertices[0].T - gripper[:, 3]
-        turning = pose.turning(theta[self.segments : self.segments + 3], arms)
+        turning = pose.rotated_points_jacobian(theta[self.segments : self.segments + 3], arms)
         return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
 
     def moves(self, theta: NDArray[np.float64]) -> Moves:

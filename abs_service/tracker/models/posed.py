@@ -86,7 +86,7 @@ class Posed:
         turned = (self._shape.deform(theta[None, 6:]).vertices[0].T - self._centroid) @ R.T
         shape = self._shape.moves(theta[6:])
         local = np.empty((len(turned), 3, 6 + shape.local.shape[2]))
-        local[:, :, :3] = pose.turning(theta[:3], turned)
+        local[:, :, :3] = pose.rotated_points_jacobian(theta[:3], turned)
         local[:, :, 3:6] = np.eye(3)
         np.matmul(R, shape.local, out=local[:, :, 6:])
         posing = np.broadcast_to(np.arange(6), (len(shape.parameters), 6))

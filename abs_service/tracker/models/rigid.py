@@ -64,7 +64,7 @@ class Rigid:
         """Derivatives (n, 3, 6) of the vertices at theta (6,)."""
         turned = pose.transform(pose.from_rotation_vector(theta[:3], (0, 0, 0)), self._arms)
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
-        return np.concatenate([pose.turning(theta[:3], turned), shifts], axis=2)
+        return np.concatenate([pose.rotated_points_jacobian(theta[:3], turned), shifts], axis=2)
 
     def moves(self, theta: NDArray[np.float64]) -> Moves:
         """As `jacobian`: every parameter moves every vertex."""

@@ -13,7 +13,7 @@ from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from calib.rig import PictureNoise, Rig
+from calib.rig import ImageNoise, Rig
 
 
 def surroundings(mesh: Mesh, step_m: float) -> Mesh:
@@ -43,7 +43,7 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
     sizes = [
         np.median((mesh.vertices - sensor.camera.center) @ sensor.camera.T_rs[:3, 2]) / sensor.camera.fx
         for sensor in rig.sensors.values()
-        if isinstance(sensor.noise, PictureNoise) and len(mesh.vertices)
+        if isinstance(sensor.noise, ImageNoise) and len(mesh.vertices)
     ]
     return float(0.5 * min((size for size in sizes if size > 0), default=2e-3))
 

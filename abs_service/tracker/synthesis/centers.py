@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.forward import bend, bend_fisheye, four
-from calib.forward import eight as coefficients
+from calib.forward import brown_conrady_coefficients as coefficients
+from calib.forward import distort, distort_fisheye, fisheye_coefficients
 from calib.jit import composed, kernel, prange
 
 
@@ -59,7 +59,7 @@ def at_centers(
                 inverse = one / (pose[2, 0] * a + pose[2, 1] * b + pose[2, 2] * c + pose[2, 3])
                 x = (pose[0, 0] * a + pose[0, 1] * b + pose[0, 2] * c + pose[0, 3]) * inverse
                 y = (pose[1, 0] * a + pose[1, 1] * b + pose[1, 2] * c + pose[1, 3]) * inverse
-                bent_x, bent_y = bend(x, y, own_lens)
+                bent_x, bent_y = distort(x, y, own_lens)
                 column, row = fx * bent_x + cx, fy * bent_y + cy
                 line = np.int32((pixel[k, v] + 0.5) * per_stride)  # divisions of integers take as long as all of this
                 right = np.float32(pixel[k, v] - line * width) - one - column
@@ -72,4 +72,4 @@ def at_centers(
 
 
 #: The same with the four coefficients of a fisheye.
-at_centers_fisheye = composed(at_centers, bend=bend_fisheye, coefficients=four)
+at_centers_fisheye = composed(at_centers, distort=distort_fisheye, coefficients=fisheye_coefficients)

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from calib.forward import bend, bend_fisheye, four
-from calib.forward import eight as coefficients
+from calib.forward import brown_conrady_coefficients as coefficients
+from calib.forward import distort, distort_fisheye, fisheye_coefficients
 from calib.jit import composed, kernel
 
 
@@ -99,11 +99,11 @@ def _project(
             inverse = one / z
             u, w = x * inverse, y * inverse
             seen = z > np.float32(1e-6) and u * u + w * w < farthest
-            bent_u, bent_w = bend(u, w, own_lens)
+            bent_u, bent_w = distort(u, w, own_lens)
             place[k, v, 0] = fx * bent_u + cx if seen else np.float32(0)
             place[k, v, 1] = fy * bent_w + cy if seen else np.float32(0)
             inverse_z[k, v] = inverse if seen else np.float32(np.nan)
 
 
 #: The same with the four coefficients of a fisheye.
-_project_fisheye = composed(_project, bend=bend_fisheye, coefficients=four)
+_project_fisheye = composed(_project, distort=distort_fisheye, coefficients=fisheye_coefficients)

@@ -6,8 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.fisheye import KannalaBrandt
-from calib.forward import bend, bend_fisheye, four, straight, straighten, straighten_fisheye
-from calib.forward import eight as coefficients
+from calib.forward import brown_conrady_coefficients as coefficients
+from calib.forward import (
+    distort,
+    distort_fisheye,
+    fisheye_coefficients,
+    undistort_step,
+    undistort_step_fisheye,
+    without_distortion,
+)
 from calib.jit import composed, kernel, prange
 from calib.lens import LensModel
 
@@ -93,7 +100,7 @@ def _sample(
             u, w = x * inverse, y * inverse
             r2 = u * u + w * w
             facing = nx * x + ny * y + nz * z < 0
-            bent_u, bent_w = bend(u, w, own_lens)
+            bent_u, bent_w = distort(u, w, own_lens)
             column = fx * bent_u + cx + half
             row = fy * bent_w + cy + half
             inside = column >= 0 and column < columns and row >= 0 and row < rows
@@ -102,7 +109,7 @@ def _sample(
             pixel[k, v] = -1 if hidden[v] else place
             right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
             down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
-            right, down = straighten(u, w, right, down, own_lens)
+            right, down = undistort_step(u, w, right, down, own_lens)
             u, w = u + right, w + down
             length = np.sqrt(u * u + w * w + one)
             along = min(nx * u + ny * w + nz, flattest * length)
@@ -110,7 +117,7 @@ def _sample(
 
 
 #: What `_sample` is without distortion, and with the four coefficients of a fisheye, which bends even small steps.
-_sample_pinhole: Callable[..., None] = composed(_sample, bend=straight)
+_sample_pinhole: Callable[..., None] = composed(_sample, distort=without_distortion)
 _sample_fisheye: Callable[..., None] = composed(
-    _sample, bend=bend_fisheye, coefficients=four, straighten=straighten_fisheye
+    _sample, distort=distort_fisheye, coefficients=fisheye_coefficients, undistort_step=undistort_step_fisheye
 )

@@ -13,7 +13,7 @@ from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.window import WHOLE, Window
 from calib.camera import Camera
-from calib.noise.base import DepthNoise, without_offset
+from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
 from calib.warp.errors import WarpError
 from calib.warp.mesh import MeshWarp
@@ -73,7 +73,7 @@ class Warped:
         image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
         self._distance = np.full_like(self._distance, np.nan)
         if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
-            measured = without_offset(sensor.noise, image.distance, image.amplitude)
+            measured = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
             warped = self._warp(self._reference, measured)
             if warped is not None:
                 self._distance = warped.distance

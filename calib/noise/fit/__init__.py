@@ -1,1 +1,1 @@
-"""Fitting of noise models, and function families that several models share."""
+"""Fitting of noise models, and families of functions that several models share."""

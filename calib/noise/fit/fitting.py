@@ -1,4 +1,4 @@
-"""Maximum likelihood of a noise model's parameters, with a share of outliers that come from anywhere."""
+"""Maximum-likelihood fit of a noise model's parameters, with a fraction of uniform outliers."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,28 +12,28 @@ from calib.noise.base import LOG_SQRT_2PI, NoiseError
 from calib.noise.fit.polynomial import Polynomials, Table
 from calib.noise.fit.samples import Samples, domain
 
-#: More samples than this are thinned at random: the parameters of a whole image need no more.
+#: Samples beyond this number are subsampled at random.
 LARGEST = 200_000
 
 #: Distances over which an outlier is uniform [m].
 RANGE_M = 5.0
 
-#: The deviation at which the fit stops, in units of the samples' spread: a sample that lies on the mean exactly would
-#: be explained ever better by an ever smaller one.
+#: Lower bound of the fitted deviation, in units of the samples' spread; without it, a sample exactly on the mean makes
+#: the likelihood unbounded.
 _LEAST_SPREAD = 1e-3
 
-#: Conditions along each axis of a domain at which nothing wild may be said, even if no sample lies near.
-_CORNERS = 8
+#: Pseudo-samples along each axis of the domain, which regularise conditions without real samples.
+_PSEUDO_SAMPLES = 8
 
-#: Smallest singular value of the columns, each of length 1, at which their coefficients can still be told apart.
+#: Smallest singular value of a design matrix with unit columns for which its coefficients are identifiable.
 _LEAST_VARIETY = 1e-6
 
 #: σ of a normal distribution over its median absolute deviation.
 MAD_TO_SIGMA = 1.4826
 
 
-class Columns(NamedTuple):
-    """What mean offset and deviation are linear in, one row per sample.
+class Design(NamedTuple):
+    """Design matrices of mean offset and deviation, one row per sample.
 
     Attributes:
         mean: (n, k); k may be 0, for no mean offset.
@@ -45,13 +45,13 @@ class Columns(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Law:
-    """Parameters of greatest likelihood.
+class FittedNoise:
+    """Maximum-likelihood parameters.
 
     Attributes:
-        mean: coefficients (k,) of the columns whose sum is the mean offset.
-        spread: coefficients (l,) of the columns whose sum is the power of the deviation.
-        outlier_share: share of the samples that are outliers, 0…0.5.
+        mean: coefficients (k,) of the mean offset.
+        spread: coefficients (l,) of the deviation to the chosen power.
+        outlier_share: fraction of outliers, 0…0.5.
     """
 
     mean: NDArray[np.floating]
@@ -59,51 +59,51 @@ class Law:
     outlier_share: float
 
 
-#: No conditions but those of the samples.
-NO_CORNERS = Columns(np.zeros((0, 0)), np.zeros((0, 0)))
+#: No regularisation.
+NO_PSEUDO_SAMPLES = Design(np.zeros((0, 0)), np.zeros((0, 0)))
 
 
-def maximize(
+def maximize_likelihood(
     residual: NDArray[np.floating],
-    columns: Columns,
+    columns: Design,
     power: int = 1,
-    corners: Columns = NO_CORNERS,
+    pseudo_samples: Design = NO_PSEUDO_SAMPLES,
     span: float = RANGE_M,
-) -> Law:
+) -> FittedNoise:
     """Fits (1 − ε) N(μ, σ²) + ε uniform to residuals, with μ = columns.mean @ m and σᵖᵒʷᵉʳ = columns.spread @ s.
 
     Args:
-        residual: measured minus real distance (n,) [m], or another number.
-        columns: of every sample.
+        residual: measured minus true value (n,) [m], or another unit.
+        columns: design matrices of the samples.
         power: 1 if the deviation is linear in its parameters, 2 if the variance is.
-        corners: of conditions under which there may be no sample. Each counts like one sample of the usual mean and
-            spread: nothing beside thousands of real ones, and enough that nothing wild is said where there are none.
+        pseudo_samples: design matrices of conditions that may lack real samples. Each counts as one sample of median
+            mean and spread: negligible beside thousands of real ones, but enough to bound the extrapolation.
         span: range over which an outlier is uniform, in the unit of the residuals.
 
     Raises:
-        NoiseError: the samples do not vary enough to tell the coefficients of all columns.
+        NoiseError: the samples vary too little to identify all coefficients.
     """
     for part in columns:
         _check_variety(part)
-    unit, usual = _spread_of(residual), float(np.median(residual))
-    q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns, however different the powers of x and a are
+    unit, center = _spread_of(residual), float(np.median(residual))
+    q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns: powers of x and a differ by orders of magnitude
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
-    samples = _Samples(residual / unit, Columns(q_mean, q_spread), power, unit / span)
-    turned = Columns(_solved(corners.mean, r_mean), _solved(corners.spread, r_spread))
-    imagined = _Imagined(usual / unit, turned, power)
+    samples = _Samples(residual / unit, Design(q_mean, q_spread), power, unit / span)
+    turned = Design(_solved(pseudo_samples.mean, r_mean), _solved(pseudo_samples.spread, r_spread))
+    regularization = _PseudoSamples(center / unit, turned, power)
 
     def cost(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Negative log-likelihood per sample, and its gradient; the share ε is in its logit."""
+        """Negative log-likelihood per sample, and its gradient; ε is parametrised by its logit."""
         real, by_real = samples.cost(parameters[:k], parameters[k:-1], parameters[-1])
-        weak, by_weak = imagined.cost(parameters[:k], parameters[k:-1])
+        weak, by_weak = regularization.cost(parameters[:k], parameters[k:-1])
         return (real + weak) / len(residual), (by_real + by_weak) / len(residual)
 
     start = np.concatenate([*_start(samples.residual, samples.columns, power), [scipy.special.logit(0.02)]])
     bounds = [(None, None)] * (len(start) - 1) + [tuple(scipy.special.logit([1e-6, 0.5]))]
     options = {"maxiter": 500, "ftol": 1e-12, "gtol": 1e-8}
     best = scipy.optimize.minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
-    return Law(
+    return FittedNoise(
         np.linalg.solve(r_mean, best[:k]) * unit,
         np.linalg.solve(r_spread, best[k:-1]) * unit**power,
         float(scipy.special.expit(best[-1])),
@@ -112,15 +112,15 @@ def maximize(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """What real samples say of the parameters, in units of their spread; `uniform` is the density of an outlier."""
+    """Log-likelihood of the samples, in units of their spread; `uniform` is the density of an outlier."""
 
     residual: NDArray[np.floating]
-    columns: Columns
+    columns: Design
     power: int
     uniform: float
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64], logit: float) -> tuple[float, NDArray[np.floating]]:
-        """Negative log-likelihood, and its gradient by m, s and the logit of the outliers' share."""
+        """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε."""
         share = scipy.special.expit(logit)
         v, inside = _bounded(self.columns.spread @ s, self.power)
         sigma = v ** (1 / self.power)
@@ -135,18 +135,18 @@ class _Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Imagined:
-    """What one sample of the usual mean and of spread 1 would say under each of some conditions, on average."""
+class _PseudoSamples:
+    """Expected log-likelihood of one pseudo-sample of mean `center` and spread 1 under each condition."""
 
-    usual: float
-    columns: Columns
+    center: float
+    columns: Design
     power: int
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64]) -> tuple[float, NDArray[np.floating]]:
-        """Negative log-likelihood, and its gradient by m, s and the logit, on which it does not depend."""
+        """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε, which is zero."""
         v, inside = _bounded(self.columns.spread @ s, self.power)
         variance = v ** (2 / self.power)
-        off = self.columns.mean @ m - self.usual
+        off = self.columns.mean @ m - self.center
         square = (1 + off**2) / variance
         by_mean = self.columns.mean.T @ (off / variance)
         by_spread = self.columns.spread.T @ (inside * (1 - square) / (self.power * v))
@@ -155,49 +155,51 @@ class _Imagined:
 
 
 def polynomials(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tuple[int, int]) -> Polynomials:
-    """One pair of polynomials for all samples; σ is never less than nearly the least that they show.
+    """One pair of polynomials for all samples; σ is bounded below by about its smallest fitted value.
 
     Args:
-        samples: measurements; the domain is where they lie.
-        sigma_degrees, mu_degrees: highest powers of the distance and of the amplitude.
+        samples: measurements; they determine the domain.
+        sigma_degrees, mu_degrees: degrees in distance and amplitude.
 
     Raises:
-        NoiseError: no sample has a distance or, where a power of the amplitude is asked for, an amplitude; or they vary
-            too little for so many powers.
+        NoiseError: no sample has a distance or, if the polynomials use it, an amplitude; or the samples vary too little
+            for these degrees.
     """
-    samples = thinned(samples.returns(with_amplitude=max(sigma_degrees[1], mu_degrees[1]) > 0))
+    samples = subsampled(samples.returns(with_amplitude=max(sigma_degrees[1], mu_degrees[1]) > 0))
     distances = domain(samples.true)
     amplitudes = domain(samples.amplitude) if np.isfinite(samples.amplitude).all() else (0.0, 65535.0)
     x, a = np.clip(samples.true, *distances), np.nan_to_num(np.clip(samples.amplitude, *amplitudes))
-    columns = Columns(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
-    x, a = (part.ravel() for part in np.meshgrid(*(np.linspace(*span, _CORNERS) for span in (distances, amplitudes))))
-    corners = Columns(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
-    law = maximize(samples.residual, columns, corners=corners)
+    columns = Design(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
+    x, a = (
+        part.ravel() for part in np.meshgrid(*(np.linspace(*span, _PSEUDO_SAMPLES) for span in (distances, amplitudes)))
+    )
+    pseudo_samples = Design(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
+    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples)
     sigma = law.spread.reshape(sigma_degrees[0] + 1, sigma_degrees[1] + 1, 1)
     mu = law.mean.reshape(mu_degrees[0] + 1, mu_degrees[1] + 1, 1)
     least = least_sigma(columns.spread @ law.spread)
     return Polynomials(sigma, mu, distances, amplitudes, least)
 
 
-def thinned(samples: Samples) -> Samples:
-    """At most `LARGEST` of the samples, drawn at random and the same every time."""
+def subsampled(samples: Samples) -> Samples:
+    """At most `LARGEST` of the samples, drawn at random with a fixed seed."""
     if len(samples) <= LARGEST:
         return samples
     return samples.take(np.random.default_rng(0).choice(len(samples), LARGEST, replace=False))
 
 
 def least_sigma(sigma: NDArray[np.floating]) -> float:
-    """Lower bound for a fitted deviation, so that it stays sensible where the domain's corners hold no sample [m]."""
+    """Lower bound for a fitted deviation where the domain holds no samples [m]."""
     return max(float(np.quantile(sigma, 0.005)), 1e-6)
 
 
 def table(coefficients: NDArray[np.floating]) -> Table:
-    """Coefficients (i, j) as a rig file has them."""
+    """Coefficients (i, j) as nested tuples, as in a rig file."""
     return tuple(tuple(row) for row in coefficients.tolist())
 
 
 def _spread_of(residual: NDArray[np.floating]) -> float:
-    """Robust deviation [m]; where most residuals are equal, their mean absolute one, and never zero."""
+    """Robust standard deviation [m], from the median absolute deviation; always positive."""
     size = np.abs(residual - np.median(residual))
     return float(max(np.median(size) * MAD_TO_SIGMA, size.mean() * 1e-3, 1e-9))
 
@@ -212,18 +214,18 @@ def _check_variety(columns: NDArray[np.floating]) -> None:
 
 
 def _solved(columns: NDArray[np.floating], triangle: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Columns (g, k) in the coordinates in which those of the samples are orthogonal; there may be no row at all."""
+    """Design matrix (g, k) in the basis in which the samples' columns are orthogonal; g may be 0."""
     return np.linalg.solve(triangle.T, columns.reshape(len(columns), len(triangle)).T).T
 
 
 def _bounded(v: NDArray[np.floating], power: int) -> tuple[NDArray[np.floating], NDArray[np.bool_]]:
-    """A deviation's power, not too small, and where it was not."""
+    """Clamped power of the deviation, and the mask of values that were not clamped."""
     least = _LEAST_SPREAD**power
     return np.maximum(v, least), v > least
 
 
-def _start(r: NDArray[np.floating], columns: Columns, power: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
-    """Least squares without what is far off; orthogonal columns. A spread below zero somewhere begins as a constant."""
+def _start(r: NDArray[np.floating], columns: Design, power: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+    """Initial parameters by least squares with clipped residuals; constant spread if a linear one would be negative."""
     mean, spread = columns
     middle = np.median(r) if mean.shape[1] else 0.0
     offset = mean.T @ np.clip(r, middle - 5, middle + 5)

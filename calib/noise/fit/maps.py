@@ -1,4 +1,4 @@
-"""Noise polynomials of regions and pixels on disk: arrays in an .npz."""
+"""Arrays of region and pixel polynomials in an .npz file."""
 
 from pathlib import Path
 from zipfile import BadZipFile
@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 
 from calib.noise.base import NoiseError
 
-#: Lower bound of the deviation in files that do not say theirs [m].
+#: Lower bound of the deviation in files without `least_sigma` [m].
 _LEAST_SIGMA = 1e-4
 
 
 def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
-    """The arrays of a file with `distances` and `amplitudes` (2,), the calibrated domain, and `least_sigma` () [m].
+    """Arrays of a file with `distances` and `amplitudes` (2,), the calibrated domain, and `least_sigma` () [m].
 
     Args:
         file: the .npz.
-        required: arrays that it must hold beside the domain.
+        required: names of further arrays that must be present.
 
     Raises:
-        NoiseError: it cannot be read or lacks one, or the domain is none.
+        NoiseError: unreadable file, missing array, or invalid domain.
     """
     found = arrays(file, required | {"distances", "amplitudes"})
     for key in ("distances", "amplitudes"):
@@ -33,10 +33,10 @@ def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
 
 
 def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
-    """The arrays of a file.
+    """Arrays of an .npz file.
 
     Raises:
-        NoiseError: it cannot be read or lacks one that is required.
+        NoiseError: unreadable file, or a required array is missing.
     """
     try:
         with file.open("rb") as stream, NpzFile(stream) as archive:
@@ -49,10 +49,10 @@ def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
 
 
 def check_domain(file: Path, found: dict[str, NDArray[np.float64]], key: str) -> None:
-    """Complains unless an array of a file is a lowest and a higher highest value.
+    """Checks that an array is [lowest, highest] with lowest < highest.
 
     Raises:
-        NoiseError: names the file and the key.
+        NoiseError: it is not; names the file and the key.
     """
     if found[key].shape != (2,) or not found[key][0] < found[key][1]:
         raise NoiseError(f"{key} in {str(file)!r} must be [lowest, highest], not {found[key].tolist()}")

@@ -1,4 +1,4 @@
-"""Polynomials in distance and amplitude with coefficients of one image, of regions or of pixels (eq. 18)."""
+"""Polynomials in distance and amplitude with coefficients of the image, of regions or of pixels (eq. 18)."""
 
 import math
 from dataclasses import dataclass
@@ -9,34 +9,34 @@ from numpy.typing import NDArray
 from calib.jit import kernel
 from calib.noise.base import NoiseError
 
-#: Coefficients [i][j] of xⁱ aʲ, as a rig file has them.
+#: Coefficients [i][j] of xⁱ aʲ, as in a rig file.
 Table = tuple[tuple[float, ...], ...]
 
 #: Lowest and highest value of a calibrated domain.
 Span = tuple[float, float]
 
-#: The place of a sample where one polynomial is for the whole image.
+#: Index of the only coefficients if one polynomial applies to the whole image.
 EVERYWHERE = np.zeros(1, np.int64)
 
-#: Samples whose intermediate results stay in the processor's fastest memory.
+#: Samples per block: intermediate results stay in the first-level cache.
 _BLOCK = 256
 
 
 def check_table(key: str, table: Table) -> None:
-    """Complains unless a table has rows of equal length.
+    """Checks that a table has rows of equal length.
 
     Raises:
-        NoiseError: names the key.
+        NoiseError: it has not; names the key.
     """
     if not table or not table[0] or len({len(row) for row in table}) != 1:
         raise NoiseError(f"{key} must be a table of rows of equal length, {key}[i][j] for xⁱ aʲ, not {table}")
 
 
 def check_span(key: str, span: Span) -> None:
-    """Complains unless a domain has a lowest and a higher highest value.
+    """Checks that a domain is [lowest, highest] with lowest < highest.
 
     Raises:
-        NoiseError: names the key.
+        NoiseError: it is not; names the key.
     """
     low, high = span
     if not low < high:
@@ -45,9 +45,9 @@ def check_span(key: str, span: Span) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Polynomials:
-    """μ and σ as polynomials in distance x and amplitude a, with coefficients of their own for every place.
+    """μ and σ as polynomials in distance x and amplitude a, with separate coefficients for every place.
 
-    A place is the whole image, a region or a pixel. Outside the domain the polynomials keep their value at its edge.
+    A place is the whole image, a region or a pixel. Arguments are clamped to the domain.
 
     Attributes:
         sigma: coefficients of the deviation [m], (i, j, places): [i, j] belongs to xⁱ aʲ.
@@ -64,7 +64,7 @@ class Polynomials:
 
     @property
     def use_amplitude(self) -> bool:
-        """Whether a power of the amplitude occurs."""
+        """True if a power of the amplitude occurs."""
         return self.sigma.shape[1] > 1 or self.mu.shape[1] > 1
 
     def mean(self, x: NDArray[np.float64], a: NDArray[np.float64], place: NDArray[np.integer]) -> NDArray[np.float64]:
@@ -86,14 +86,14 @@ def evaluate(
     distances: Span,
     amplitudes: Span,
 ) -> NDArray[np.float64]:
-    """Σ coefficients[i, j, place] xⁱ aʲ; outside the domain x and a are moved to its edge, NaN stays NaN.
+    """Σ coefficients[i, j, place] xⁱ aʲ, with x and a clamped to the domain; NaN stays NaN.
 
-    The powers of the amplitude are summed once for all of a sample's distances. Where there is none but the zeroth,
-    the amplitude is not looked at and may be NaN.
+    The powers of the amplitude are summed once for all distances of a sample. If only the zeroth power occurs, the
+    amplitude is ignored and may be NaN.
 
     Args:
         coefficients: (i, j, places).
-        place: which coefficients each sample has, (n,) or (1,) for all; instead of n there may be several axes.
+        place: index of the coefficients of each sample, (n,) or (1,) for all; instead of n there may be several axes.
         x: distances (…, n) [m].
         a: amplitudes, like `place`.
         distances, amplitudes: the domain.
@@ -102,7 +102,7 @@ def evaluate(
         Values (…, n).
 
     Raises:
-        IndexError: a place that has no coefficients; the compiled loop would not notice.
+        IndexError: index out of range; the compiled loop does not check it.
     """
     if place.size and not 0 <= place.min() <= place.max() < coefficients.shape[2]:
         raise IndexError(f"places {place.min()} to {place.max()} of {coefficients.shape[2]}")
@@ -130,7 +130,7 @@ def _evaluate(
     domain: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
-    """Horner's scheme, first in the amplitude and then in the distance, block by block so that its loops vectorise."""
+    """Horner's scheme, first in the amplitude and then in the distance, in blocks so that the loops vectorise."""
     nearest, farthest, faintest, brightest = domain
     rows, columns, _ = coefficients.shape
     sums, inside, coefficient = np.empty((rows, _BLOCK)), np.empty(_BLOCK), np.empty(_BLOCK)
@@ -158,7 +158,7 @@ def _evaluate(
 
 @kernel
 def _clip(values: NDArray[np.float64], low: float, high: float, out: NDArray[np.float64]) -> None:
-    """Values moved into a range; NaN stays NaN."""
+    """Values clamped to a range; NaN stays NaN."""
     for k in range(values.size):
         v = values[k]
         out[k] = low if v < low else (high if v > high else v)
@@ -166,7 +166,7 @@ def _clip(values: NDArray[np.float64], low: float, high: float, out: NDArray[np.
 
 @kernel
 def _look_up(plane: NDArray[np.float64], at: NDArray[np.int64], out: NDArray[np.float64]) -> None:
-    """The coefficient of every place; where there is one for all it is read once, which is what the processor likes."""
+    """Coefficient of every place; a single coefficient for all is read once, so that the loop vectorises."""
     if plane.size == 1:
         out[: at.size] = plane[0]
     else:

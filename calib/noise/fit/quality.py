@@ -1,4 +1,4 @@
-"""How well a noise model says what a sensor does: likelihood and coverage of samples that it was not fitted to."""
+"""Goodness of fit of a noise model: likelihood and coverage on held-out samples."""
 
 from dataclasses import dataclass
 
@@ -9,31 +9,30 @@ from calib.noise.fit.fitting import RANGE_M
 from calib.noise.fit.samples import Samples
 from calib.noise.fit.truncation import deviation_within
 
-#: Residuals of more deviations than this say nothing about the variance.
+#: Residuals beyond this many deviations are excluded from the variance.
 CUT = 3.0
 
-#: Deviations within which 95 % of a normal distribution lie.
+#: 97.5 % quantile of the standard normal distribution: 95 % lie within ± this many deviations.
 _DEVIATIONS_95 = 1.959964
 
-#: A model that explains less than half of the samples is no model of them.
+#: Upper bound of the outlier fraction.
 _MOST_OUTLIERS = 0.5
 
-#: Share of the samples for which expectation and maximisation of the outliers' share have come to rest.
+#: Convergence tolerance of the outlier fraction in expectation–maximisation.
 _SETTLED = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """A noise model's agreement with samples.
+    """Agreement of a noise model with samples.
 
     Attributes:
-        log_likelihood: mean logarithm of the density of a sample, outliers mixed in; larger is better.
-        outlier_share: share of the samples that a uniform density explains better, by maximum likelihood; 0.5 at
-            most.
-        variance: of the residuals over their deviations, from those within three; 1 if the model is right, NaN if it
-            explains no sample.
-        within_one: share within one deviation, outliers aside; 0.683 if the model is right.
-        within_95: share within 1.96 deviations, outliers aside; 0.95 if the model is right.
+        log_likelihood: mean log-density of a sample under the mixture with outliers; larger is better.
+        outlier_share: maximum-likelihood fraction of outliers, at most 0.5.
+        variance: of normalised residuals, from those within three deviations; 1 if the model is right, NaN if there are
+            none.
+        within_one: fraction of inliers within one deviation; 0.683 if the model is right.
+        within_95: fraction of inliers within 1.96 deviations; 0.95 if the model is right.
     """
 
     log_likelihood: float
@@ -43,11 +42,11 @@ class Quality:
     within_95: float
 
 
-def judge(model: DepthNoise, samples: Samples) -> Quality:
-    """Compares a model with samples, best with such as it was not fitted to.
+def goodness_of_fit(model: DepthNoise, samples: Samples) -> Quality:
+    """Agreement of a model with samples, preferably ones that it was not fitted to.
 
     Raises:
-        NoiseError: no sample has a distance or, where the model depends on it, an amplitude.
+        NoiseError: no sample has a distance or, if the model uses it, an amplitude.
     """
     samples = samples.returns(with_amplitude=model.uses_amplitude)
     x, a, p = samples.true, samples.amplitude, samples.pixels

@@ -1,4 +1,4 @@
-"""Measurements of known distances, from which noise models are fitted and judged."""
+"""Measurements of known distances: input for fitting and evaluating noise models."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from calib.noise.base import NoiseError, Pixels
 from calib.noise.fit.polynomial import Span
 
-#: Share of the samples at either end of a quantity that does not count for its domain: outliers are there.
+#: Fraction of samples at either end of a quantity that is excluded from its domain as possible outliers.
 _TAIL = 0.002
 
 
@@ -18,10 +18,10 @@ class Samples:
     """Measurements of one sensor, one per entry, in any order.
 
     Attributes:
-        measured: measured radial distance (n,) [m]; NaN, infinity or less than zero for no return.
-        true: real radial distance (n,) [m].
-        amplitude: measured amplitude (n,); NaN where there is none.
-        row, column: pixel that measured (n,).
+        measured: measured radial distance (n,) [m]; NaN, infinite or negative without return.
+        true: true radial distance (n,) [m].
+        amplitude: measured amplitude (n,); NaN if there is none.
+        row, column: measuring pixel (n,).
     """
 
     measured: NDArray[np.float64]
@@ -40,7 +40,7 @@ class Samples:
 
     @property
     def residual(self) -> NDArray[np.float64]:
-        """Measured minus real distance (n,) [m]."""
+        """Measured minus true distance (n,) [m]."""
         return self.measured - self.true
 
     @property
@@ -49,14 +49,14 @@ class Samples:
         return self.row, self.column
 
     def take(self, which: NDArray[np.integer] | NDArray[np.bool_]) -> "Samples":
-        """The samples that an index or a mask (n,) selects."""
+        """Samples selected by an index or a mask (n,)."""
         return Samples(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def returns(self, with_amplitude: bool) -> "Samples":
-        """The samples with a finite, positive measured and real distance and, if asked for, amplitude.
+        """Samples with finite, positive measured and true distance and, if asked for, amplitude.
 
         Raises:
-            NoiseError: there is none.
+            NoiseError: there are none.
         """
         with np.errstate(invalid="ignore"):
             good = (self.measured > 0) & (self.true > 0) & np.isfinite(self.measured) & np.isfinite(self.true)
@@ -67,17 +67,17 @@ class Samples:
 
 
 def joined(parts: Iterable[Samples]) -> Samples:
-    """All samples of several parts, in their order."""
+    """Concatenation of several sets of samples."""
     columns = zip(*([getattr(part, field.name) for field in fields(Samples)] for part in parts))
     return Samples(*map(np.concatenate, columns))
 
 
 def from_images(measured: ArrayLike, true: ArrayLike, amplitude: ArrayLike) -> Samples:
-    """The samples of one depth image, or of several.
+    """Samples of one depth image, or of several.
 
     Args:
         measured: radial distances (…, height, width) [m].
-        true: real distances, of the same shape or one that repeats to it, such as (height, width).
+        true: true distances, of the same or a broadcastable shape, such as (height, width).
         amplitude: likewise; NaN if the sensor has none.
     """
     distance = np.asarray(measured, np.float64)
@@ -87,6 +87,6 @@ def from_images(measured: ArrayLike, true: ArrayLike, amplitude: ArrayLike) -> S
 
 
 def domain(values: NDArray[np.float64]) -> Span:
-    """Lowest and highest of some values without the outermost ones; where all are equal, a thousandth around them."""
+    """Range of values without the extreme quantiles; ± 0.1 % if all are equal."""
     low, high = (float(value) for value in np.quantile(values, [_TAIL, 1 - _TAIL]))
     return (low, high) if low < high else (low * 0.999, low * 1.001)

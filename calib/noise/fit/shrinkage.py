@@ -1,8 +1,7 @@
-"""From an image's noise to its regions' and from a region's to its pixels', as far as their samples tell.
+"""Empirical Bayes shrinkage: noise of regions towards the image, of pixels towards their region.
 
-Empirical Bayes: how much regions (or pixels) differ from what they are part of is estimated from all of them together,
-and each is moved towards it by as much as its own samples leave open. Thin data so become the parent's values and never
-nonsense.
+The variation among regions (or pixels) is estimated from all of them together; each is shrunk towards its parent
+according to the information in its own samples. With few samples it equals its parent.
 """
 
 from dataclasses import dataclass
@@ -18,43 +17,43 @@ from calib.noise.fit.fitting import MAD_TO_SIGMA, RANGE_M
 from calib.noise.fit.polynomial import Polynomials, Span
 from calib.noise.fit.samples import Samples
 
-#: Rounds of expectation and maximisation; where there are tens of samples a pixel, twice as many move no offset by more
-#: than 0.01 mm.
+#: Iterations of expectation–maximisation; with tens of samples per pixel, twice as many change no offset by more than
+#: 0.01 mm.
 _ROUNDS = 40
 
-#: Regions or pixels whose mean offsets differ by less than this are taken as equal [m].
+#: Variation of mean offsets below this is treated as zero [m].
 _EQUAL_M = 1e-6
 
-#: Fewer samples say nothing about how much the deviations of regions or pixels differ.
+#: Minimum number of samples of a region or pixel that contributes to the variation of the deviations.
 _FEW = 4
 
 
 class Repeats(NamedTuple):
-    """How many measurements a sample is the mean of, and how they scatter; sequences of a thing at rest have many.
+    """Number and scatter of the measurements that a sample is the mean of, as in sequences of a static scene.
 
     Attributes:
-        times: of them, (n,) or (1,).
-        variance: mean square of their differences from the sample [m²], likewise.
+        times: number of measurements, (n,) or (1,).
+        variance: mean squared difference from the sample [m²], likewise.
     """
 
     times: NDArray[np.floating]
     variance: NDArray[np.floating]
 
 
-#: Every sample is one measurement.
+#: Every sample is a single measurement.
 ONCE = Repeats(np.ones(1), np.zeros(1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Groups:
-    """Residuals from the parent, by group.
+    """Residuals from the parent, grouped by place.
 
     Attributes:
-        residual, deviation: of every sample from the parent's mean, and the parent's deviation (n,) [m].
-        basis: columns (n, k) in which the groups' own mean offsets are linear.
-        of: group (n,) of every sample.
-        number: of groups.
-        repeats: of the samples.
+        residual, deviation: residual of every sample from the parent's mean, and the parent's deviation (n,) [m].
+        basis: design matrix (n, k) of the groups' own mean offsets.
+        of: index of the group of every sample (n,).
+        number: number of groups.
+        repeats: replicates of the samples.
     """
 
     residual: NDArray[np.float64]
@@ -69,7 +68,7 @@ class _Groups:
         return np.asarray(np.bincount(self.of, values, self.number), np.float64)
 
     def medians(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Medians (groups,) of values (n,); 0 where there is no sample."""
+        """Medians (groups,) of values (n,); 0 for an empty group."""
         order = np.lexsort((values, self.of))
         count = np.bincount(self.of, minlength=self.number)
         middle = np.concatenate([[0], np.cumsum(count)[:-1]]) + (count - 1) // 2
@@ -83,14 +82,14 @@ def refine(
     place: NDArray[np.integer],
     degree: int,
 ) -> Polynomials:
-    """Polynomials of smaller places: a parent's, plus an own mean offset in x, with an own factor on the deviation.
+    """Polynomials of smaller places: the parent's plus an own mean offset in x, with an own factor on the deviation.
 
     Args:
-        parent: polynomials of larger places.
-        parent_of: the larger place (places,) that every smaller one is part of.
+        parent: polynomials of the larger places.
+        parent_of: index of the larger place (places,) that contains each smaller one.
         samples: measurements with distances and, if the parent uses them, amplitudes.
-        place: smaller place (n,) of every sample.
-        degree: highest power of the distance in the own mean offset.
+        place: index of the smaller place (n,) of every sample.
+        degree: degree of the own mean offset in the distance.
     """
     at = parent_of[place]
     residual = samples.residual - parent.mean(samples.true, samples.amplitude, at)
@@ -98,7 +97,7 @@ def refine(
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
     basis = basis_of(samples.true, parent.distances, degree)
-    offsets, factors = own(residual, deviation, basis, place, len(parent_of))
+    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of))
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
@@ -109,12 +108,12 @@ def refine(
 
 
 def basis_of(x: NDArray[np.floating], distances: Span, degree: int) -> NDArray[np.floating]:
-    """Powers (n, degree + 1) of distances (n,), moved and scaled so that the domain is −1 to 1; beyond, its edge."""
+    """Powers (n, degree + 1) of distances (n,), scaled so that the domain is [−1, 1] and clamped to it."""
     near, far = distances
     return polyvander((2 * np.clip(x, near, far) - near - far) / (far - near), degree)
 
 
-def own(
+def shrink(
     residual: NDArray[np.float64],
     deviation: NDArray[np.float64],
     basis: NDArray[np.floating],
@@ -122,18 +121,18 @@ def own(
     places: int,
     repeats: Repeats = ONCE,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """How places differ from what they are part of, by expectation and maximisation.
+    """Offsets and deviation factors of places relative to their parent, by expectation–maximisation.
 
     Args:
         residual: of the samples from the parent's mean (n,) [m].
-        deviation: that the parent says they have (n,) [m].
-        basis: columns (n, k) in which a place's own mean offset is linear.
-        place: of every sample (n,).
-        places: number of them.
-        repeats: measurements that every sample stands for.
+        deviation: the parent's deviation (n,) [m].
+        basis: design matrix (n, k) of a place's own mean offset.
+        place: index of the place of every sample (n,).
+        places: number of places.
+        repeats: replicates of the samples.
 
     Returns:
-        Own mean offsets (places, k), in the columns, and factors on the deviation (places,).
+        Coefficients of the own mean offsets (places, k), and factors on the deviation (places,).
     """
     groups = _Groups(residual, deviation, basis, place.astype(np.int64), places, repeats)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
@@ -152,7 +151,7 @@ def own(
 def _inliers(
     groups: _Groups, offsets: NDArray[np.float64], factors: NDArray[np.float64], share: float
 ) -> tuple[NDArray[np.float64], float]:
-    """Measurements (n,) of every sample that are no outliers, and the outliers' share."""
+    """Weight (n,) of every sample: number of inlier measurements; and the outlier fraction."""
     sigma = factors[groups.of] * groups.deviation
     rest = groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])
     inlier = (1 - share) * np.exp(-0.5 * (rest**2 + groups.repeats.variance) / sigma**2 - LOG_SQRT_2PI) / sigma
@@ -163,7 +162,7 @@ def _inliers(
 def _offsets(
     groups: _Groups, weight: NDArray[np.float64], factors: NDArray[np.float64], prior: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Offsets (groups, k) under a normal prior of covariance (k, k), the next prior, and parameters used (groups,)."""
+    """Posterior offsets (groups, k) under a normal prior (k, k), the next prior, effective parameters (groups,)."""
     k = groups.basis.shape[1]
     precision = weight / (factors[groups.of] * groups.deviation) ** 2
     information = np.empty((groups.number, k, k))
@@ -193,9 +192,9 @@ def _factors(
 
 
 def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> tuple[float, float]:
-    """The variance that all groups scatter around, and how many samples' worth each knows of it by being one of them.
+    """Common variance of the groups, and the prior's degrees of freedom.
 
-    Moments of the logarithm of a scaled F distribution.
+    By the moments of the logarithm of a scaled F distribution.
     """
     told = (freedom >= _FEW) & (squares > 0)
     if not told.any():
@@ -203,7 +202,7 @@ def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64])
     half = freedom[told] / 2
     logarithm = np.log(squares[told] / freedom[told]) - scipy.special.digamma(half) + np.log(half)
     excess = float(np.var(logarithm) - scipy.special.polygamma(1, half).mean())
-    if excess <= 1e-6:  # no more scatter than so few samples have anyway
+    if excess <= 1e-6:  # no more scatter than sampling alone explains
         return float(squares[told].sum() / freedom[told].sum()), 1e6
     confidence = 2 * scipy.optimize.brentq(lambda y: scipy.special.polygamma(1, y) - excess, 1e-3, 1e7)
     centre = logarithm.mean() + scipy.special.digamma(confidence / 2) - np.log(confidence / 2)

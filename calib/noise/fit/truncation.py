@@ -1,4 +1,4 @@
-"""The deviation of normal residuals, from those of them that are not too large: outliers are beyond the cut."""
+"""Deviation of truncated normal residuals; the truncation excludes outliers."""
 
 import functools
 
@@ -6,21 +6,21 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-#: The largest deviation that is told, in units of the cut: beyond, what lies within it is as good as uniform.
+#: Upper bound of the deviation, in units of the cut; the truncated distribution of a larger one is nearly uniform.
 _LARGEST = 1.5
 
 
 def deviation_within(mean_square: float, cut: float, channels: int = 1) -> float:
-    """Deviation s of the normal distribution whose values within a cut have this mean square.
+    """Standard deviation s of the normal distribution whose values within a cut have this mean square.
 
-    Cutting makes the mean square too small: by 2.7 % for a cut at three deviations, by 43 % if the deviation is twice
-    what it was taken for. With k channels, all of deviation s, and r² the mean of a residual's squares,
-    E[r² | r < cut] = s² F(k + 2, q) / F(k, q), q = k cut² / s² and F the distribution of χ²; s is its inverse.
+    Truncation biases the mean square: by 2.7 % for a cut at three deviations, by 43 % if the true deviation is twice
+        the assumed one. With k channels, all of deviation s, and r² the mean of a residual's squares, E[r² | r < cut] =
+        s² F(k + 2, q) / F(k, q), q = k cut² / s² and F the cumulative distribution of χ²; solved for s.
 
     Args:
-        mean_square: of all residuals r < cut; NaN, for none, stays NaN.
-        cut: the largest residual that counts.
-        channels: values that each residual is the root mean square of.
+        mean_square: of all residuals r < cut; NaN stays NaN.
+        cut: largest residual that is included.
+        channels: number of values that each residual is the root mean square of.
 
     Returns:
         s, at most 1.5 times the cut.
@@ -31,7 +31,7 @@ def deviation_within(mean_square: float, cut: float, channels: int = 1) -> float
 
 @functools.cache
 def _table(channels: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Mean squares within a cut of 1, rising, and the deviations that they belong to."""
+    """Mean squares within a cut of 1, in ascending order, and the corresponding deviations."""
     deviations = np.linspace(1e-3, _LARGEST, 1500)
     half_q = channels / (2 * deviations**2)
     cut_off = scipy.special.gammainc(channels / 2 + 1, half_q) / scipy.special.gammainc(channels / 2, half_q)

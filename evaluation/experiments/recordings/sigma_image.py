@@ -108,7 +108,7 @@ def compared(shot: Shot, generator: np.random.Generator, rounds: int) -> list[Ro
 
 def _row(name: str, results: list[tuple[DepthNoise, Samples]]) -> Row:
     model = results[-1][0]
-    judged = [(quality.judge(one, samples), len(samples)) for one, samples in results]
+    judged = [(quality.goodness_of_fit(one, samples), len(samples)) for one, samples in results]
     weights = np.array([count for _, count in judged])
     names = ("log_likelihood", "outlier_share", "variance", "within_one", "within_95")
     means = [float(np.average([getattr(one, key) for one, _ in judged], weights=weights)) for key in names]

@@ -66,7 +66,7 @@ def _colors(mesh: Mesh, own: Mapping[str, Values], rig: Rig) -> Values:
             case GaussianColor():
                 color.append(seen)
             case GaussianBayer() as noise:
-                bayer.append(noise.unfiltered(seen))
+                bayer.append(noise.remove_crosstalk(seen))
             case GaussianGrey():
                 grey.append(np.repeat(seen, 3, axis=1))
     shape = (len(mesh.vertices), 3)
@@ -82,7 +82,7 @@ def _filtered(sensor: Sensor, noise: GaussianBayer, mesh: Mesh, images: Mapping[
             blur_px = noise.defocus_px * _magnification(camera, sensor.camera, mesh.vertices)
             rgb = cv2.GaussianBlur(image.rgb, (0, 0), blur_px) if blur_px > 0 else image.rgb
             seen.append(_seen(ColorImage(np.asarray(rgb, np.uint8)), camera, mesh))
-    return noise.filtered(_mean(seen, (len(mesh.vertices), 3)))
+    return noise.apply_crosstalk(_mean(seen, (len(mesh.vertices), 3)))
 
 
 def _magnification(camera: Camera, other: Camera, points: Values) -> float:

@@ -10,7 +10,7 @@ from calib.noise.base import LEVELS, NoiseError
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
 from calib.noise.color import GaussianColor
-from calib.noise.fit import pictures
+from calib.noise.fit import image_noise
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
 from drivers.simulated.address import parse
@@ -42,7 +42,7 @@ def exposures(query: str, stream: str, number: int) -> np.ndarray:
 def test_the_density_integrates_to_one(model, real):
     spread = float(reference.picture_deviation(model, real))
     measured = real + spread * np.linspace(-8, 8, 2001)
-    total = np.trapezoid(np.exp(pictures.log_density(model, measured, np.full(2001, real))), measured)
+    total = np.trapezoid(np.exp(image_noise.log_density(model, measured, np.full(2001, real))), measured)
     assert total == pytest.approx(1, abs=1e-6)
 
 
@@ -50,14 +50,14 @@ def test_the_density_integrates_to_one(model, real):
 def test_the_density_is_the_normal_one(model, real, deviations):
     spread = float(reference.picture_deviation(model, real))
     density = np.exp(-0.5 * deviations**2) / (np.sqrt(2 * np.pi) * spread)
-    assert np.exp(pictures.log_density(model, real + deviations * spread, real)) == pytest.approx(density, rel=1e-4)
+    assert np.exp(image_noise.log_density(model, real + deviations * spread, real)) == pytest.approx(density, rel=1e-4)
 
 
 @settings(max_examples=15)
 @given(MODELS, REAL, SEEDS)
 def test_samples_have_the_model_s_mean_and_deviation(model, real, seed):
     n, spread = 10_000, float(reference.picture_deviation(model, real))
-    drawn = pictures.sample(model, np.random.default_rng(seed), np.full((n // 10, 10), real))
+    drawn = image_noise.sample(model, np.random.default_rng(seed), np.full((n // 10, 10), real))
     assert drawn.shape == (n // 10, 10)
     assert drawn.mean() == pytest.approx(real, abs=5 * spread / np.sqrt(n))
     assert drawn.std() == pytest.approx(spread, rel=5 / np.sqrt(2 * n))
@@ -78,7 +78,7 @@ def test_taking_the_deviation_at_the_measured_value_changes_the_sum_as_documente
 def test_one_deviation_is_found_again_whatever_outliers_there_are(name, sigma, seed):
     generator = np.random.default_rng(seed)
     real = generator.uniform(0, 255, (40, 50, 3))
-    measured = pictures.sample(GaussianColor(sigma), generator, real)
+    measured = image_noise.sample(GaussianColor(sigma), generator, real)
     lost = generator.random(real.shape) < 0.05
     measured[lost] = generator.uniform(0, LEVELS, lost.sum())
     measured[0] = np.nan
@@ -93,22 +93,22 @@ def test_what_a_camera_errs_by_is_told_from_pictures_of_a_scene_that_rests(name,
     """The simulator's camera has 2.5 levels, times `noise`, and rounds to whole ones."""
     stream = "color" if name == "color" else "bayer"
     declared = 5.0 if "noise=2" in query else 2.5
-    measured, real = pictures.still(exposures(query, stream, 8))
+    measured, real = image_noise.from_static_scene(exposures(query, stream, 8))
     assert FITS[name](measured, real).sigma == pytest.approx(np.hypot(declared, np.sqrt(1 / 12)), rel=0.02)
 
 
 def test_two_pictures_are_enough():
     images = 100 + 3.0 * np.random.default_rng(1).standard_normal((2, 40_000))
-    assert grey.fit(*pictures.still(images)).sigma == pytest.approx(3, rel=0.02)
+    assert grey.fit(*image_noise.from_static_scene(images)).sigma == pytest.approx(3, rel=0.02)
     with pytest.raises(NoiseError, match="at least 2 pictures of a scene in which nothing moves, not 1"):
-        pictures.still(images[:1])
+        image_noise.from_static_scene(images[:1])
 
 
 def test_what_is_cut_off_at_black_or_white_does_not_count():
     images = np.clip(
         np.rint(np.array([2.0, 120.0, 254.0]) + 4 * np.random.default_rng(1).normal(size=(900, 3))), 0, 255
     )
-    measured, real = pictures.still(images)
+    measured, real = image_noise.from_static_scene(images)
     assert np.isnan(measured[:, [0, 2]]).all()
     assert np.isnan(real[:, [0, 2]]).all()
     assert np.isfinite(measured[:, 1]).all()
@@ -120,7 +120,7 @@ def test_both_parts_of_an_intensity_s_deviation_are_found_again(sigma, relative,
     generator = np.random.default_rng(seed)
     real = np.geomspace(10, 5000, 20_000)
     law = GaussianIntensity("ir", sigma, relative)
-    measured = pictures.sample(law, generator, real)
+    measured = image_noise.sample(law, generator, real)
     lost = generator.random(real.shape) < 0.05
     measured[lost] = generator.uniform(0, 65535, lost.sum())
     found = intensity.fit(measured, real, "ir")
@@ -131,7 +131,7 @@ def test_both_parts_of_an_intensity_s_deviation_are_found_again(sigma, relative,
 
 
 def test_the_infrared_noise_of_the_simulator_has_no_proportional_part():
-    measured, real = pictures.still(exposures("sensors=ir&noise=2", "ir", 10), full_scale=65535)
+    measured, real = image_noise.from_static_scene(exposures("sensors=ir&noise=2", "ir", 10), full_scale=65535)
     found = intensity.fit(measured, real, "ir")
     assert found.sigma == pytest.approx(100, rel=0.03)
     assert found.relative < 0.005
@@ -156,7 +156,7 @@ def test_crosstalk_is_found_again_from_known_colors(seed):
     generator = np.random.default_rng(seed)
     colors, channel = generator.uniform(20, 235, (6000, 3)), generator.integers(0, 3, 6000)
     law = GaussianBayer(2.0, CROSSTALK)
-    measured = np.take_along_axis(law.filtered(colors), channel[:, None], axis=1)[:, 0]
+    measured = np.take_along_axis(law.apply_crosstalk(colors), channel[:, None], axis=1)[:, 0]
     measured += 2 * generator.standard_normal(6000)
     lost = generator.random(6000) < 0.05
     measured[lost] = generator.uniform(0, 255, lost.sum())
@@ -179,7 +179,7 @@ def test_without_numbers_there_is_no_model(fit):
 
 
 def test_more_numbers_than_needed_are_thinned():
-    residual, real = pictures.residuals(np.ones(300_000), np.arange(300_000.0))
+    residual, real = image_noise.residuals(np.ones(300_000), np.arange(300_000.0))
     assert len(residual) == 200_000
     np.testing.assert_array_equal(residual, 1 - real)
 

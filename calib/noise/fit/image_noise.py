@@ -1,4 +1,4 @@
-"""Density, sampling and fitting of noise around what a surface looks like, the same for every kind of picture."""
+"""Density, sampling and fitting of noise of colour, grey and intensity images."""
 
 from typing import Protocol
 
@@ -10,7 +10,7 @@ from calib.noise.fit import fitting
 
 
 class ValueNoise(Protocol):
-    """Gaussian noise of the numbers that a picture consists of, each independent of the others."""
+    """Gaussian noise of the values of an image, independent of each other."""
 
     def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Standard deviation of values, in their shape."""
@@ -18,9 +18,9 @@ class ValueNoise(Protocol):
 
 
 def log_density(model: ValueNoise, measured: ArrayLike, real: ArrayLike) -> NDArray[np.float64]:
-    """Logarithm of the density of measuring each number when the surface looks like `real` there.
+    """Log-density of each measured value for the true value `real`.
 
-    That of a whole colour is the sum over its channels.
+    The log-density of a colour is the sum over its channels.
     """
     real = np.asarray(real, np.float64)
     deviation = _deviation(model, real)
@@ -28,27 +28,29 @@ def log_density(model: ValueNoise, measured: ArrayLike, real: ArrayLike) -> NDAr
 
 
 def sample(model: ValueNoise, generator: np.random.Generator, real: ArrayLike) -> NDArray[np.float64]:
-    """Draws one measurement of every number; neither rounded nor cut off at black and white."""
+    """Random measurement of every value, neither rounded nor clipped."""
     real = np.asarray(real, np.float64)
     return real + _deviation(model, real) * generator.standard_normal(real.shape)
 
 
-def still(images: ArrayLike, full_scale: float = LEVELS - 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measured and real numbers from pictures of a scene in which nothing moves, for a `fit`.
+def from_static_scene(
+    images: ArrayLike, full_scale: float = LEVELS - 1
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Measured and true values from images of a static scene, as input of a `fit`.
 
-    The mean over the pictures takes the place of the real number. It lies nearer to each measurement than that, so
-    measurements are moved away from it until their variance is right.
+    The mean over the images replaces the true value. Residuals from the mean are too small by the factor √((n − 1) /
+    n); they are scaled to the unbiased variance.
 
     Args:
         images: (n, …), at least two.
-        full_scale: largest number of a pixel. Noise is cut off there and at 0, so what ever reached one of them does
-            not count.
+        full_scale: largest value of a pixel. Pixels that reach it or 0 in any image are excluded, because their noise
+            is clipped.
 
     Returns:
-        Measured and real numbers, both (n, …); NaN where they do not count.
+        Measured and true values, both (n, …); NaN where excluded.
 
     Raises:
-        NoiseError: there are fewer than two pictures.
+        NoiseError: fewer than two images.
     """
     pictures = np.asarray(images, np.float64)
     if len(pictures) < 2:
@@ -61,10 +63,10 @@ def still(images: ArrayLike, full_scale: float = LEVELS - 1) -> tuple[NDArray[np
 
 
 def residuals(measured: ArrayLike, real: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measured minus real numbers (n,), and the real ones, where both are known; thinned to what a fit needs.
+    """Residuals (n,) and true values where both are finite; subsampled to at most `fitting.LARGEST`.
 
     Raises:
-        NoiseError: there is none.
+        NoiseError: there are none.
     """
     values, truth = np.broadcast_arrays(np.asarray(measured, np.float64), np.asarray(real, np.float64))
     known = np.flatnonzero(np.isfinite(values) & np.isfinite(truth))
@@ -77,14 +79,14 @@ def residuals(measured: ArrayLike, real: ArrayLike) -> tuple[NDArray[np.float64]
 
 
 def fit_deviation(measured: ArrayLike, real: ArrayLike) -> float:
-    """The one deviation of greatest likelihood, in levels of 256.
+    """Maximum-likelihood deviation, in levels of 256.
 
     Raises:
-        NoiseError: no measured number comes with a real one.
+        NoiseError: no measured value has a finite true value.
     """
     residual, _ = residuals(measured, real)
     one = np.ones((len(residual), 1))
-    return float(fitting.maximize(residual, fitting.Columns(one[:, :0], one), span=LEVELS).spread[0])
+    return float(fitting.maximize_likelihood(residual, fitting.Design(one[:, :0], one), span=LEVELS).spread[0])
 
 
 def _deviation(model: ValueNoise, values: NDArray[np.float64]) -> NDArray[np.float64]:
