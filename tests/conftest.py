@@ -1,5 +1,6 @@
-"""What every test may ask for: repeatable property tests, processes of the service, a real device, large data sets."""
+"""Shared fixtures: repeatable property tests, processes of the service, a real device, large data sets."""
 
+import faulthandler
 import os
 import signal
 import socket
@@ -17,6 +18,15 @@ hypothesis.settings.load_profile("repeatable")
 
 # A shell that runs the tests in the background lets them, and all that they start, ignore Ctrl-C.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+#: Time that the interpreter has to end after the last line of the report [s].
+EXIT_S = 10.0
+
+
+def pytest_unconfigure() -> None:
+    """Ends the process with status 1, and with the stack of each thread, if a thread left by a test keeps it alive."""
+    faulthandler.dump_traceback_later(EXIT_S, exit=True, file=2)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

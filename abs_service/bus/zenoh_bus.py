@@ -1,5 +1,6 @@
 """The bus between processes: zenoh."""
 
+import logging
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
@@ -11,6 +12,8 @@ from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
 from abs_service.bus.session import Role, open_session
 from drivers.contract.callbacks import from_non_daemon_thread
+
+_log = logging.getLogger(__name__)
 
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
@@ -108,9 +111,13 @@ class ZenohBus:
         return self._keep(from_non_daemon_thread(lambda: tokens.declare_subscriber(key, on_token, history=True)))
 
     def close(self) -> None:
-        """Ends the session; may be called again."""
-        if not self._session.is_closed():
+        """Ends the session; may be called again. A callback that does not return is left behind after ten seconds."""
+        if self._session.is_closed():
+            return
+        try:
             self._session.close()
+        except zenoh.ZError as error:
+            _log.warning("rig %s: the session did not close, a callback has not returned: %s", self._rig, error)
 
     def __enter__(self) -> Self:
         return self

@@ -111,9 +111,7 @@ def test_a_sensor_whose_images_are_mirrored_is_noticed() -> None:
     coverage.check([*rolled("color", mirror=False), *rolled("tof", mirror=False)])
     with pytest.raises(MirroredSensorError, match="color or tof sees the board as in a mirror"):
         coverage.check([*rolled("color", mirror=False), *rolled("tof", mirror=True)])
-
-
-def test_a_board_that_was_never_rolled_does_not_tell_about_mirrors() -> None:
+    # A board that was never rolled does not show it.
     coverage.check([*rolled("color", mirror=False, roll=0.02), *rolled("tof", mirror=True, roll=0.02)])
 
 

@@ -7,7 +7,9 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
+import zenoh
 
 from abs_service.bus.contract import EVENTS, IMAGES, STATE, Sample
 from abs_service.bus.session import BusError, Role, check_endpoint, open_session
@@ -26,7 +28,7 @@ def buses(open_bus):
     return open_bus(), open_bus(), open_bus()
 
 
-def publish_until_heard(publisher, arrived, *message):
+def publish_until_received(publisher, arrived, *message):
     """Subscriptions travel to publishers on their own time."""
     for _ in range(200):
         publisher.put(*message)
@@ -43,10 +45,12 @@ def test_a_message_arrives_as_it_was_sent(buses, qos):
     arrived = listen(receiver, "**")
     payload = bytes(range(256)) * 1000
     publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", qos)
-    sample = publish_until_heard(publisher, arrived, payload, b"info")
+    sample = publish_until_received(publisher, arrived, payload, b"info")
     assert sample == Sample("tof/depth/image", "foxglove.RawImage", payload, b"info")
     bare = sender.publisher("tf", "foxglove.FrameTransforms", qos)
-    assert publish_until_heard(bare, listen(receiver, "tf"), b"") == Sample("tf", "foxglove.FrameTransforms", b"", b"")
+    assert publish_until_received(bare, listen(receiver, "tf"), b"") == Sample(
+        "tf", "foxglove.FrameTransforms", b"", b""
+    )
 
 
 def test_an_announcement_is_heard_and_answers_with_the_last(buses):
@@ -54,7 +58,7 @@ def test_an_announcement_is_heard_and_answers_with_the_last(buses):
     publisher = sender.announce("config", "absmsg.v1.Config")
     assert receiver.ask("config", 1) == []
     arrived = listen(receiver, "config")
-    publish_until_heard(publisher, arrived, b"old")
+    publish_until_received(publisher, arrived, b"old")
     publisher.put(b"new")
     assert receiver.ask("**", 1) == [Sample("config", "absmsg.v1.Config", b"new")]
 
@@ -85,24 +89,36 @@ def test_components_come_and_go(buses):
     assert changes.get(timeout=5) == ("capture", False)
 
 
-def test_a_slow_subscriber_neither_blocks_the_publisher_nor_others(buses):
+@pytest.fixture
+def blocked():
+    """A callback that returns once the test is over, and the messages that it began with."""
+    begun, release = queue.SimpleQueue(), threading.Event()
+
+    def callback(sample):
+        begun.put(sample)
+        release.wait()
+
+    yield callback, begun
+    release.set()
+
+
+def test_a_slow_subscriber_neither_blocks_the_publisher_nor_others(buses, blocked):
     router, sender, receiver = buses
-    release = queue.SimpleQueue()
-    router.subscribe("tof/depth/image", lambda _: release.get())
+    callback, begun = blocked
+    router.subscribe("tof/depth/image", callback)
     arrived = listen(receiver, "tof/depth/image")
     publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", IMAGES)
-    publish_until_heard(publisher, arrived, b"first")
-    slowest = 0.0
+    publish_until_received(publisher, arrived, b"first")
+    while begun.empty():
+        publish_until_received(publisher, arrived, b"first")
+    durations = []
     for number in range(60):
         before = time.perf_counter()
         publisher.put(bytes(100_000), str(number).encode())
-        slowest = max(slowest, time.perf_counter() - before)
-        time.sleep(0.005)
-    heard = [arrived.get(timeout=5) for _ in range(50)]
-    assert len(heard) == 50
-    assert slowest < 0.5
-    for _ in range(300):
-        release.put(None)
+        durations.append(time.perf_counter() - before)
+        publish_until_received(publisher, arrived, bytes(100_000), str(number).encode())
+    assert begun.qsize() == 1, "the slow subscriber still handles its first message"
+    assert np.median(durations) < 0.5  # a busy machine holds up single calls, a subscriber all of them
 
 
 def test_a_stopped_subscriber_does_not_block_the_publisher(buses, endpoint):
@@ -126,7 +142,7 @@ with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
             assert alive.get(timeout=5) == ("stopped", True)
             arrived = listen(receiver, "tof/depth/image")
             publisher = sender.publisher("tof/depth/image", "foxglove.RawImage", IMAGES)
-            publish_until_heard(publisher, arrived, b"first")
+            publish_until_received(publisher, arrived, b"first")
             process.send_signal(19)  # SIGSTOP
             slowest = 0.0
             for _ in range(100):
@@ -145,11 +161,11 @@ def test_everything_resumes_when_the_router_comes_back(buses, endpoint):
     arrived = listen(receiver, "sheet/state")
     publisher = sender.publisher("sheet/state", "absmsg.v1.DeformationState", STATE)
     sender.announce("config", "absmsg.v1.Config").put(b"answer")
-    publish_until_heard(publisher, arrived, b"before")
+    publish_until_received(publisher, arrived, b"before")
     router.close()
     publisher.put(b"nobody hears this, and nothing blocks")
     with ZenohBus.open("demo", endpoint, Role.ROUTER):
-        while publish_until_heard(publisher, arrived, b"after").payload != b"after":
+        while publish_until_received(publisher, arrived, b"after").payload != b"after":
             pass
         while not (answers := receiver.ask("config", 1)):
             pass
@@ -199,13 +215,27 @@ with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
     bus.announce("config", "absmsg.v1.Config").put(b"x")
     bus.publisher("sheet/state", "absmsg.v1.DeformationState", STATE).put(b"y")
 """
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=10, stdout=subprocess.DEVNULL)
+    ended = subprocess.run([sys.executable, "-c", program], check=False, timeout=10, stdout=subprocess.DEVNULL)
+    assert ended.returncode == 0
 
 
 def test_closing_twice_is_fine(endpoint):
     bus = ZenohBus.open("demo", endpoint, Role.ROUTER, shared_memory=False)
     bus.close()
     bus.close()
+    ZenohBus.open("demo", endpoint, Role.ROUTER).close()  # which it can only while nobody else listens there
+
+
+def test_a_callback_that_does_not_return_is_left_behind_with_a_warning(caplog):
+    class Session:
+        def is_closed(self):
+            return False
+
+        def close(self):
+            raise zenoh.ZError("close operation timed out!")
+
+    ZenohBus(Session(), "demo").close()
+    assert "rig demo: the session did not close, a callback has not returned" in caplog.text
 
 
 def test_the_interpreter_waits_for_callbacks_that_a_daemon_declared(open_bus):

@@ -180,7 +180,10 @@ def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
 
 
 def test_health_of_strangers_is_ignored(world):
-    world.supervisor("capture").heard("track/elsewhere")
+    supervisor = world.supervisor("capture")
+    supervisor.heard("track/elsewhere")
+    assert list(supervisor.children) == ["capture"]
+    assert world.events == []
 
 
 def test_the_recorder_is_stopped_last(world):

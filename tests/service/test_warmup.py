@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from abs_service import config, wiring
+from abs_service.tracking import warmup
 from abs_service.tracking.warmup import warm_up
 from calib.noise.pixel_polynomial import PixelPolynomial
 
@@ -16,8 +17,8 @@ PROGRAM = """
 import dataclasses, gc, json, sys
 from numba.core.dispatcher import Dispatcher
 from pathlib import Path
-from abs_service import config, plugins
-from abs_service.commands import plans
+from abs_service import config, wiring
+from abs_service.config import plugins
 from abs_service.tracking.session import Tracking, streams
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracking.warmup import warm_up
@@ -27,8 +28,8 @@ settings = config.load_default()
 table = json.loads(sys.argv[1])
 parts = {key: plugins.load(f"abs_service.tracker.{package}", table[key], Path())
          for key, package in [("model", "models"), ("synthesis", "synthesis")] if key in table}
-plan = dataclasses.replace(plans.plan(settings, "sheet"), **parts)
-warm_up(plans.noises(settings, "sheet"), plan)
+plan = dataclasses.replace(wiring.plan(settings, "sheet"), **parts)
+warm_up(wiring.noises(settings, "sheet"), plan)
 
 simulation = address.parse(table.get("uri", settings.devices["sim"].uri) + table.get("keys", "")).build()
 exposures = [simulation.expose(k)[0] for k in range(3)]
@@ -38,7 +39,7 @@ def forms():
              if isinstance(f, Dispatcher) and f.py_func.__module__.startswith("abs_service")}
 
 before = forms()
-rig = plans.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
+rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
 tracking = Tracking(rig, plan)
 synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 10**7)
 for frames in exposures:
@@ -74,9 +75,18 @@ def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(parts):
     assert sum(before.values()) >= 4
 
 
-def test_a_map_of_noise_that_is_smaller_than_the_nominal_image_does_no_harm():
+def test_a_noise_map_that_is_smaller_than_the_nominal_image_does_no_harm(monkeypatch):
+    statuses = []
+
+    class Recorded(warmup.Tracking):
+        def track(self, *arguments):
+            statuses.append((estimate := super().track(*arguments)).status)
+            return estimate
+
+    monkeypatch.setattr(warmup, "Tracking", Recorded)
     settings = config.load_default()
     plan = wiring.plan(settings, "sheet")
     small = np.full((1, 1, 2, 2), 0.01)
     tof = PixelPolynomial(small, np.zeros_like(small), np.array([0.0, 9.0]), np.array([0.0, 1.0]))
     warm_up(wiring.noises(settings, "sheet") | {"tof": tof}, plan)
+    assert statuses[::2] == 3 * ["TRACKING"]  # one board for each kind of lens

@@ -131,3 +131,5 @@ def test_whatever_it_answers_is_understood_or_an_error_of_the_driver(answer: byt
     }
     with contextlib.suppress(DeviceError):
         actions[what]()
+    pipe.kinect.spoil = lambda good: good
+    assert pipe.commands.read_register(0x15) == pipe.kinect.registers[0x15]  # the next command is answered
