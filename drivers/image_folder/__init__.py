@@ -1,1 +1,1 @@
-"""Folders of image files as frames: other people's data sets, and what other tools export."""
+"""Folders of image files as frames: public data sets and exports of other tools."""

@@ -1,4 +1,4 @@
-"""Image files as frames: what is read is checked, and never converted silently."""
+"""Image files as frames: formats are validated and never converted silently."""
 
 import heapq
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,29 +25,29 @@ class Images(Protocol):
 
     @property
     def camera(self) -> Camera:
-        """What took them."""
+        """Camera that took the images."""
         ...
 
     def frame(self, file: ImageFile) -> Frame:
         """Reads one of `files`.
 
         Raises:
-            ImageFolderError: it is not such an image.
+            ImageFolderError: the image has another format.
         """
         ...
 
 
 @dataclass(frozen=True)
 class DepthImages:
-    """Stream `depth` of sensor `depth`: 16-bit images of lengths.
+    """Stream `depth` of sensor `depth`: 16-bit depth images.
 
     Attributes:
         files: the images.
-        camera: what took them.
+        camera: camera of the images.
         scale: length of one unit [m].
-        geometry: which length, z or radial.
+        geometry: type of distance, z or radial.
         invalid: the value that means "no return".
-        masks: images that are black or transparent where the depth is to count as "no return", by sequence number.
+        masks: mask images by sequence number; where they are black or transparent, depth is "no return".
     """
 
     files: Sequence[ImageFile]
@@ -58,7 +58,7 @@ class DepthImages:
     masks: Mapping[int, Path] = field(default_factory=dict)
 
     def frame(self, file: ImageFile) -> Frame:
-        """Reads a depth image and applies its mask, if it has one."""
+        """Reads a depth image and applies its mask, if any."""
         depth = _read(file.path, self.camera)
         if depth.dtype != np.uint16 or depth.ndim != 2:
             raise ImageFolderError(f"{file.path}: depth must have one channel of 16 bits, this is {_format(depth)}")
@@ -86,11 +86,11 @@ class DepthImages:
 
 @dataclass(frozen=True)
 class ColorImages:
-    """Stream `color` of sensor `color`: 8-bit images, grey ones with three equal channels, transparency left out.
+    """Stream `color` of sensor `color`: 8-bit images; grey images get three equal channels, alpha is ignored.
 
     Attributes:
         files: the images.
-        camera: what took them.
+        camera: camera of the images.
     """
 
     files: Sequence[ImageFile]
@@ -121,14 +121,14 @@ class ImageFolder:
     """The images of a folder.
 
     Attributes:
-        streams: by the sensor's name.
+        streams: by sensor name.
     """
 
     streams: Mapping[str, Images]
 
     @property
     def cameras(self) -> Mapping[str, Camera]:
-        """What took them, by sensor name."""
+        """Cameras by sensor name."""
         return {sensor: images.camera for sensor, images in self.streams.items()}
 
     @property
@@ -137,7 +137,7 @@ class ImageFolder:
         return sum(len(images.files) for images in self.streams.values())
 
     def frames(self) -> Iterator[Frame]:
-        """The frames of all streams in the order of their times, each read when it is asked for."""
+        """Frames of all streams in order of time, read lazily."""
         streams = list(self.streams.values())
         numbered = [[(file.t_ns, number, file) for file in images.files] for number, images in enumerate(streams)]
         for _, number, file in heapq.merge(*numbered, key=lambda entry: entry[:2]):
@@ -156,7 +156,7 @@ def _read(path: Path, camera: Camera) -> NDArray[np.generic]:
 
 
 def _mask(path: Path, camera: Camera) -> NDArray[np.bool_]:
-    """Where a mask keeps what it covers: its alpha channel if it has one, else wherever it is not black."""
+    """True where a mask keeps pixels: nonzero alpha if it has an alpha channel, else not black."""
     image = _read(path, camera)
     if image.ndim == 2:
         return image != 0

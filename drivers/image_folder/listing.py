@@ -1,4 +1,4 @@
-"""Which image files belong to which moment."""
+"""Image files with their timestamps, by number or from a list."""
 
 import math
 import re
@@ -7,17 +7,17 @@ from pathlib import Path
 
 
 class ImageFolderError(Exception):
-    """A folder or file that cannot be imported; names it and what is wrong."""
+    """A folder or file that cannot be imported; names it and the problem."""
 
 
 @dataclass(frozen=True, slots=True)
 class ImageFile:
-    """One image and when it was taken.
+    """One image file and its timestamp.
 
     Attributes:
         path: of the file.
         seq: number of the exposure.
-        t_ns: time of the exposure [ns], from the same origin for all images of a folder.
+        t_ns: time of the exposure [ns]; the origin is common to all images of a folder.
     """
 
     path: Path
@@ -26,15 +26,15 @@ class ImageFile:
 
 
 def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
-    """Files that match a pattern, in the order of the last number in their name, which counts exposures.
+    """Files that match a pattern, sorted by the last number in their name, the sequence number.
 
     Args:
-        folder: where they are.
-        pattern: glob pattern, `depth_*.png`, say.
+        folder: the folder.
+        pattern: glob pattern, such as `depth_*.png`.
         rate_hz: exposures per second; number n was taken n / rate_hz seconds after number 0.
 
     Raises:
-        ImageFolderError: no such folder, no match, a name without a number, or two names with the same.
+        ImageFolderError: missing folder, no match, a name without a number, or duplicate numbers.
     """
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
@@ -53,10 +53,10 @@ def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
 
 
 def by_list(folder: Path, name: str) -> list[ImageFile]:
-    """Files named in a list of the TUM RGB-D benchmark: lines of a time [s] and a path; `#` begins a comment.
+    """Files in a list of the TUM RGB-D benchmark: lines with a time [s] and a path; `#` starts a comment.
 
     Raises:
-        ImageFolderError: no such list, a line that is not understood, or a file that is not there; names the line.
+        ImageFolderError: missing list, malformed line, or missing file; names the line.
     """
     try:
         lines = (folder / name).read_text(encoding="utf-8").splitlines()
@@ -81,7 +81,7 @@ def by_list(folder: Path, name: str) -> list[ImageFile]:
 
 
 def _nanoseconds(text: str) -> int | None:
-    """A decimal number of seconds, 0 or more, as nanoseconds; exact, as a float of today's Unix time would not be."""
+    """Nonnegative decimal seconds as nanoseconds; exact, unlike a float of the current Unix time."""
     match = re.fullmatch(r"(\d{1,10})(?:\.(\d*))?", text)
     if match is None:
         return None

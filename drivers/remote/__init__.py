@@ -1,4 +1,4 @@
-"""A rig whose frames arrive over the network, from another `abs-service capture`, as a device of this one.
+"""Driver for a rig that another `abs-service capture` publishes, on this host or over the network.
 
 Protocol: `probe`, `device`. Transport: `link`, whose SDK is zenoh. Codec: that of the wire, `drivers.encoding.codec`.
 """
@@ -14,15 +14,16 @@ from drivers.remote.probe import choose_rig, probe
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
-    """Opens `remote://HOST:PORT/RIG`; the rig may be left out where there is only one, and all of it on this host.
+    """Opens `remote://HOST:PORT/RIG`; the rig is optional if there is only one, host and port default to this host.
 
-    Keys: `protocol`, tcp, tls, quic, udp or ws, tcp if not given; `shared_memory`, 0 or 1, 1 if not given: whether
-    images of a rig on this host travel through it; `learn`, time to see which streams come [s], 1 if not given;
-    `sensors`, which of the rig's are wanted, all if not given.
+    Keys: `protocol`, tcp, tls, quic, udp or ws, tcp if not given; `shared_memory`, 0 or 1, 1 if not given: shared
+        memory
+    transport for images on one host; `learn`, time in which streams are observed before opening [s], 1 if not given;
+    `sensors`, comma-separated names, all sensors if not given.
 
     Raises:
-        AddressError: the address is not understood.
-        DeviceError: nothing answers there, there is no such rig, or it delivers nothing.
+        AddressError: invalid address.
+        DeviceError: no answer, no such rig, or no frames.
     """
     address = parse(uri)
     link = open_link(address)
@@ -35,7 +36,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """The rigs that are captured on this host. Others have to be named: zenoh is told not to search the network."""
+    """Rigs captured on this host. Others must be addressed explicitly: zenoh scouting is disabled."""
     try:
         link = open_link(Address("127.0.0.1", DEFAULT_PORT), timeout_s)
     except DeviceError:

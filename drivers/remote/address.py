@@ -1,4 +1,4 @@
-"""What an address `remote://HOST:PORT/RIG?key=value` asks for."""
+"""Addresses `remote://HOST:PORT/RIG?key=value`."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ _LEARN_S = (0.1, 60.0)
 
 @dataclass(frozen=True)
 class Address:
-    """Where a rig is captured.
+    """A parsed address.
 
     Attributes:
-        host, port: where its router listens.
-        rig: its name, "" for the only one there.
+        host, port: endpoint of the zenoh router.
+        rig: name of the rig, "" for the only one.
         protocol: one of `PROTOCOLS`.
-        shared_memory: whether images may pass through shared memory on one host.
-        learn_s: time to see which streams come [s].
-        sensors: names of those that are wanted, () for all that its configuration names.
+        shared_memory: True if images on one host use shared memory.
+        learn_s: time in which streams are observed before opening [s].
+        sensors: names of the requested sensors, () for all in the rig's configuration.
     """
 
     host: str = "127.0.0.1"
@@ -34,11 +34,11 @@ class Address:
 
     @property
     def endpoint(self) -> str:
-        """As zenoh writes it."""
+        """Endpoint in zenoh's notation."""
         return f"{self.protocol}/{_bracketed(self.host)}:{self.port}"
 
     def uri(self, rig: str) -> str:
-        """The address of one rig there."""
+        """Address of a rig at this endpoint."""
         keys = [
             f"protocol={self.protocol}" if self.protocol != Address.protocol else "",
             "" if self.shared_memory else "shared_memory=0",
@@ -50,10 +50,10 @@ class Address:
 
 
 def parse(uri: str) -> Address:
-    """Reads an address such as `remote://192.168.1.7:7447/bench`.
+    """Parses an address such as `remote://192.168.1.7:7447/bench`.
 
     Raises:
-        AddressError: a host, port, rig or key that cannot be; names it and what is allowed.
+        AddressError: invalid host, port, rig or key; names it and what is allowed.
     """
     parts = urlsplit(uri)
     rig = parts.path.strip("/")

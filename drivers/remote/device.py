@@ -1,4 +1,4 @@
-"""A remote rig as a device: its frames as they were, with their times on this host's clock."""
+"""A remote rig as a device: unchanged frames, with host times mapped to this host's clock."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -17,13 +17,13 @@ from drivers.remote.link import Link
 from drivers.remote.probe import IMAGES, RemoteRig
 
 TRUTHS = "*/truth"
-#: The other host's monotonic clock, by its stamps.
+#: The remote host's monotonic clock.
 CLOCK = ClockInfo("remote host", 1e9)
 
 
 @dataclass(slots=True)
 class _Stream:
-    """Where one stream is: the epoch of its rig, its number here, and the latest exposure."""
+    """State of one stream: epoch in the remote rig and in this device, latest sequence number, clock mapping."""
 
     theirs: int
     ours: int
@@ -32,16 +32,17 @@ class _Stream:
 
 
 class RemoteDevice:
-    """Delivers what another `abs-service capture` publishes. Sequence numbers, ticks and settings stay as they are.
+    """Delivers the frames of another `abs-service capture`. Sequence numbers, ticks and settings are unchanged.
 
-    Host times stay, too, if both processes read the same clock; else each stream's are mapped from the other host's
-    clock by `drivers.contract.clock`. An epoch there is one here. If the other process ends, the device has FAILED.
+    If both processes share a clock, host times are unchanged; else each stream's host times are mapped from the remote
+    host's clock by `drivers.contract.clock`. Each remote epoch is one epoch here. The end of the remote process is the
+    state FAILED.
 
     Args:
-        uri: address that opens it again.
+        uri: address that reopens it.
         rig: name of the remote rig.
-        link: to it; closed with the device.
-        remote: what the rig delivers.
+        link: zenoh link; closed with the device.
+        remote: cameras and streams of the rig.
         clock: CLOCK_MONOTONIC [ns].
     """
 
@@ -64,12 +65,12 @@ class RemoteDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames`; exposures that are `missing` between two that came, lost there or on the way; `malformed` ones."""
+        """`frames` delivered; `missing` exposures, by gaps in sequence numbers; `malformed` messages."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Of each stream's mapping from the other host's clock, see `drivers.contract.clock.DeviceClock.gauges`."""
+        """Clock mapping of each stream, see `drivers.contract.clock.DeviceClock.gauges`."""
         streams = {} if self._same_clock else dict(self._streams)
         return {
             f"clock.{sensor}/{stream}.{name}": value
@@ -88,7 +89,7 @@ class RemoteDevice:
             return
         self._streams = {}
         self._gate.report_state(DeviceState.STREAMING, f'rig "{self._rig}" is captured elsewhere')
-        # Whoever makes a mesh of the first images needs their truth, which comes just before them.
+        # Truths first: a mesh is made from the first images and their truth, which is published just before them.
         self._link.subscribe(self._rig, TRUTHS, self._on_truth)
         self._link.subscribe(self._rig, IMAGES, self._on_image)
         self._link.watch_liveliness(self._rig, self._on_gone)
@@ -96,12 +97,12 @@ class RemoteDevice:
             self._link.unsubscribe()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again."""
+        """Stops delivery; the sink is not called after it returns."""
         self._gate.end("stopped")
         self._link.unsubscribe()
 
     def close(self) -> None:
-        """Stops and ends the session."""
+        """Stops and closes the session."""
         self._gate.release()
         self._link.close()
 
@@ -109,7 +110,7 @@ class RemoteDevice:
         self._gate.report_state(DeviceState.FAILED, f'the capture of rig "{self._rig}" has ended')
 
     def _on_truth(self, topic: str, payload: bytes, attachment: bytes) -> None:
-        # Truths of another clock would have no frame of the same time.
+        # With mapped host times, no frame has exactly the time of a truth.
         if self._same_clock:
             try:
                 self._gate.deliver_truth(codec.decode_truth(payload))
@@ -138,7 +139,7 @@ class RemoteDevice:
         )
 
     def _follow(self, frame: Frame) -> _Stream:
-        """Where the frame's stream is; counts what is missing before the frame."""
+        """State of the frame's stream, updated by the frame; counts missing exposures."""
         stream = self._streams.get(frame.key)
         if stream is None:
             stream = _Stream(frame.epoch, self._gate.epoch, frame.seq, DeviceClock(CLOCK))

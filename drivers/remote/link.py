@@ -1,4 +1,4 @@
-"""The way to another process: a zenoh session as this driver needs it, and nothing else here knows zenoh.
+"""A zenoh client session to the remote rig; the only module of this driver that imports zenoh.
 
 Keys are those of docs/subscribing.md: `abs/RIG/TOPIC`.
 """
@@ -14,12 +14,12 @@ from drivers.contract.callbacks import from_non_daemon_thread
 from drivers.contract.device import DeviceError
 from drivers.remote.address import Address
 
-#: Without a sign of life for this long the other side counts as gone [ms].
+#: Keep-alive timeout after which the peer is considered gone [ms].
 LEASE_MS = 2000
-#: How long the other side may take to answer [s].
+#: Timeout of queries [s].
 ANSWER_S = 3.0
 
-#: Takes topic, payload and attachment of a message, from a thread of zenoh's; must be quick.
+#: Callback with topic, payload and attachment of a message, from a zenoh thread; must not block.
 OnMessage = Callable[[str, bytes, bytes], None]
 
 
@@ -36,17 +36,17 @@ class Link:
         self._lock = threading.Lock()
 
     def rigs(self, timeout_s: float = ANSWER_S) -> list[str]:
-        """Names of the rigs whose devices are captured."""
+        """Names of the rigs with a live capture process."""
         replies = self._session.liveliness().get("abs/*/live/capture", timeout=timeout_s)
         return sorted({str(reply.ok.key_expr).split("/")[1] for reply in replies if reply.ok is not None})
 
     def query(self, rig: str, pattern: str) -> list[bytes]:
-        """What answers a question for the topics of a rig that match."""
+        """Replies to a query for a rig's topics that match a pattern."""
         replies = self._session.get(f"abs/{rig}/{pattern}", target=zenoh.QueryTarget.ALL, timeout=ANSWER_S)
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
     def subscribe(self, rig: str, pattern: str, on_message: OnMessage) -> None:
-        """Hears the messages of a rig's topics that match, until `unsubscribe`."""
+        """Subscribes to a rig's topics that match a pattern, until `unsubscribe`."""
         prefix = f"abs/{rig}/"
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -56,7 +56,7 @@ class Link:
         self._keep(lambda: self._session.declare_subscriber(prefix + pattern, on_sample))
 
     def watch_liveliness(self, rig: str, on_gone: Callable[[], None]) -> None:
-        """Hears when the capture of a rig ends, cleanly or not, until `unsubscribe`."""
+        """Calls back when the capture process of a rig ends, cleanly or not, until `unsubscribe`."""
 
         def on_token(sample: zenoh.Sample) -> None:
             if sample.kind == zenoh.SampleKind.DELETE:
@@ -66,14 +66,14 @@ class Link:
         self._keep(lambda: tokens.declare_subscriber(key, on_token, history=True))
 
     def unsubscribe(self) -> None:
-        """Hears nothing any more."""
+        """Undeclares all subscriptions."""
         with self._lock:
             declared, self._declared = self._declared, []
         for one in declared:
             one.undeclare()
 
     def close(self) -> None:
-        """Ends the session; may be called again. Has to happen before the interpreter ends: zenoh hangs there else."""
+        """Closes the session; idempotent. Required before interpreter exit, where zenoh would hang."""
         self.unsubscribe()
         if not self._session.is_closed():
             self._session.close()
@@ -88,7 +88,7 @@ def open_link(address: Address, timeout_s: float = ANSWER_S) -> Link:
     """Connects to a router.
 
     Raises:
-        DeviceError: nothing answers there in time.
+        DeviceError: no answer within the timeout.
     """
     settings = {
         "mode": "client",

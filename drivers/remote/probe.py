@@ -1,4 +1,4 @@
-"""What a remote rig delivers: its sensors say it, its streams show it."""
+"""Sensors and streams of a remote rig, from its metadata and its first frames."""
 
 import threading
 import tomllib
@@ -21,18 +21,18 @@ from drivers.remote.address import Address
 from drivers.remote.link import Link
 
 IMAGES = "*/*/image"
-#: How long to wait for the first image [s].
+#: Timeout for the first image [s].
 FIRST_S = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class RemoteRig:
-    """What was learned.
+    """Result of `probe`.
 
     Attributes:
-        cameras: calibration of every sensor, by name, in the coordinates of its rig.
-        streams: those that were seen.
-        same_clock: whether their host times are those of this host's clock.
+        cameras: calibrations by sensor name, in coordinates of the remote rig.
+        streams: the observed streams.
+        same_clock: True if their host times are on this host's clock.
     """
 
     cameras: Mapping[str, Camera]
@@ -41,25 +41,25 @@ class RemoteRig:
 
 
 def choose_rig(link: Link, address: Address) -> str:
-    """The rig that an address means.
+    """Name of the rig that an address refers to.
 
     Raises:
-        DeviceError: there is none of that name, or several to choose from.
+        DeviceError: no rig of that name, or several rigs.
     """
     found = [Found(DeviceInfo(address.uri(rig), "abs-service rig", rig)) for rig in link.rigs()]
     return choose(found, "remote", address.rig).info.serial
 
 
 def probe(link: Link, rig: str, address: Address) -> RemoteRig:
-    """Asks for the sensors of a rig and watches for a while what they deliver.
+    """Queries the sensors of a rig and observes their streams.
 
     Args:
-        link: to the rig.
+        link: link to the rig.
         rig: its name.
-        address: says which sensors are wanted and how long to watch.
+        address: requested sensors and observation time.
 
     Raises:
-        DeviceError: a sensor that is wanted is not announced or delivers nothing, as while its device is opened.
+        DeviceError: a requested sensor has no metadata or no frames yet, as while its device is being opened.
     """
     wanted = address.sensors or _configured(link, rig)
     models = _models(link, rig, wanted)
@@ -81,7 +81,7 @@ def probe(link: Link, rig: str, address: Address) -> RemoteRig:
 
 @dataclass
 class _Seen:
-    """The first and the latest frame of every stream, and which exposure that was."""
+    """First and latest frame of every stream."""
 
     frames: dict[tuple[str, str], tuple[Frame, Frame]] = field(default_factory=dict)
     first: threading.Event = field(default_factory=threading.Event)
@@ -90,13 +90,13 @@ class _Seen:
         try:
             frame = codec.decode(payload, attachment)
         except CodecError:
-            return  # counted once the device is started
+            return  # counted when the device is started
         self.frames[frame.key] = (self.frames.get(frame.key, (frame,))[0], frame)
         self.first.set()
 
 
 def _configured(link: Link, rig: str) -> tuple[str, ...]:
-    """The sensors that the rig's configuration names: more may be announced one after the other."""
+    """Sensors in the rig's configuration; their metadata may be published one after the other."""
     try:
         configs = [tomllib.loads(Config.FromString(payload).toml) for payload in link.query(rig, "config")]
     except (DecodeError, tomllib.TOMLDecodeError) as error:
@@ -108,7 +108,7 @@ def _configured(link: Link, rig: str) -> tuple[str, ...]:
 
 
 def _models(link: Link, rig: str, wanted: Collection[str]) -> dict[str, SensorModel]:
-    """What is announced of the wanted sensors, by name."""
+    """Sensor models of the requested sensors, by name."""
     try:
         models = [SensorModel.FromString(payload) for payload in link.query(rig, "*/model")]
     except DecodeError as error:
@@ -129,7 +129,7 @@ def _camera(rig: str, model: SensorModel) -> Camera:
 
 
 def _stream(frames: tuple[Frame, Frame]) -> StreamInfo:
-    """A stream as its first and latest frame show it; 1 Hz if there was one only."""
+    """Stream properties from its first and latest frame; rate 1 Hz after a single frame."""
     first, latest = frames
     height, width = latest.data.shape[:2]
     exposures, elapsed_ns = latest.seq - first.seq, latest.t_host_ns - first.t_host_ns

@@ -1,4 +1,4 @@
-"""Recordings: read frame by frame without a clock, or played as a device at `replay://FILE?speed=1&loop=0`."""
+"""Recordings: read offline frame by frame, or played in real time as the device `replay://FILE?speed=1&loop=0`."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,11 +19,11 @@ _DELAYS_S = (0.0, 3600.0)
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens `replay://recordings/a.mcap` (relative) or `replay:///data/a.mcap` (absolute).
 
-    Keys: `speed`, factor on the recorded pace, 1 if not given; `loop`, 1 to begin anew at the end, 0 if not given;
-    `delay`, seconds before the first frame, for those who want to see it and are still starting.
+    Keys: `speed`, factor on the recorded speed, 1 if not given; `loop`, 1 to restart at the end, 0 if not given;
+    `delay`, time before the first frame [s], so that subscribers can connect first.
 
     Raises:
-        AddressError: the address is not understood, or the file cannot be replayed.
+        AddressError: invalid address, or the file cannot be replayed.
     """
     parts = urlsplit(uri)
     values = {"speed": "1", "loop": "0", "delay": "0"}
@@ -43,7 +43,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """Nothing: recordings are found in folders."""
+    """Empty: recordings are not discovered."""
     return []
 
 

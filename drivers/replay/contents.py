@@ -1,4 +1,4 @@
-"""What an MCAP file holds and where, from its index or, if it was never finished, by reading it through."""
+"""Index of an MCAP file: from its summary section or, for an unfinished file, by a sequential scan."""
 
 import struct
 from collections import Counter
@@ -17,7 +17,7 @@ from zstandard import ZstdError
 
 from drivers.contract.device import DeviceError
 
-#: What the MCAP reader and its decompressors raise about bytes that are cut off or damaged.
+#: Exceptions of the MCAP reader and its decompressors for truncated or corrupt bytes.
 DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)
 
 #: Bytes of opcode and length before the content of a record.
@@ -25,12 +25,12 @@ _RECORD_HEADER = 9
 
 
 class RecordingError(DeviceError):
-    """A file that cannot be replayed; names the file and what is wrong with it."""
+    """A file that cannot be replayed; names the file and the problem."""
 
 
 @dataclass(frozen=True)
 class ChunkLocation:
-    """Where a chunk begins in the file, and the earliest time in it [ns]."""
+    """File offset of a chunk, and its earliest message time [ns]."""
 
     offset: int
     start_ns: int
@@ -38,7 +38,7 @@ class ChunkLocation:
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic: its name, the full name of its protobuf message, and how many messages it has."""
+    """One topic: name, full name of its protobuf message, and number of messages."""
 
     name: str
     schema: str
@@ -47,15 +47,15 @@ class Topic:
 
 @dataclass(frozen=True)
 class Contents:
-    """Survey of one file.
+    """Contents of one file.
 
     Attributes:
-        chunks: in the file's order.
+        chunks: in file order.
         topics: by channel id.
         attachments: content by name.
         start_ns, end_ns: first and last log time [ns]; 0 for a file without messages.
-        truncated: the file was never finished: its writer was killed, or is still writing.
-        damaged: chunks left out because they are damaged; those of a finished file are found when they are read.
+        truncated: True if the file was not finished: its writer was killed, or is still writing.
+        damaged: number of corrupt chunks that were skipped; in a finished file they are only detected when read.
     """
 
     chunks: tuple[ChunkLocation, ...]
@@ -68,10 +68,10 @@ class Contents:
 
 
 def scan(path: Path) -> Contents:
-    """Surveys a file, quickly if it has an index.
+    """Reads the contents of a file, fast if it has an index.
 
     Raises:
-        RecordingError: the file cannot be read, or is no MCAP file.
+        RecordingError: the file cannot be read, or is not MCAP.
     """
     try:
         with path.open("rb") as stream:
@@ -82,13 +82,13 @@ def scan(path: Path) -> Contents:
 
 
 def read_chunk(stream: BinaryIO, place: ChunkLocation) -> list[McapRecord]:
-    """The records of a chunk; raises one of `DAMAGE` if it is damaged."""
+    """The records of a chunk; raises one of `DAMAGE` if it is corrupt."""
     stream.seek(place.offset + _RECORD_HEADER)
     return breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
 
 
 def _summary(path: Path, stream: BinaryIO) -> Summary | None:
-    """The index at the end of the file, None if there is none."""
+    """The summary section at the end of the file, None if there is none."""
     try:
         reader = SeekingReader(stream)
     except DAMAGE as error:
@@ -116,7 +116,7 @@ def _from_index(summary: Summary, stream: BinaryIO) -> Contents:
 
 
 def _scan_records(stream: BinaryIO) -> Contents:
-    """Reads every record up to the first that is cut off; a damaged chunk is left out and counted."""
+    """Reads every record up to the first truncated one; corrupt chunks are skipped and counted."""
     damaged = 0
     chunks: list[ChunkLocation] = []
     schemas: dict[int, Schema] = {}
@@ -152,7 +152,7 @@ def _scan_records(stream: BinaryIO) -> Contents:
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, McapRecord]]:
-    """Offset and content of every record before the file breaks off."""
+    """Offset and content of every record up to the truncation."""
     stream.seek(0)
     records = StreamReader(stream, emit_chunks=True).records
     offset = len(b"\x89MCAP0\r\n")

@@ -1,4 +1,4 @@
-"""A recording as a device: its frames again, in real time, as if they were taken now."""
+"""Real-time playback of a recording as a device."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -13,23 +13,23 @@ from drivers.contract.frame_gate import FrameGate
 from drivers.replay.contents import RecordingError
 from drivers.replay.recording import Recording
 
-#: Waits until the event is set or so many seconds have passed; tells whether it is set.
+#: Waits until the event is set or the timeout [s] has passed; returns True if it is set.
 Wait = Callable[[threading.Event, float], bool]
 
 
 class ReplayDevice:
-    """Delivers what a recording holds, at its own pace times `speed`, with new host times and a new epoch.
+    """Delivers the frames of a recording at `speed` times real time, with new host times and epochs.
 
-    Host times keep their distances (divided by `speed`) and begin with now; sequence numbers and the device's own ticks
-    stay. Nothing is dropped: a replay that cannot keep up delivers late.
+    Host times keep their differences (divided by `speed`) and start now; sequence numbers and device ticks are
+    unchanged. Nothing is dropped: a replay that falls behind delivers late.
 
     Args:
         uri: the address that opened it.
-        recording: what to play.
-        speed: factor on the pace.
-        loop: whether to begin anew at the end, in a new epoch.
+        recording: the recording.
+        speed: playback speed.
+        loop: restart at the end, in a new epoch.
         clock: CLOCK_MONOTONIC [ns].
-        wait: how to pass time; tests pass their own.
+        wait: waiting function, replaced in tests.
         delay_s: time before the first frame [s].
 
     Raises:
@@ -67,16 +67,16 @@ class ReplayDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and images or descriptions in the file that were `unpaired`."""
+        """`frames` delivered, and `unpaired` images or metadata in the file."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Nothing: the clocks of the recording are no more."""
+        """Empty: the recorded clocks are not running."""
         return {}
 
     def start(self, sink: Sink) -> None:
-        """Begins at the beginning; a device that is running goes on as it is.
+        """Starts at the beginning; no effect while it is running.
 
         Raises:
             DeviceError: the device was closed.
@@ -86,13 +86,13 @@ class ReplayDevice:
             self._thread.start()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again."""
+        """Stops delivery; the sink is not called after it returns."""
         self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
-        """Stops; the file is not kept open."""
+        """Stops; no file is held open."""
         self._gate.release()
         self.stop()
 
@@ -109,7 +109,7 @@ class ReplayDevice:
             self._gate.end("the recording ended")
 
     def _play(self, stop: threading.Event) -> bool:
-        """Plays the file once; tells whether to go on. Each epoch of the file becomes one of the device."""
+        """Plays the file once; returns True unless stopped. Each recorded epoch becomes one epoch of the device."""
         start_ns = self._clock()
         epochs: dict[int, int] = {}
         first_ns: int | None = None
@@ -130,7 +130,7 @@ class ReplayDevice:
 
 
 def _streams(recording: Recording, speed: float) -> tuple[StreamInfo, ...]:
-    """The streams as their first frames show them."""
+    """Stream properties, from the first frame of each stream."""
     first = dict(_first_frames(recording))
     for sensor, stream in recording.counts:
         if (sensor, stream) not in first:

@@ -1,4 +1,4 @@
-"""A recording as a sequence of frames and truths, without a clock: nothing dropped, the same result each time."""
+"""Offline reader of recordings: a deterministic sequence of frames and truths, without a clock or drops."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -25,23 +25,23 @@ _IMAGE = re.compile(r"/(?P<sensor>[^/]+)/(?P<stream>[^/]+)/image")
 class Recording:
     """An MCAP file that abs-service recorded.
 
-    A file whose writer was killed can be read up to where it breaks off; `truncated` tells.
+    A file whose writer was killed is read up to the truncation, and `truncated` is True.
 
     Attributes:
         path: of the file.
-        truncated: whether the file was never finished.
-        damaged_chunks: how many parts of an unfinished file were left out because they are damaged; a finished file
-            with such a part is refused when it is reached.
+        truncated: True if the file was not finished.
+        damaged_chunks: number of corrupt chunks skipped in an unfinished file; in a finished file, reading a corrupt
+            chunk raises.
         duration_s: from the first to the last message [s].
         wall_offset_ns: wall-clock time minus `t_host_ns` of the first frame [ns]; 0 if there is none.
         counts: number of images by (sensor, stream).
-        models: what the recording says about each sensor, by sensor name.
-        cameras: the camera model of each sensor, by sensor name.
-        config: the configuration that was in effect, as TOML; "" if none was attached.
-        unpaired: images and descriptions without their counterpart in what `frames` has read last.
+        models: recorded sensor models, by sensor name.
+        cameras: camera models, by sensor name.
+        config: the rig's configuration as TOML; "" if none was attached.
+        unpaired: number of images and metadata messages without counterpart in the last pass of `frames`.
 
     Raises:
-        RecordingError: no such file, not MCAP, or not a recording of abs-service.
+        RecordingError: missing file, not MCAP, or not a recording of abs-service.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,10 +59,10 @@ class Recording:
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
 
     def frames(self) -> Iterator[Frame | Truth]:
-        """Everything that was measured or simulated, in the order of its time.
+        """All frames and truths in order of time.
 
         Raises:
-            RecordingError: a damaged part, or a message that is no frame or truth.
+            RecordingError: a corrupt chunk, or a malformed frame or truth.
         """
         waiting: dict[tuple[str, int, int], bytes] = {}
         for topic, message in messages(
@@ -93,7 +93,7 @@ class Recording:
         return 0
 
     def _read_models(self) -> dict[str, SensorModel]:
-        """The first model of every sensor."""
+        """First sensor model of every sensor."""
         missing = {
             topic.name for topic in self._contents.topics.values() if topic.schema == MODEL_SCHEMA and topic.count
         }
@@ -117,7 +117,7 @@ class Recording:
 
 
 def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], int]:
-    """Number of images per stream; refuses files whose images nobody described."""
+    """Number of images per stream; raises if images have no FrameInfo."""
     names = {topic.name for topic in contents.topics.values()}
     counts: dict[tuple[str, str], int] = {}
     for topic in contents.topics.values():
