@@ -69,7 +69,7 @@ class Tracker:
         near = self._posterior.linearized_near(theta)
         covariance = sandwich(posterior_covariance(near.quadratic), near.sensed)
         own = along_normals(surface, self._own)
-        return covariance, propagated(near.moves, covariance) + own
+        return covariance, propagated(near.sparse_jacobian, covariance) + own
 
     def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.

@@ -21,7 +21,7 @@ from scipy.stats import chi2
 
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
-from abs_service.tracker.models.base import DeformationModel, Moves
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
@@ -69,7 +69,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
         sensed = _sensed(known, _prior(model, estimate, jacobian, 1 / simulation.rate_hz))
         within = [
             _inside(error, estimate.vertex_covariance),
-            _inside(error, propagated(Moves.full(jacobian), known)),
+            _inside(error, propagated(SparseJacobian.from_dense(jacobian), known)),
             _inside((sensed @ off)[None], (sensed @ known @ sensed.T)[None]),
             len(sensed),
             _inside(off[None], known[None]),
@@ -87,7 +87,7 @@ def _prior(
     """Curvature (dim, dim) of the priors alone at an estimate, for the derivatives (n, 3, dim) of its vertices."""
     settings = default_plan().priors
     surface = model.deform(estimate.theta[None])
-    parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, Moves.full(jacobian))
+    parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, SparseJacobian.from_dense(jacobian))
     stretch = stack(parts, jacobian.shape[2]).jacobian
     motion = np.diag(1 / (model.scales * settings.speed * interval_s))
     rows = np.concatenate([stretch, model.prior, motion])

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.pairing.images import BeamReading
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.terms.barrier import BarrierTerm
@@ -120,7 +120,7 @@ def test_it_is_one_sample_that_agrees_or_not_and_has_no_slope():
         assert (fit.visible, fit.hidden, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
         assert fit.mean_log_likelihood == pytest.approx(-NOISE.cost(interrupted)[1])
         assert np.isnan(fit.normalized_residual)
-    linear = barrier.linearize(surface, Moves.full(np.zeros((30, 3, 6))))
+    linear = barrier.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))
     assert linear.jacobian.shape == (0, 6)
     assert barrier.foreground().shape == (0, 3)
 

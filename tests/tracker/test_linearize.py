@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.image_decoders import BAYER_ORDERS
 from abs_service.pairing.images import ChannelImage, ColorImage
-from abs_service.tracker.models.base import Moves
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
@@ -51,7 +51,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
     model, term = Rigid(MESH), depth_term()
     theta = np.array([0, 0, 0, 2e-3, -1e-3, 3e-3])
     there = model.deform(theta[None])
-    linear = term.linearize(there, model.moves(theta))
+    linear = term.linearize(there, model.sparse_jacobian(theta))
     assert len(linear.residual) == len(MESH.vertices)
     for step in np.diag([0.02, 0.02, 0.1, 0.02, 0.04, 5e-3]):
         predicted = linear.jacobian @ step
@@ -64,7 +64,7 @@ def test_depth_rows_predict_what_the_plane_s_residuals_do():
 def test_depth_residuals_are_normalised_differences():
     model, term = Rigid(MESH), depth_term()
     nearer = np.array([0, 0, 0, 0, 0, -SIGMA])
-    linear = term.linearize(model.deform(nearer[None]), model.moves(nearer))
+    linear = term.linearize(model.deform(nearer[None]), model.sparse_jacobian(nearer))
     sight = MESH.vertices / np.linalg.norm(MESH.vertices, axis=1, keepdims=True)
     gap = SIGMA * NORMAL[2] / (sight @ NORMAL)  # along the ray, from a plane moved by σ along z
     np.testing.assert_allclose(linear.residual, gap / SIGMA, atol=0.04)
@@ -76,10 +76,10 @@ def test_the_chain_rule_is_a_product_of_matrices(seed, count):
     generator = np.random.default_rng(seed)
     group = np.sort(generator.integers(0, 3, 9)).astype(np.int32)
     parameters = np.stack([generator.permutation(7)[:4] for _ in range(3)])
-    moves = Moves(generator.standard_normal((9, 3, 4)), group, parameters, 7)
+    sparse_jacobian = SparseJacobian(generator.standard_normal((9, 3, 4)), group, parameters, 7)
     points, rows = generator.integers(0, 9, count), generator.standard_normal((count, 3))
-    expected = np.einsum("mi,mid->md", rows, moves.jacobian[points])
-    linear = PointLinearization(generator.standard_normal(count), rows, points, moves)
+    expected = np.einsum("mi,mid->md", rows, sparse_jacobian.dense[points])
+    linear = PointLinearization(generator.standard_normal(count), rows, points, sparse_jacobian)
     np.testing.assert_allclose(linear.jacobian, expected, rtol=0, atol=1e-12)
     parts, order = stack(linear.parts(), 7), np.argsort(group[points], kind="stable")
     np.testing.assert_array_equal(parts.residual, linear.residual[order])
@@ -112,7 +112,7 @@ def test_color_rows_predict_what_a_ramp_s_residuals_do():
     bounds = LIKELIHOOD.bounds(seen_by(noise))
     term = ColorTerm("color", sparse(COLOR, mesh), colors.astype(np.float32), noise, bounds)
     term.observe(ColorImage(ramp()), as_surface((mesh.vertices, mesh.normals)))
-    linear = term.linearize(model.deform(model.rest[None]), model.moves(model.rest))
+    linear = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     np.testing.assert_allclose(linear.residual, 0, atol=0.06)  # pixels are whole numbers
     for parameter, step in [(3, 0.02), (4, -0.02), (5, 0.1), (2, 0.15)]:
         theta = np.zeros(6)
@@ -161,7 +161,7 @@ def test_mosaic_rows_are_exact_within_a_pixel_whatever_the_picture(seed, order):
     term = ChannelTerm("bayer", synthesizer, looks, noise, Passive(), LIKELIHOOD.bounds(seen_by(noise)))
     picture = generator.uniform(100, 150, (COLOR.height, COLOR.width)).astype(np.float32)
     term.observe(ChannelImage(picture, BAYER_ORDERS[order]), model.deform(model.rest[None]))
-    linear = term.linearize(model.deform(model.rest[None]), model.moves(model.rest))
+    linear = term.linearize(model.deform(model.rest[None]), model.sparse_jacobian(model.rest))
     assert len(linear.residual) == len(mesh.vertices)
     for step in np.diag([1e-4, 1e-4, 1e-4, 2e-5, 2e-5, 1e-4]):
         there, back = (model.deform((model.rest + part)[None]) for part in (step, -step))
@@ -186,7 +186,7 @@ def test_what_costs_less_than_an_outlier_is_linearized_whatever_the_objective(ob
         float(found.cost(as_surface((mesh.vertices * (1 - (0.01 * deviations + by) / along), mesh.normals)))[0])
         for by in (-1e-4, 1e-4)
     ]
-    (linear,) = found.linearize(nearer, Moves.full((mesh.vertices / along)[:, :, None]))
+    (linear,) = found.linearize(nearer, SparseJacobian.from_dense((mesh.vertices / along)[:, :, None]))
     gradient = -(linear.jacobian.T @ linear.residual)[0]
     np.testing.assert_allclose((costs[1] - costs[0]) / 2e-4, gradient, rtol=0.02, atol=20.0)
 
@@ -199,7 +199,7 @@ def test_only_inliers_and_what_is_in_free_space_are_linearized():
     term = DepthTerm("tof", sparse(FINE, mesh), len(mesh.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((mesh.vertices, mesh.normals))
     term.observe(depth_image(distance), surface)
-    linear = term.linearize(surface, Moves.full(np.zeros((len(mesh.vertices), 3, 2))))
+    linear = term.linearize(surface, SparseJacobian.from_dense(np.zeros((len(mesh.vertices), 3, 2))))
     pixels = FINE.project(mesh.vertices) + 0.5
     inliers = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] >= 240))
     free = np.count_nonzero((pixels[:, 0] >= 320) & (pixels[:, 1] < 240))
@@ -217,7 +217,7 @@ def test_stretch_rows_are_derivatives_of_the_stretch_cost():
     model = Settings(control_points=(4, 4)).of_mesh(sheet(5, 6))
     prior = StretchPrior(model.mesh, 0.02)
     theta = model.rest + np.random.default_rng(2).normal(0, 3e-3, len(model.rest))
-    linear = stack(prior.linearize(model.deform(theta[None]), model.moves(theta)), len(theta))
+    linear = stack(prior.linearize(model.deform(theta[None]), model.sparse_jacobian(theta)), len(theta))
     assert 0.5 * np.sum(linear.residual**2) == pytest.approx(prior.cost(model.deform(theta[None]))[0], rel=1e-3)
     gradient, h = linear.jacobian.T @ linear.residual, 1e-4
     offsets = h * np.eye(len(theta))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
 
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Bounds
@@ -96,7 +96,7 @@ def test_a_sheet_that_slid_along_itself_is_drawn_back():
     for x, y in ((6e-3, 0.0), (-6e-3, 4e-3)):
         theta = np.array([0, 0, 0, x, y, 0])
         assert term.cost(model.deform(theta[None]))[0] > term.cost(model.deform(np.zeros((1, 6))))[0] + 10
-        linear = term.linearize(model.deform(theta[None]), model.moves(theta))
+        linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
         step = np.linalg.lstsq(linear.jacobian[:, 3:5], -linear.residual, rcond=None)[0]
         np.testing.assert_allclose(theta[3:5] + step, 0, atol=1.5e-3)
 
@@ -104,10 +104,11 @@ def test_a_sheet_that_slid_along_itself_is_drawn_back():
 def test_rows_predict_what_residuals_do():
     term, model = outline(picture()), Rigid(MESH)
     theta = np.array([0.01, -0.02, 0.03, 2e-3, 1e-3, 4e-3])
-    linear = term.linearize(model.deform(theta[None]), model.moves(theta))
+    linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
     for step in np.diag([1e-3, 1e-3, 1e-3, 2e-4, 2e-4, 1e-3]):
         ahead, behind = (
-            term.linearize(model.deform((theta + part)[None]), model.moves(theta)).residual for part in (step, -step)
+            term.linearize(model.deform((theta + part)[None]), model.sparse_jacobian(theta)).residual
+            for part in (step, -step)
         )
         error = (ahead - behind) / 2 - linear.jacobian @ step
         assert np.median(np.abs(error)) < 0.02 * np.abs(linear.jacobian @ step).max()
@@ -130,7 +131,9 @@ def test_what_hides_the_rim_says_nothing_about_it():
     hand[:, columns] = 0.7
     hole[:, columns] = np.nan
     for distance in (hand, hole):
-        linear = outline(distance).linearize(moved(MESH, 0.0), Moves.full(np.zeros((len(MESH.vertices), 3, 1))))
+        linear = outline(distance).linearize(
+            moved(MESH, 0.0), SparseJacobian.from_dense(np.zeros((len(MESH.vertices), 3, 1)))
+        )
         x = CAMERA.project(MESH.vertices[Rim.of(MESH).outer])[:, 0]
         assert len(linear.residual) < np.count_nonzero(x < 70) + 3
         assert len(linear.residual) > 0.8 * np.count_nonzero(x < 70)

@@ -14,7 +14,7 @@ from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs, posed
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.posed import GAUGE_M, Posed
 from abs_service.tracker.models.rigid import Rigid
@@ -93,8 +93,8 @@ class Waves:
         result[:, 2] = np.sin(np.outer(self.mesh.vertices[:, 0], [40.0, 60.0]))
         return result
 
-    def moves(self, theta: np.ndarray) -> Moves:
-        return Moves.full(self.jacobian(theta))
+    def sparse_jacobian(self, theta: np.ndarray) -> SparseJacobian:
+        return SparseJacobian.from_dense(self.jacobian(theta))
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     motion.predict(0)
     jacobian = MODEL.jacobian(MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm
-    parts = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), MODEL.moves(MODEL.rest))
+    parts = StretchPrior(MODEL.mesh, 0.02).linearize(MODEL.deform(MODEL.rest[None]), MODEL.sparse_jacobian(MODEL.rest))
     stretch = stack(parts, 54).jacobian
     rows = np.concatenate([measured, stretch, MODEL.prior, motion.linearize(MODEL.rest).jacobian])
     metric = search_metric(gauss_newton([Linearization(np.zeros(len(rows)), rows)], 54))

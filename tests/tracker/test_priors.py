@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.models.base import Moves
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.priors import (
     FIRST_INTERVAL_S,
     LONGEST_INTERVAL_S,
@@ -66,14 +66,16 @@ def test_stretch_rows_are_the_derivatives_of_the_edges_lengths(seed):
     generator = np.random.default_rng(seed)
     mesh, group = sheet(4, 5), np.sort(generator.integers(0, 3, 20)).astype(np.int32)
     parameters = np.stack([generator.permutation(7)[:4] for _ in range(3)])
-    moves = Moves(generator.standard_normal((20, 3, 4)), group, parameters, 7)
+    sparse_jacobian = SparseJacobian(generator.standard_normal((20, 3, 4)), group, parameters, 7)
     moved = mesh.vertices + generator.normal(0, 5e-3, mesh.vertices.shape)
     surface = as_surface((moved, mesh.normals))
-    linear = stack(StretchPrior(mesh, 0.02).linearize(surface, moves), 7)
+    linear = stack(StretchPrior(mesh, 0.02).linearize(surface, sparse_jacobian), 7)
     (i, j), now = mesh.edges.T, surface.vertices[0].T.astype(float)
     rest = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
     length = np.linalg.norm(now[i] - now[j], axis=1)
-    slopes = np.einsum("ei,eid->ed", (now[i] - now[j]) / length[:, None], moves.jacobian[i] - moves.jacobian[j])
+    slopes = np.einsum(
+        "ei,eid->ed", (now[i] - now[j]) / length[:, None], sparse_jacobian.dense[i] - sparse_jacobian.dense[j]
+    )
     order = np.argsort(np.where(group[i] == group[j], group[i], 3), kind="stable")
     np.testing.assert_allclose(linear.residual, ((length / rest - 1) / 0.02)[order], rtol=0, atol=1e-4)
     np.testing.assert_allclose(linear.jacobian, (slopes / rest[:, None] / 0.02)[order], rtol=1e-5, atol=1e-2)

@@ -57,7 +57,7 @@ def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) ->
     """Derivative of the cost by a parameter of the pose, numerically and as the linearisation says."""
     offset = step * np.eye(6)[parameter]
     ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
-    linear = term.linearize(model.deform(theta[None]), model.moves(theta))
+    linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
     return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
 
 

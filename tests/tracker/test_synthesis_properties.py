@@ -114,7 +114,7 @@ def slopes(term: ChannelTerm, parameter: int) -> tuple[float, float]:
     theta = 0.01 * np.eye(6)[parameter]
     offset = step * np.eye(6)[parameter]
     ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
-    linear = term.linearize(model.deform(theta[None]), model.moves(theta))
+    linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
     return (ahead - behind) / (2 * step), float(linear.jacobian[:, parameter] @ linear.residual)
 
 

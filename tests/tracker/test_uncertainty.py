@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.models import nurbs
-from abs_service.tracker.models.base import Moves
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated, remaining, sandwich
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
@@ -26,7 +26,7 @@ def test_vertices_of_a_linear_model_scatter_as_their_covariance_says(seed):
     rows = generator.standard_normal((12, 4))
     covariance = posterior_covariance(gauss_newton([Linearization(np.zeros(12), rows)], 4))
     jacobian = generator.standard_normal((5, 3, 4))
-    found = propagated(Moves.full(jacobian), covariance)
+    found = propagated(SparseJacobian.from_dense(jacobian), covariance)
     solutions = jacobian @ np.linalg.pinv(rows)  # what unit noise of every measurement does to a vertex
     np.testing.assert_allclose(found, solutions @ solutions.transpose(0, 2, 1), rtol=1e-6, atol=1e-9 * found.max())
 
@@ -95,8 +95,8 @@ def test_the_search_answers_each_vertex_s_own_error_as_it_answers_a_motion_of_it
     alone = np.zeros((n, 3, n))
     alone[np.arange(n), :, np.arange(n)] = offsets
     by_theta, by_offset = (
-        stack(posterior._objective.linearize(surface, moves), moves.dimension).jacobian
-        for moves in (model.moves(theta), Moves.full(alone))
+        stack(posterior._objective.linearize(surface, sparse_jacobian), sparse_jacobian.dimension).jacobian
+        for sparse_jacobian in (model.sparse_jacobian(theta), SparseJacobian.from_dense(alone))
     )
     expected = by_theta.T @ by_offset
     np.testing.assert_allclose(posterior.answers(theta, offsets), expected, atol=1e-9 * np.abs(expected).max())

@@ -204,8 +204,8 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     """The slope of what is linearised is that of the cost; depth itself says nothing about sliding along a plane."""
     term, model = term_before(board(STRAIGHT)), Rigid(MESH)
     theta = np.array([0, 0, 0, x, 0, 0])
-    moves = model.moves(theta)
-    linear = term.linearize(model.deform(theta[None]), moves)
+    sparse_jacobian = model.sparse_jacobian(theta)
+    linear = term.linearize(model.deform(theta[None]), sparse_jacobian)
     ahead, behind = (
         np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)
     )
@@ -217,7 +217,7 @@ def test_the_search_is_told_the_way_back_from_free_space(x):
     assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
     within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
     measured = np.isfinite(term._residuals(term._view.synthesize(within))[2])
-    assert term.linearize(within, moves).residual.size == np.count_nonzero(measured)
+    assert term.linearize(within, sparse_jacobian).residual.size == np.count_nonzero(measured)
 
 
 def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():

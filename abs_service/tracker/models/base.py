@@ -26,14 +26,14 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moves:
-    """How points move with the parameters: all points of a group with the same few.
+class SparseJacobian:
+    """Jacobian of points with respect to theta, without the columns that are zero for a whole group of points.
 
     Attributes:
-        local: derivatives (n, 3, k) of the points by the k parameters of their group, contiguous.
-        group: group (n,) of every point.
-        parameters: parameters (groups, k) that move the points of each group.
-        dimension: number of all parameters.
+        local: derivatives (n, 3, k) of each point with respect to the k parameters of its group, contiguous.
+        group: index (n,) of each point's group.
+        parameters: indices (groups, k) of the parameters on which each group depends.
+        dimension: number of all parameters, dim.
     """
 
     local: NDArray[np.float64]
@@ -42,14 +42,14 @@ class Moves:
     dimension: int
 
     @classmethod
-    def full(cls, jacobian: NDArray[np.float64]) -> "Moves":
-        """Of points that all parameters move, with derivatives (n, 3, dim)."""
+    def from_dense(cls, jacobian: NDArray[np.float64]) -> "SparseJacobian":
+        """One group of all points, from a dense Jacobian (n, 3, dim)."""
         n, _, dimension = jacobian.shape
         return cls(np.ascontiguousarray(jacobian), np.zeros(n, np.int32), np.arange(dimension)[None], dimension)
 
     @property
-    def jacobian(self) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the points by all parameters."""
+    def dense(self) -> NDArray[np.float64]:
+        """The same as a dense array (n, 3, dim)."""
         result = np.zeros((len(self.local), 3, self.dimension))
         np.put_along_axis(result, self.parameters[self.group][:, None], self.local, axis=2)
         return result
@@ -80,9 +80,9 @@ class DeformationModel(Protocol):
         ...
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the vertices by the parameters at theta (dim,)."""
+        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
         ...
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
-        """The same, without what is zero everywhere."""
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
+        """The Jacobian of the vertices in sparse form, at theta (dim,)."""
         ...

@@ -11,7 +11,7 @@ from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.detection.rectangle_fit import find_sheet
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.fused_cost import Step, deforming
-from abs_service.tracker.models.base import BOARD, Moves, Surface
+from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
 from abs_service.tracker.models.parts import bends
 from abs_service.tracker.models.parts.bends import bend, roll, slopes
 from abs_service.tracker.models.parts.rigid_transform import place
@@ -131,9 +131,9 @@ class FlexPad:
         result[:, :, TRANSLATION] = np.eye(3)
         return result
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """As `jacobian`: every parameter moves every vertex."""
-        return Moves.full(self.jacobian(theta))
+        return SparseJacobian.from_dense(self.jacobian(theta))
 
 
 def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> NDArray[np.float64]:

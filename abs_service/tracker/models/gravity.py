@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.detection.strip_detection import Strip, find_strip
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.parts.arc import arc
 from calib import pose
 from calib.jit import kernel, prange
@@ -116,9 +116,9 @@ class Gravity:
         turning = pose.rotated_points_jacobian(theta[self.segments : self.segments + 3], arms)
         return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """As `jacobian`: every parameter moves every vertex."""
-        return Moves.full(self.jacobian(theta))
+        return SparseJacobian.from_dense(self.jacobian(theta))
 
     def _slopes(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Derivatives (segments, columns) of the columns' places along (real) and across (imaginary) the gripper's x.

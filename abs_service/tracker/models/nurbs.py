@@ -11,7 +11,7 @@ from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import BOARD, ModelError, Moves, Surface
+from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import binding, spline
 from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
@@ -131,13 +131,13 @@ class Nurbs:
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
-        return self.moves(theta).jacobian
+        return self.sparse_jacobian(theta).dense
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """The same: the control points of its knot span move a vertex."""
         local = np.empty((len(self._offset), 3, self._span_parameters.shape[1]))
         _moves(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, local)
-        return Moves(local, self._span, self._span_parameters, len(theta))
+        return SparseJacobian(local, self._span, self._span_parameters, len(theta))
 
 
 @kernel

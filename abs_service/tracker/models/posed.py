@@ -8,7 +8,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import Sighting
-from abs_service.tracker.models.base import DeformationModel, Moves, Surface
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from calib import pose
 from calib.jit import kernel, prange
 
@@ -78,19 +78,19 @@ class Posed:
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,): those of the pose, then the shape's, turned."""
-        return self.moves(theta).jacobian
+        return self.sparse_jacobian(theta).dense
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """The same: the pose moves every vertex, and what moves it in the shape."""
         R = pose.from_rotation_vector(theta[:3], (0, 0, 0))[:3, :3]
         turned = (self._shape.deform(theta[None, 6:]).vertices[0].T - self._centroid) @ R.T
-        shape = self._shape.moves(theta[6:])
+        shape = self._shape.sparse_jacobian(theta[6:])
         local = np.empty((len(turned), 3, 6 + shape.local.shape[2]))
         local[:, :, :3] = pose.rotated_points_jacobian(theta[:3], turned)
         local[:, :, 3:6] = np.eye(3)
         np.matmul(R, shape.local, out=local[:, :, 6:])
         posing = np.broadcast_to(np.arange(6), (len(shape.parameters), 6))
-        return Moves(local, shape.group, np.concatenate([posing, shape.parameters + 6], axis=1), len(theta))
+        return SparseJacobian(local, shape.group, np.concatenate([posing, shape.parameters + 6], axis=1), len(theta))
 
 
 def _gauge(shape: DeformationModel) -> NDArray[np.float64]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import Sighting
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import BOARD, Moves, Surface
+from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
 from calib import pose
 
 
@@ -66,6 +66,6 @@ class Rigid:
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
         return np.concatenate([pose.rotated_points_jacobian(theta[:3], turned), shifts], axis=2)
 
-    def moves(self, theta: NDArray[np.float64]) -> Moves:
+    def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
         """As `jacobian`: every parameter moves every vertex."""
-        return Moves.full(self.jacobian(theta))
+        return SparseJacobian.from_dense(self.jacobian(theta))

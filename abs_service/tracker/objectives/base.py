@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.fused_cost import Step, available, step_of
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import SensorFit, Term
 from abs_service.tracker.terms.linearization import Linear
@@ -31,12 +31,12 @@ class Objective(Protocol):
         """Cost (population,) of every deformed mesh; lower explains the measurements better."""
         ...
 
-    def linearize(self, surface: Surface, moves: Moves) -> list[Linear]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
         """Normalised residuals of a population of one, and their derivatives.
 
         Args:
             surface: the deformed mesh.
-            moves: how its vertices move with the parameters.
+            sparse_jacobian: derivative of the vertices with respect to theta.
         """
         ...
 
@@ -77,9 +77,9 @@ class TermSum:
             return None
         return steps[0][1] if len(self._active) == len(steps) == 1 else available(steps)
 
-    def linearize(self, surface: Surface, moves: Moves) -> list[Linear]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
         """All sensors' normalised residuals and their derivatives."""
-        return [term.linearize(surface, moves) for term in self._active]
+        return [term.linearize(surface, sparse_jacobian) for term in self._active]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
         """How every contributing sensor agrees with a population of one."""

@@ -22,7 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.curvature import add_at
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
@@ -47,13 +47,15 @@ def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> N
     return inverse + inverse @ excess @ inverse
 
 
-def propagated(moves: Moves, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """D Σ Dᵀ (n, 3, 3) of every vertex, for its derivatives D and the covariance Σ (dim, dim) of Θ."""
-    result = np.empty((len(moves.local), 3, 3))
-    for group, own in enumerate(moves.parameters):
-        vertices = np.flatnonzero(moves.group == group)
+    result = np.empty((len(sparse_jacobian.local), 3, 3))
+    for group, own in enumerate(sparse_jacobian.parameters):
+        vertices = np.flatnonzero(sparse_jacobian.group == group)
         in_a_row = vertices.size and vertices[-1] - vertices[0] == vertices.size - 1
-        local = moves.local[slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices]  # a slice copies nothing
+        local = sparse_jacobian.local[
+            slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices
+        ]  # a slice copies nothing
         # One product of matrices for all vertices: n small ones take several times as long.
         weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
         _multiply(weighted, local, vertices, result)

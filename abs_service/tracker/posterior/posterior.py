@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.fused_cost import Chain, Step, step_of
-from abs_service.tracker.models.base import DeformationModel, Moves, Surface
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton
 from abs_service.tracker.posterior.priors import MotionPrior, ShapePrior
@@ -28,13 +28,13 @@ class Linearized:
         theta: the parameters (dim,).
         quadratic: likelihood and priors.
         sensed: residuals of the sensors alone, and their derivatives.
-        moves: how the vertices move.
+        sparse_jacobian: derivative of the vertices with respect to theta.
     """
 
     theta: NDArray[np.float64]
     quadratic: Quadratic
     sensed: list[Linearization]
-    moves: Moves
+    sparse_jacobian: SparseJacobian
 
 
 class Posterior:
@@ -95,10 +95,10 @@ class Posterior:
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost near theta (dim,), by Gauss–Newton; asked again for the last theta, it answers at once."""
         if not (self._linearized and np.array_equal(self._linearized[0].theta, theta)):
-            surface, moves = self._model.deform(theta[None]), self._model.moves(theta)
-            sensed = [part for points in self._objective.linearize(surface, moves) for part in points.parts()]
-            quadratic = gauss_newton([*sensed, *self._priors(surface, moves, theta)], self.dimension)
-            self._linearized = [Linearized(theta, quadratic, sensed, moves)]
+            surface, sparse_jacobian = self._model.deform(theta[None]), self._model.sparse_jacobian(theta)
+            sensed = [part for points in self._objective.linearize(surface, sparse_jacobian) for part in points.parts()]
+            quadratic = gauss_newton([*sensed, *self._priors(surface, sparse_jacobian, theta)], self.dimension)
+            self._linearized = [Linearized(theta, quadratic, sensed, sparse_jacobian)]
         return self._linearized[0].quadratic
 
     def linearized_near(self, theta: NDArray[np.float64]) -> Linearized:
@@ -113,16 +113,18 @@ class Posterior:
     def answers(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
         """JᵀJE (dim, n) at theta (dim,): the sensors' derivatives by Θ, and by steps of single vertices (n, 3) [m]."""
         surface, each = self._model.deform(theta[None]), np.arange(len(offsets))
-        alone = Moves(np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each))
-        by_theta = self._objective.linearize(surface, self._model.moves(theta))
+        alone = SparseJacobian(
+            np.ascontiguousarray(offsets[:, :, None]), each.astype(np.int32), each[:, None], len(each)
+        )
+        by_theta = self._objective.linearize(surface, self._model.sparse_jacobian(theta))
         by_offset = self._objective.linearize(surface, alone)
         pairs = zip(by_offset, by_theta)
         return np.sum([one.transposed_times(other.jacobian, len(each)) for one, other in pairs], axis=0).T
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """The cost of the priors alone near theta (dim,): where the object may be, whatever the sensors say."""
-        surface, moves = self._model.deform(theta[None]), self._model.moves(theta)
-        return gauss_newton(self._priors(surface, moves, theta), self.dimension)
+        surface, sparse_jacobian = self._model.deform(theta[None]), self._model.sparse_jacobian(theta)
+        return gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
 
     def fits(self, theta: NDArray[np.float64]) -> tuple[SensorFit, ...]:
         """How every contributing sensor agrees with theta (dim,); the last theta's are remembered."""
@@ -142,9 +144,11 @@ class Posterior:
             chain = Chain(*steps)
             self._cost, self.judge = chain.cost, chain.judge
 
-    def _priors(self, surface: Surface, moves: Moves, theta: NDArray[np.float64]) -> list[Linearization]:
+    def _priors(
+        self, surface: Surface, sparse_jacobian: SparseJacobian, theta: NDArray[np.float64]
+    ) -> list[Linearization]:
         return [
-            *self._stretch.linearize(surface, moves),
+            *self._stretch.linearize(surface, sparse_jacobian),
             self._shape.linearize(theta),
             self._motion.linearize(theta),
         ]

@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import DeformationModel, Moves
+from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.curvature import gauss_newton
 from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
@@ -34,12 +34,12 @@ def laid_over(model: DeformationModel, last: NDArray[np.float64], points: NDArra
     stretch, shape = StretchPrior(model.mesh, _STRETCH), ShapePrior(model.rest, model.prior)
     tree = scipy.spatial.KDTree(thinned)
     for _ in range(_STEPS):
-        surface, moves = model.deform(theta[None]), model.moves(theta)
+        surface, sparse_jacobian = model.deform(theta[None]), model.sparse_jacobian(theta)
         vertices = surface.vertices[0].T.astype(np.float64)
         nearest = scipy.spatial.KDTree(vertices).query(thinned)[1]
         attracted = np.concatenate([np.arange(len(vertices)), nearest])
         targets = np.concatenate([thinned[tree.query(vertices)[1]], thinned])
-        rows = [_towards(vertices, moves, attracted, targets), *stretch.linearize(surface, moves)]
+        rows = [_towards(vertices, sparse_jacobian, attracted, targets), *stretch.linearize(surface, sparse_jacobian)]
         theta = _stepped(theta, [*rows, shape.linearize(theta)])
     return theta
 
@@ -68,17 +68,20 @@ def _reached(model: DeformationModel, theta: NDArray[np.float64], target: NDArra
     everywhere = np.arange(len(target))
     for _ in range(_STEPS):
         vertices = model.deform(theta[None]).vertices[0].T.astype(np.float64)
-        theta = _stepped(theta, [_towards(vertices, model.moves(theta), everywhere, target)])
+        theta = _stepped(theta, [_towards(vertices, model.sparse_jacobian(theta), everywhere, target)])
     return theta
 
 
 def _towards(
-    vertices: NDArray[np.float64], moves: Moves, which: NDArray[np.intp], targets: NDArray[np.float64]
+    vertices: NDArray[np.float64],
+    sparse_jacobian: SparseJacobian,
+    which: NDArray[np.intp],
+    targets: NDArray[np.float64],
 ) -> Linearization:
     """Rows that pull some vertices, each possibly often, to targets (m, 3)."""
     residual = (vertices[which] - targets) / _APART_M
-    jacobian = moves.jacobian[which] / _APART_M
-    return Linearization(residual.reshape(-1), jacobian.reshape(-1, moves.dimension))
+    jacobian = sparse_jacobian.dense[which] / _APART_M
+    return Linearization(residual.reshape(-1), jacobian.reshape(-1, sparse_jacobian.dimension))
 
 
 def _stepped(theta: NDArray[np.float64], rows: list[Linearization]) -> NDArray[np.float64]:

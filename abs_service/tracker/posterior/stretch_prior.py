@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.edge_runs import EdgeRuns
 from abs_service.tracker.terms.linearization import Linearization, split
 from calib.jit import kernel
@@ -29,18 +29,18 @@ class StretchPrior:
         """The same for one candidate of a chain."""
         return self._runs.step(0.5 * self._inverse_deviation**2)
 
-    def linearize(self, surface: Surface, moves: Moves) -> list[Linearization]:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linearization]:
         """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""
-        start = np.zeros(len(moves.parameters) + 2, np.int64)
-        _count_edges(self._edges, moves.group, start)
+        start = np.zeros(len(sparse_jacobian.parameters) + 2, np.int64)
+        _count_edges(self._edges, sparse_jacobian.group, start)
         within, residual = start[-2], np.empty(len(self._edges))
-        rows = np.empty((within, moves.local.shape[2]))
-        across = np.zeros((len(self._edges) - within, moves.dimension))
+        rows = np.empty((within, sparse_jacobian.local.shape[2]))
+        across = np.zeros((len(self._edges) - within, sparse_jacobian.dimension))
         scales = self._inverse_lengths * self._inverse_deviation
-        of_points = moves.local, moves.group, moves.parameters
+        of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
         edges = surface.vertices[0], self._edges, scales, self._inverse_deviation
         _stretch_rows(*edges, *of_points, start[:-1].copy(), residual, rows, across)
-        parts = split(residual[:within], rows, start[:-1], moves.parameters)
+        parts = split(residual[:within], rows, start[:-1], sparse_jacobian.parameters)
         return [*parts, Linearization(residual[within:], across)]
 
 
@@ -73,7 +73,7 @@ def _stretch_rows(
     Args:
         vertices, edges: (3, n) [m] and (edges, 2).
         scales, rest: per length at rest (edges,) [1/m], and what that makes of the length at rest.
-        local, group, parameters: as in `Moves`.
+        local, group, parameters: as in `SparseJacobian`.
         place: where the first edge within each group, and the first between groups, go.
         residual: (edges,).
         rows: of the edges within a group, by its parameters.

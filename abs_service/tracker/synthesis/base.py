@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.window import Window
 from calib.camera import Camera
 
@@ -79,7 +79,7 @@ class View(Protocol):
         """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
         ...
 
-    def follow(self, surface: Surface, moves: Moves) -> Moves:
+    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
         """How the samples of a population of one move, from how its vertices do."""
         ...
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, in_sight
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -130,9 +130,9 @@ class DenseView:
         samples, _ = self._render(surface)
         return np.einsum("mi,mi...->m...", samples.weights[0], values[self._faces[samples.face[0]]])
 
-    def follow(self, surface: Surface, moves: Moves) -> Moves:
+    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
         """As the vertices, interpolated."""
-        return Moves.full(self.spread(surface, moves.jacobian))
+        return SparseJacobian.from_dense(self.spread(surface, sparse_jacobian.dense))
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (population, n) of the vertices, interpolated at the samples (population, m)."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.attribute_gradients import LEVEL, Relief, Slopes, half_pixel, surroundings
 from abs_service.tracker.synthesis.base import Sight, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
@@ -130,9 +130,9 @@ class SparseView:
         """The values themselves: the samples are the vertices."""
         return values
 
-    def follow(self, surface: Surface, moves: Moves) -> Moves:
+    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
         """As the vertices."""
-        return moves
+        return sparse_jacobian
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import ModelError, Moves, Surface
+from abs_service.tracker.models.base import ModelError, SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.sparse import SparseView
 from abs_service.tracker.synthesis.window import WHOLE, Window
@@ -164,9 +164,9 @@ class _SharedView:
         """The values themselves: the samples are the vertices."""
         return values
 
-    def follow(self, surface: Surface, moves: Moves) -> Moves:
+    def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
         """As the vertices."""
-        return moves
+        return sparse_jacobian
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """The values themselves."""

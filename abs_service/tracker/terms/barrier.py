@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import BeamReading, Image
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import Bounds, SensorFit
 from abs_service.tracker.terms.linearization import PointLinearization
 from calib.camera import Camera
@@ -47,9 +47,9 @@ class BarrierTerm:
         """−log P(reading | does the mesh cross the beam) (population,)."""
         return self._costs[self._crossing(surface).astype(int)]
 
-    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Nothing: the cost is constant but for a step, which the search has to find."""
-        return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), moves)
+        return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), sparse_jacobian)
 
     def fit(self, surface: Surface) -> SensorFit:
         """One sample, which agrees or not."""

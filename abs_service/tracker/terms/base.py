@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import Image
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.linearization import Linear
 from calib.noise.fit.truncation import deviation_within
 
@@ -127,7 +127,7 @@ class Term(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def linearize(self, surface: Surface, moves: Moves) -> Linear:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linear:
         """The inliers' normalised residuals around a deformed mesh; arguments as in `Objective`."""
         ...
 

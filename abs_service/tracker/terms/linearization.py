@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.models.base import Moves
+from abs_service.tracker.models.base import SparseJacobian
 from calib.jit import kernel
 
 #: All parameters.
@@ -51,38 +51,53 @@ class PointLinearization:
         residual: (m,).
         rows: derivatives (m, 3) by the position of the point [1/m].
         points: which point (m,) that is.
-        moves: how the points move with the parameters.
+        sparse_jacobian: derivative of the points with respect to theta.
     """
 
     residual: NDArray[np.float64]
     rows: NDArray[np.float64]
     points: NDArray[np.int64]
-    moves: Moves
+    sparse_jacobian: SparseJacobian
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
         """Derivatives (m, dim) by all parameters, in the order of the residuals."""
-        order = np.argsort(self.moves.group[self.points], kind="stable")
-        result = np.empty((len(order), self.moves.dimension))
-        result[order] = stack(self.parts(), self.moves.dimension).jacobian
+        order = np.argsort(self.sparse_jacobian.group[self.points], kind="stable")
+        result = np.empty((len(order), self.sparse_jacobian.dimension))
+        result[order] = stack(self.parts(), self.sparse_jacobian.dimension).jacobian
         return result
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
         """Jᵀ times values (m, k) of the residuals (dimension, k), without making J."""
-        moves = self.moves
-        at_points, result = np.zeros((len(moves.local), 3, values.shape[1])), np.zeros((dimension, values.shape[1]))
+        sparse_jacobian = self.sparse_jacobian
+        at_points, result = (
+            np.zeros((len(sparse_jacobian.local), 3, values.shape[1])),
+            np.zeros((dimension, values.shape[1])),
+        )
         _gather(self.rows, self.points, values, at_points)
-        _transpose(at_points, moves.group, moves.parameters, moves.local, result)
+        _transpose(at_points, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, result)
         return result
 
     def parts(self) -> list[Linearization]:
         """The residuals by the parameters, by the chain rule; those of each group of points in one part."""
-        moves = self.moves
-        end = np.zeros(len(moves.parameters) + 1, np.int64)
-        _count(self.points, moves.group, end)
-        residual, jacobian = np.empty(len(self.residual)), np.empty((len(self.residual), moves.local.shape[2]))
-        _chain(self.residual, self.rows, self.points, moves.group, moves.local, end[:-1].copy(), residual, jacobian)
-        return split(residual, jacobian, end, moves.parameters)
+        sparse_jacobian = self.sparse_jacobian
+        end = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
+        _count(self.points, sparse_jacobian.group, end)
+        residual, jacobian = (
+            np.empty(len(self.residual)),
+            np.empty((len(self.residual), sparse_jacobian.local.shape[2])),
+        )
+        _chain(
+            self.residual,
+            self.rows,
+            self.points,
+            sparse_jacobian.group,
+            sparse_jacobian.local,
+            end[:-1].copy(),
+            residual,
+            jacobian,
+        )
+        return split(residual, jacobian, end, sparse_jacobian.parameters)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.fused_cost import Step, both
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
@@ -133,13 +133,13 @@ class DepthTerm:
         measured = Step(composed(judge, see=sight.see.kernel), (self._texture, *bounds, *sight.see.arguments))
         return both(measured, self._outline.step())
 
-    def linearize(self, surface: Surface, moves: Moves) -> Together:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
         """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""
-        samples, seen = self._view.follow(surface, moves), self._view.synthesize(surface)
+        samples, seen = self._view.follow(surface, sparse_jacobian), self._view.synthesize(surface)
         parts = (self._linearize_measured(surface, samples, seen), self._linearize_free(surface, samples, seen))
-        return Together((*parts, self._outline.linearize(surface, moves)), moves.dimension)
+        return Together((*parts, self._outline.linearize(surface, sparse_jacobian)), sparse_jacobian.dimension)
 
-    def _linearize_measured(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
+    def _linearize_measured(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         residual, inverse_deviation, cost = self._residuals(seen)
         use = np.flatnonzero(cost < self._bounds.outlier - self._bounds.inlier)
         vertices, normals = (
@@ -148,7 +148,7 @@ class DepthTerm:
         rows = depth_rows(vertices, normals, self._view.camera.center, use, inverse_deviation)
         return PointLinearization(residual[use], rows, use, samples)
 
-    def _linearize_free(self, surface: Surface, samples: Moves, seen: Synthesis) -> PointLinearization:
+    def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
 
         The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.fused_cost import NOTHING, Step
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
@@ -56,7 +56,7 @@ class Outline(Protocol):
         """The same for one candidate of a chain."""
         ...
 
-    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """Normalised residuals of a population of one and their derivatives, from how the vertices move."""
         ...
 
@@ -78,9 +78,9 @@ class Unknown:
         """Nothing."""
         return NOTHING
 
-    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """No rows."""
-        return Linearization(np.zeros(0), np.zeros((0, moves.dimension)))
+        return Linearization(np.zeros(0), np.zeros((0, sparse_jacobian.dimension)))
 
 
 class RimOutline:
@@ -127,7 +127,7 @@ class RimOutline:
         """The same for one candidate of a chain."""
         return Step(judge, (self._deviation, *self._arguments))
 
-    def linearize(self, surface: Surface, moves: Moves) -> Linearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """Residuals of what is near the outline, and their derivatives."""
         points, values, slopes = self._locate(surface)
         residual = values / self._deviation
@@ -135,8 +135,8 @@ class RimOutline:
         by_place = project_with_slopes(self._camera, points[use].astype(np.float64))[1]
         rows = np.einsum("vi,vij->vj", slopes[use] / self._deviation, by_place)
         ends = self._rim.outer[use], self._rim.inner[use], self._beyond[use]
-        jacobian = np.zeros((len(use), moves.dimension))
-        chain(rows, *ends, moves.group, moves.parameters, moves.local, jacobian)
+        jacobian = np.zeros((len(use), sparse_jacobian.dimension))
+        chain(rows, *ends, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, jacobian)
         return Linearization(residual[use], jacobian)
 
     @property

@@ -79,7 +79,7 @@ def chain(
     Args:
         rows: derivatives (k, 3) by these points.
         outer, inner, beyond: vertices and share (k,).
-        group, parameters, local: as in `Moves`.
+        group, parameters, local: as in `SparseJacobian`.
         jacobian: zeros before.
     """
     for k in range(rows.shape[0]):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ChannelImage, Image
 from abs_service.tracker.fused_cost import Step
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
@@ -120,7 +120,7 @@ class ChannelTerm:
         uniform = self._bounds.inlier + self._bounds.uniform
         return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
 
-    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of all but outliers, and how they change with the parameters.
 
         What light makes of a turning surface changes slower than its texture, and is left to the search.
@@ -130,7 +130,7 @@ class ChannelTerm:
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
         slopes = self._slopes(surface)[use] * inverse[use, None]
         rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices))[:, 0]
-        return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, moves))
+        return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, sparse_jacobian))
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""

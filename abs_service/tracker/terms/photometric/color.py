@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image
 from abs_service.tracker.fused_cost import Step
-from abs_service.tracker.models.base import Moves, Surface
+from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
@@ -95,7 +95,7 @@ class ColorTerm:
         uniform = self._bounds.inlier + self._bounds.uniform
         return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
 
-    def linearize(self, surface: Surface, moves: Moves) -> PointLinearization:
+    def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """Normalised residuals of all but outliers, three channels each, and how they change with the parameters."""
         residual, measured = self._residuals(surface)
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
@@ -103,7 +103,9 @@ class ColorTerm:
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
         rows = color_rows(self._image, self._view.camera, vertices) * inverse
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
-        return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, self._view.follow(surface, moves))
+        return PointLinearization(
+            residual[use].ravel(), rows.reshape(-1, 3), points, self._view.follow(surface, sparse_jacobian)
+        )
 
     def fit(self, surface: Surface) -> SensorFit:
         """How the sensor agrees with a population of one."""
