@@ -1,4 +1,4 @@
-"""What an address `simulated://scene?key=value&…` asks for; whatever is not understood is an error, never ignored."""
+"""Addresses `simulated://scene?key=value&…`; unknown keys and values are errors."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -19,7 +19,7 @@ from drivers.simulated.sensors.optics import BEAMS, OPTICS
 from drivers.simulated.shapes.printed import TARGETS
 from drivers.simulated.simulation import Simulation
 
-#: The keys, and what reads their values.
+#: Parsers of the values, by key.
 KEYS: Mapping[str, Callable[[str], Any]] = {
     "seed": values.number(int, 0, 2**32 - 1),
     "sensors": values.some_of([*OPTICS, *BEAMS]),
@@ -53,10 +53,10 @@ KEYS: Mapping[str, Callable[[str], Any]] = {
     **dict.fromkeys(OPTICS, values.size),
 }
 
-#: The scenes in which something is to be tracked.
+#: Scenes with a surface to track.
 MOVING = frozenset(SCENES) - {"wall"}
 
-#: The keys that mean something in some scenes only, and in which.
+#: Scenes of the keys that do not apply to all scenes.
 SCENES_OF: Mapping[str, frozenset[str]] = {
     "bend": frozenset({"sheet", "board", "pair"}),
     "texture": frozenset({"sheet", "pair"}),
@@ -77,40 +77,40 @@ SCENES_OF: Mapping[str, frozenset[str]] = {
 
 @dataclass(frozen=True)
 class Address:
-    """A simulated device as its address describes it; the fields are the address's keys.
+    """A parsed address; the fields are its keys.
 
     Attributes:
         scene: one of `SCENES`.
-        seed: of motion, texture and noise.
+        seed: random seed of motion, texture and noise.
         sensors: heads, of `OPTICS` and `BEAMS`.
-        sizes: width and height [px] of heads that differ from their default; in the address `color=640x480`.
+        sizes: image sizes [px] of heads that differ from the default; in the address `color=640x480`.
         rate: exposures per second [Hz].
-        noise: factor on all random errors; 0 leaves only what digits do.
+        noise: factor on all random errors; with 0 only quantisation remains.
         offset: mean offset of the time-of-flight head's distances [m].
-        wiggle: size of its periodic offset [m].
-        dark: its offset of dark surfaces, times the amplitude [m].
-        pattern: standard deviation of its pixels' own offsets [m].
-        bend: largest bend of the sheet from end to end [degrees].
-        speed: factor on the speed of all motion; with 0 nothing ever moves.
-        jitter_ms: standard deviation of the error of the frames' stamps [ms].
-        fault: what goes wrong and with which exposure that begins, `fault=stall@20` for example; see `faults.Fault`.
-        occluder: `hand` if a hand shall cross the view in front of what is tracked, else `none`.
-        turn: when everything to be tracked turns by 90° in a quarter of a second, and stays so [s].
-        leave: from when until when it is out of view [s]; in the address `leave=3,5`.
+        wiggle: amplitude of its periodic offset (wiggling error) [m].
+        dark: its amplitude-dependent offset, times the amplitude [m].
+        pattern: standard deviation of its fixed pattern noise [m].
+        bend: maximum bend of the sheet from end to end [degrees].
+        speed: factor on the speed of all motion; with 0 the scene is static.
+        jitter_ms: standard deviation of the timestamps' error [ms].
+        fault: injected fault and its first exposure, such as `fault=stall@20`; see `faults.Fault`.
+        occluder: `hand` if a hand crosses the view in front of the tracked surface, else `none`.
+        turn: time at which the tracked surfaces rotate by 90° within a quarter of a second, permanently [s].
+        leave: time interval in which they are out of view [s]; in the address `leave=3,5`.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
         distance: of the bare wall, along the rig's z axis [m].
-        reflectivity: of the bare wall, the same for all light.
+        reflectivity: of the bare wall, equal in all channels.
         tilt: of the bare wall, about the rig's y axis [degrees].
-        board: what is printed on the calibration board, one of `printed.TARGETS`.
-        hold: how long it is still in each pose [s].
-        reach: how far to the sides it is held: 1 is within the view of the time-of-flight head.
-        texture: of a sheet: `smooth`, or `fine`: a print with details of 1 to 3 px of a colour head of 640x480.
-        lens: distortion of all heads; `lens=-0.2,0.05` is a barrel's k1 and k2.
-        lens_model: what `lens` are coefficients of: `brown_conrady`, or `fisheye` with up to four.
-        order: of the Bayer head's filters, one of `ORDERS`.
-        blur: defocus of the Bayer head: deviation of a Gaussian [px].
-        crosstalk: share of what a pixel of the Bayer head collects that its four neighbours read.
+        board: pattern of the calibration board, one of `printed.TARGETS`.
+        hold: duration of each of its poses [s].
+        reach: lateral range of its poses; 1 is the field of view of the time-of-flight head.
+        texture: of a sheet: `smooth`, or `fine`, a print with details of 1 to 3 px in a colour head of 640x480.
+        lens: distortion coefficients of all heads; `lens=-0.2,0.05` is k1 and k2 of a barrel distortion.
+        lens_model: distortion model of `lens`: `brown_conrady`, or `fisheye` with up to four coefficients.
+        order: filter pattern of the Bayer head, one of `ORDERS`.
+        blur: defocus of the Bayer head: σ of a Gaussian [px].
+        crosstalk: fraction of a Bayer pixel's light that is measured by its four neighbours.
     """
 
     scene: str
@@ -146,10 +146,10 @@ class Address:
     crosstalk: float = 0.0
 
     def build(self) -> Simulation:
-        """The scene that the address describes.
+        """The simulation of this address.
 
         Raises:
-            AddressError: no such lens, or light from somewhere in an image cannot have come through it.
+            AddressError: invalid lens, or its distortion is not invertible in the image.
         """
         fine = self.texture == "fine"
         settings = SceneSettings(
@@ -195,10 +195,10 @@ class Address:
 
 
 def parse(uri: str) -> Address:
-    """Reads an address such as `simulated://sheet?seed=1&sensors=tof,color&color=640x480`.
+    """Parses an address such as `simulated://sheet?seed=1&sensors=tof,color&color=640x480`.
 
     Raises:
-        AddressError: unknown scene or key, a key that means nothing in the scene or is given twice, or a value outside
+        AddressError: unknown scene or key, a key that does not apply to the scene or is given twice, or a value outside
             its range; names all three.
     """
     parts = urlsplit(uri)

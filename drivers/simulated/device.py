@@ -1,4 +1,4 @@
-"""The simulated world as a device: paces its exposures by a clock and hands them to a sink."""
+"""Real-time simulated device: paces the exposures of a simulation by a clock."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -13,10 +13,10 @@ from drivers.contract.frame_gate import FrameGate
 from drivers.simulated.faults import Fault, FaultSchedule, corrupted
 from drivers.simulated.simulation import Simulation
 
-#: Waits until the event is set or so many seconds have passed; tells whether it is set.
+#: Waits until the event is set or the timeout [s] has passed; returns True if it is set.
 Wait = Callable[[threading.Event, float], bool]
 
-#: Exposures that wait for a program that is held up.
+#: Number of overdue exposures that are still delivered.
 BUFFERED = 3
 
 #: A device without a fault.
@@ -26,16 +26,16 @@ NO_FAULT = FaultSchedule()
 class SimulatedDevice:
     """Delivers exposure after exposure in real time.
 
-    Exposures that it falls behind with are delivered late, up to `BUFFERED` of them, as from the buffers of a real
-    camera. Beyond, all that are overdue are skipped and counted as `late`; their numbers are skipped, too. Nothing else
-    is ever dropped, unless the address asks for a fault.
+    Up to `BUFFERED` overdue exposures are delivered late, as from the buffers of a real camera. If more are overdue,
+    all of them are skipped, with their sequence numbers, and counted as `late`. Nothing else is dropped, except by an
+    injected fault.
 
     Args:
         uri: the address that describes the simulation.
-        simulation: what is seen.
+        simulation: scene and heads.
         clock: CLOCK_MONOTONIC [ns].
-        wait: how to pass time; tests pass their own.
-        fault_schedule: what goes wrong, and when.
+        wait: waiting function, replaced in tests.
+        fault_schedule: injected fault.
     """
 
     def __init__(
@@ -64,16 +64,16 @@ class SimulatedDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, exposures skipped because it was too `late` for them, and frames `lost` by a fault."""
+        """`frames` delivered, overdue exposures skipped (`late`), and frames `lost` by an injected fault."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Nothing: its clock is the host's."""
+        """Empty: the clock is the host's."""
         return {}
 
     def start(self, sink: Sink) -> None:
-        """Begins anew at exposure 0, in a new epoch; a device that is running goes on as it is.
+        """Restarts at exposure 0, in a new epoch; no effect while it is running.
 
         Raises:
             DeviceError: the device was closed.
@@ -83,19 +83,19 @@ class SimulatedDevice:
             self._thread.start()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again."""
+        """Stops delivery; the sink is not called after it returns."""
         self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
-        """Stops; there is nothing else to release."""
+        """Stops; there are no resources to release."""
         self._gate.release()
         self.stop()
 
     def _run(self, stop: threading.Event) -> None:
         try:
-            self._simulation.frames(0)  # compiles the kernels, which must not make the first exposures late
+            self._simulation.frames(0)  # compiles the kernels, which would delay the first exposures
             self._gate.report_state(DeviceState.STREAMING, "simulated exposures follow")
             self._stream(stop, self._gate.epoch)
         except Exception as error:

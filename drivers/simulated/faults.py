@@ -1,4 +1,4 @@
-"""What a simulated device does wrong on demand, so that whatever depends on devices can be tried on one that fails."""
+"""Fault injection: a simulated device that fails on demand, for tests of everything that uses devices."""
 
 import re
 from dataclasses import dataclass, replace
@@ -10,29 +10,29 @@ from drivers.contract.frame import Frame, Kind
 
 
 class Fault(StrEnum):
-    """A way to misbehave."""
+    """Kind of fault."""
 
     NONE = "none"
     DROP = "drop"  # every second exposure is lost
-    STALL = "stall"  # nothing comes any more, and nobody says so
-    UNPLUG = "unplug"  # the device is gone, and says so
-    WRONG_SIZE = "wrong_size"  # images lack a row
-    NAN = "nan"  # nothing is measured, in any pixel of a depth image
+    STALL = "stall"  # no more frames, without an error
+    UNPLUG = "unplug"  # the device reports that it was unplugged
+    WRONG_SIZE = "wrong_size"  # images lack one row
+    NAN = "nan"  # depth images without a valid pixel
 
 
-#: How many exposures a fault lasts that passes.
+#: Duration of a temporary fault [exposures].
 PASSING_FAULT_EXPOSURES = 10
 
 
 @dataclass(frozen=True)
 class FaultSchedule:
-    """What goes wrong, and from which exposure on."""
+    """A fault and its first exposure."""
 
     fault: Fault = Fault.NONE
     begin: int = 0
 
     def at(self, k: int) -> Fault:
-        """What is wrong at exposure `k`."""
+        """Fault that is active at exposure `k`."""
         if k < self.begin or (self.fault not in _PERMANENT and k >= self.begin + PASSING_FAULT_EXPOSURES):
             return Fault.NONE
         return Fault.NONE if self.fault == Fault.DROP and (k - self.begin) % 2 else self.fault
@@ -42,7 +42,7 @@ _PERMANENT = frozenset({Fault.STALL, Fault.UNPLUG})
 
 
 def corrupted(frame: Frame, fault: Fault) -> Frame:
-    """The frame as a device with a fault of its images delivers it."""
+    """The frame, corrupted by a fault that affects images."""
     if fault == Fault.WRONG_SIZE:
         return replace(frame, data=frame.data[:-1])
     if fault == Fault.NAN and frame.kind == Kind.DEPTH:
@@ -52,10 +52,10 @@ def corrupted(frame: Frame, fault: Fault) -> Frame:
 
 
 def read(text: str) -> FaultSchedule:
-    """Reads `stall@20`: a fault and the exposure with which it begins.
+    """Parses `stall@20`: a fault and its first exposure.
 
     Raises:
-        ValueError: says what the text must be.
+        ValueError: invalid text; names the expected format.
     """
     match = re.fullmatch(r"([a-z_]+)@(\d{1,9})", text)
     faults = sorted(fault.value for fault in Fault if fault != Fault.NONE)

@@ -1,4 +1,4 @@
-"""The simulated world without a clock: exposure k is a pure function of the seed and k."""
+"""Simulation without a clock: exposure k is a pure function of the seed and k."""
 
 import zlib
 from collections.abc import Mapping
@@ -14,15 +14,15 @@ from drivers.simulated.sensors.exposure import Exposure, Head
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A scene and the heads that look at it, all exposed at the same instants.
+    """A scene and the heads that observe it, exposed simultaneously.
 
     Attributes:
-        scene: what moves.
-        heads: who looks, by sensor name.
-        seed: of all noise.
+        scene: the scene.
+        heads: by sensor name.
+        seed: random seed of all noise.
         rate_hz: exposures per second.
-        jitter_ns: standard deviation of the error of the frames' stamps [ns].
-        truth_size: rows and columns of the material points in a `Truth`.
+        jitter_ns: standard deviation of the timestamps' error [ns].
+        truth_size: rows and columns of the grid of material points in a `Truth`.
     """
 
     scene: Scene
@@ -33,15 +33,15 @@ class Simulation:
     truth_size: tuple[int, int] = (21, 31)
 
     def time_ns(self, k: int) -> int:
-        """When exposure `k` happens [ns after exposure 0]."""
+        """Time of exposure `k` since exposure 0 [ns]."""
         return round(k * 1e9 / self.rate_hz)
 
     def expose(self, k: int) -> tuple[list[Frame], Truth]:
-        """The frames of all heads at exposure `k`, and the truth about the first surface; see `frames` and `truths`."""
+        """Frames of all heads at exposure `k`, and ground truth of the first surface; see `frames` and `truths`."""
         return self.frames(k), self.truths(k)[0]
 
     def frames(self, k: int) -> list[Frame]:
-        """The frames of all heads at exposure `k`; times count from exposure 0."""
+        """Frames of all heads at exposure `k`; times are relative to exposure 0."""
         t_ns = self.time_ns(k)
         moment = self.scene.at(t_ns * 1e-9)
         frames: list[Frame] = []
@@ -53,7 +53,7 @@ class Simulation:
         return frames
 
     def truths(self, k: int) -> list[Truth]:
-        """The truth about every surface at exposure `k`."""
+        """Ground truth of every surface at exposure `k`."""
         t_ns = self.time_ns(k)
         surfaces = self.scene.at(t_ns * 1e-9).surfaces
         return [Truth(k, t_ns, s.grid(*self.truth_size).astype(np.float32), i) for i, s in enumerate(surfaces)]

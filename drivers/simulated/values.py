@@ -1,4 +1,4 @@
-"""Readers of an address's values: what a text means, or a ValueError that says what it must be."""
+"""Parsers of an address's values; they raise a ValueError that names what is allowed."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -6,12 +6,12 @@ from typing import TypeVar
 
 Number = TypeVar("Number", int, float)
 
-#: Least and greatest width and height of images [px].
+#: Minimum and maximum width and height of images [px].
 _LEAST, _GREATEST = 16, 2048
 
 
 def number(kind: type[Number], low: float, high: float) -> Callable[[str], Number]:
-    """Reads a number from `low` to `high`."""
+    """Parser of a number from `low` to `high`."""
 
     def read(text: str) -> Number:
         try:
@@ -26,7 +26,7 @@ def number(kind: type[Number], low: float, high: float) -> Callable[[str], Numbe
 
 
 def one_of(*words: str) -> Callable[[str], str]:
-    """Reads one of some words."""
+    """Parser of one of several words."""
 
     def read(text: str) -> str:
         if text not in words:
@@ -37,7 +37,7 @@ def one_of(*words: str) -> Callable[[str], str]:
 
 
 def some_of(words: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
-    """Reads a list of words with commas in between."""
+    """Parser of a comma-separated list of distinct words."""
     allowed = sorted(words)
 
     def read(text: str) -> tuple[str, ...]:
@@ -50,7 +50,7 @@ def some_of(words: Iterable[str]) -> Callable[[str], tuple[str, ...]]:
 
 
 def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, ...]]:
-    """Reads up to `most` numbers from `low` to `high` with commas in between."""
+    """Parser of up to `most` comma-separated numbers from `low` to `high`."""
     read_one = number(float, low, high)
 
     def read(text: str) -> tuple[float, ...]:
@@ -67,7 +67,7 @@ def numbers(most: int, low: float, high: float) -> Callable[[str], tuple[float, 
 
 
 def interval(low: float, high: float) -> Callable[[str], tuple[float, float]]:
-    """Reads two numbers from `low` to `high` with a comma in between, the second greater than the first."""
+    """Parser of two comma-separated numbers from `low` to `high`, the second greater than the first."""
     read_some = numbers(2, low, high)
 
     def read(text: str) -> tuple[float, float]:
@@ -83,7 +83,7 @@ def interval(low: float, high: float) -> Callable[[str], tuple[float, float]]:
 
 
 def size(text: str) -> tuple[int, int]:
-    """Reads width and height of an image [px], such as 640x480."""
+    """Parses width and height of an image [px], such as 640x480."""
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
     width, height = (int(number) for number in match.groups()) if match else (0, 0)
     if not (_LEAST <= width <= _GREATEST and _LEAST <= height <= _GREATEST):

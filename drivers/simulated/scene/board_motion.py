@@ -1,4 +1,4 @@
-"""How somebody shows a board to the sensors: held still, brought to another pose, held still again."""
+"""Motion of a hand-held calibration board: held still in a pose, moved to the next, held still again."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -10,28 +10,28 @@ from calib import pose
 from calib.pose import Pose
 from drivers.simulated.scene.motion import Placement, smooth_step
 
-#: Time from one pose to the next [s].
+#: Duration of the move from one pose to the next [s].
 MOVE_S = 1.0
-#: Distances from the rig's origin that a board is held at [m], and the largest tilt and roll [rad].
+#: Range of distances from the rig's origin [m], and maximum tilt and roll [rad].
 NEAREST, FARTHEST = 0.55, 0.95
 TILT, ROLL = np.deg2rad(40), np.deg2rad(20)
-#: Half the width and height that the time-of-flight head sees at a distance of 1 m, less a rim [m].
+#: Half width and height of the time-of-flight head's view at 1 m, less a margin [m].
 _SEEN = (0.37, 0.29)
 
 
 @dataclass(frozen=True)
 class BoardMotion:
-    """A flat board in one pose after another; see `drivers.simulated.scene.motion.Motion`.
+    """Motion of a flat board; see `drivers.simulated.scene.motion.Motion`.
 
-    The first pose faces the rig from 0.7 m. The others are drawn so that the board is turned by up to 40° about an axis
-    in its plane, rolled by up to 20°, and with `reach` 1 inside the view of the time-of-flight head if it faces it.
+    The first pose faces the rig from 0.7 m. The others are random: tilted by up to 40° about an axis in the board's
+    plane, rolled by up to 20°, and for `reach` 1 inside the view of the time-of-flight head when fronto-parallel.
 
     Attributes:
-        seed: of the poses.
+        seed: random seed of the poses.
         width, height: of the board [m].
-        hold_s: how long it is still in each pose [s].
-        reach: how far to the sides it is held: 1 is within the view of the time-of-flight head.
-        speed: factor on time; with 0 it stays in its first pose.
+        hold_s: duration of each pose [s].
+        reach: lateral range of the poses; 1 is the field of view of the time-of-flight head.
+        speed: factor on time; with 0 the board stays in its first pose.
     """
 
     seed: int
@@ -48,7 +48,7 @@ class BoardMotion:
         return Placement(_between(self.pose_at(int(number)), self.pose_at(int(number) + 1), part))
 
     def pose_at(self, number: int) -> Pose:
-        """The pose `T_rp` of the board's middle that is held after `number` moves."""
+        """Pose `T_rp` of the board's centre after `number` moves."""
         return _held(self, number)
 
 
@@ -67,7 +67,7 @@ def _held(board_motion: BoardMotion, number: int) -> Pose:
 
 
 def _between(first: Pose, second: Pose, part: float) -> Pose:
-    """A pose on the straight way from one to another, `part` from 0 to 1; the rotation is about one axis."""
+    """Interpolated pose, `part` from 0 to 1: linear translation, rotation about one axis."""
     turn = Rotation.from_matrix(second[:3, :3] @ first[:3, :3].T).as_rotvec()
     T = np.eye(4)
     T[:3, :3] = Rotation.from_rotvec(part * turn).as_matrix() @ first[:3, :3]

@@ -1,4 +1,4 @@
-"""What a scene is made of: bodies, solid at one moment, and the things that become a body at every moment."""
+"""Interfaces of a scene's parts: bodies at one moment, and moving bodies."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,11 +11,11 @@ from calib.pose import Pose
 
 @dataclass(frozen=True, eq=False)
 class RayImage:
-    """What some lines of sight see of one body, noise-free; every array covers the rays (height, width).
+    """Noise-free result of casting rays at one body; all arrays are (height, width).
 
     Attributes:
-        share: part of each pixel that the body fills, 0 to 1.
-        distance: radial distance of the body [m], NaN where the share is 0; so for the cosine.
+        share: coverage of each pixel by the body, 0 to 1.
+        distance: radial distance of the body [m], NaN where the share is 0; likewise for the cosine.
         cosine: of the angle of incidence on the body.
         albedo: red, green, blue and infra-red reflectivity, (height, width, 4); 0 where the share is 0.
     """
@@ -27,14 +27,14 @@ class RayImage:
 
 
 class Body(Protocol):
-    """Something solid at one moment."""
+    """A solid body at one moment."""
 
     def outline(self) -> NDArray[np.float64]:
-        """Rig points (…, 3) [m] around the body: in every image their pixels enclose it, but for 3 pixels."""
+        """Rig points (n, 3) [m] that bound the body: their projections enclose it up to 3 px."""
         ...
 
     def cast(self, rays: NDArray[np.float64], T_rs: Pose) -> RayImage:
-        """What a camera sees of the body.
+        """Casts a camera's rays at the body.
 
         Args:
             rays: unit directions of neighbouring pixels in the sensor frame, (height, width, 3), contiguous.
@@ -43,31 +43,32 @@ class Body(Protocol):
         ...
 
     def shadowed(self, points_s: NDArray[np.float64], light_s: NDArray[np.float64], T_rs: Pose) -> NDArray[np.bool_]:
-        """Whether the body keeps a light at `light_s` (3,) [m] from points (height, width, 3) [m].
+        """Shadow mask (height, width): True where the body blocks a light at `light_s` (3,) [m] from points [m].
 
-        Both are given in a frame s that `T_rs` maps to the rig. The body's own lit side is not in its shadow.
+        `points_s` is (height, width, 3). Both are in a frame s that `T_rs` maps to the rig. The body's lit side is not
+        shadowed by itself.
         """
         ...
 
 
 class SurfaceBody(Body, Protocol):
-    """A body that is a rectangle of material, however bent."""
+    """A body that is a bent rectangle of material."""
 
     def grid(self, rows: int, columns: int) -> NDArray[np.float64]:
-        """Rig coordinates (rows, columns, 3) [m] of a regular grid of material points that reaches the rims."""
+        """Rig coordinates (rows, columns, 3) [m] of a regular grid of material points, borders included."""
         ...
 
 
 class MovingBody(Protocol):
-    """What moves."""
+    """A moving body."""
 
     def at(self, t: float) -> Body:
-        """The thing at time `t` [s] after the start."""
+        """The body at time `t` [s] after the start."""
         ...
 
 
 class Surface(Protocol):
-    """What moves and is to be tracked."""
+    """A moving surface to track."""
 
     def at(self, t: float) -> SurfaceBody:
         """The surface at time `t` [s] after the start."""

@@ -1,4 +1,4 @@
-"""How a simulated surface bends and moves: smooth, seeded, at rest for the first second."""
+"""Motion and bending of simulated surfaces: smooth, random, at rest for the first second."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,22 +11,22 @@ from calib.pose import Pose
 
 
 def smooth_step(x: float) -> float:
-    """From 0 at 0 and below to 1 at 1 and above, with continuous velocity and acceleration."""
+    """Smooth step from 0 at x ≤ 0 to 1 at x ≥ 1, with continuous first and second derivative."""
     x = np.clip(x, 0.0, 1.0)
     return float(x**3 * (10 - 15 * x + 6 * x**2))
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a surface is and how it is bent at one moment.
+    """Pose and bend of a surface at one moment.
 
-    The surface is a flat rectangle rolled onto a cylinder: isometric, whatever the numbers are.
+    The surface is a flat rectangle rolled onto a cylinder: an isometry for all values.
 
     Attributes:
         T_rp: pose that maps the plane of the unbent sheet (x right, y down, z away from the viewer) to the rig [m].
         curvature: of the cylinder [1/m]; positive bends the ends away from the viewer, zero is flat.
-        direction: angle of the direction that is bent, in the sheet, from its x axis [rad].
-        offset: where along that direction the cylinder touches the plane, from the sheet's centre [m].
+        direction: angle of the bending direction in the sheet, from its x axis [rad].
+        offset: position along that direction at which the cylinder touches the plane, from the sheet's centre [m].
     """
 
     T_rp: Pose
@@ -36,7 +36,7 @@ class Placement:
 
     @property
     def T_rb(self) -> Pose:
-        """Pose that maps the bend frame to the rig: origin where the cylinder touches, x along the bent direction."""
+        """Pose that maps the bend frame to the rig: origin on the contact line, x along the bending direction."""
         T_pb = pose.from_rotation_vector((0, 0, self.direction), (0, 0, 0))
         T_pb[:3, 3] = T_pb[:3, 0] * self.offset
         return self.T_rp @ T_pb
@@ -44,15 +44,15 @@ class Placement:
 
 @dataclass(frozen=True)
 class Oscillation:
-    """Nine numbers in [-1, 1] that change smoothly; each is a sum of two sinusoids of unrelated frequencies.
+    """Nine smooth random signals in [-1, 1], each a sum of two sinusoids of incommensurable frequencies.
 
-    They are 0 during the first `hold_s` seconds, so that a tracker can find what is at rest, and grow to their full
-    size within `ramp_s`.
+    They are 0 for the first `hold_s` seconds, so that a tracker can detect the object at rest, and reach their full
+    amplitude within `ramp_s`.
 
     Attributes:
-        seed: of phases and frequencies.
-        speed: factor on all frequencies; with 0 nothing ever moves.
-        hold_s, ramp_s: duration of rest and of the growth [s].
+        seed: random seed of phases and frequencies.
+        speed: factor on all frequencies; with 0 the signals stay 0.
+            hold_s, ramp_s: duration of the rest and of the ramp [s].
     """
 
     seed: int
@@ -61,7 +61,7 @@ class Oscillation:
     ramp_s: float = 3.0
 
     def at(self, t: float) -> NDArray[np.float64]:
-        """The numbers (9,) at time `t` [s] after the start."""
+        """The signals (9,) at time `t` [s] after the start."""
         frequencies, phases = self._sinusoids
         return self._envelope(t) * (np.array([0.7, 0.3]) @ np.sin(frequencies * t + phases))
 
@@ -70,7 +70,7 @@ class Oscillation:
 
     @cached_property
     def _sinusoids(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Angular frequencies [rad/s] and phases [rad] of the slow and the fast part, (2, 9) each."""
+        """Angular frequencies [rad/s] and phases [rad] of the slow and the fast sinusoids, (2, 9) each."""
         generator = np.random.default_rng([self.seed, 2])
         frequencies = generator.uniform([[0.14], [0.27]], [[0.23], [0.40]], (2, 9))
         return 2 * np.pi * self.speed * frequencies, generator.uniform(0, 2 * np.pi, (2, 9))
@@ -78,18 +78,18 @@ class Oscillation:
 
 @dataclass(frozen=True)
 class Motion:
-    """Oscillations about a rest pose.
+    """Random oscillation about a rest pose.
 
     Attributes:
-        seed: of the oscillation, and of the direction that is bent.
+        seed: random seed of the oscillation and of the bending direction.
         rest: translation at rest [m], shape (3,); the sheet then faces the rig's origin.
-        translation: largest displacement along x, y, z [m].
-        rotation: largest rotation about x, y, z [rad].
-        bend: largest angle between the normals at two ends of the sheet that lie along the bent direction [rad].
+        translation: maximum displacement along x, y, z [m].
+        rotation: maximum rotation about x, y, z [rad].
+        bend: maximum angle between the normals at both ends of the sheet along the bending direction [rad].
         width, height: of the sheet [m].
-        turn: largest change of the bent direction [rad].
-        shift: largest distance of the contact line from the centre [m].
-        speed: factor on all frequencies; with 0 nothing ever moves.
+        turn: maximum change of the bending direction [rad].
+        shift: maximum distance of the contact line from the centre [m].
+            speed: factor on all frequencies; with 0 the surface is static.
     """
 
     seed: int

@@ -1,4 +1,4 @@
-"""A scene: surfaces to track, what may hide them, and the wall behind everything."""
+"""Scene: surfaces to track, occluders, and a wall behind them."""
 
 from dataclasses import dataclass, field
 
@@ -16,11 +16,11 @@ REST_Z, WALL_Z = 1.0, 1.6
 
 @dataclass(frozen=True, eq=False)
 class Moment:
-    """What is where at one moment.
+    """All bodies at one moment.
 
     Attributes:
-        surfaces: what is to be tracked.
-        occluders: what is in front of it.
+        surfaces: the tracked surfaces.
+            occluders: bodies in front of them.
     """
 
     surfaces: tuple[SurfaceBody, ...]
@@ -28,14 +28,13 @@ class Moment:
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """All bodies; whatever hides another comes after it."""
+        """All bodies, occluding ones after occluded ones."""
         return (*self.surfaces, *self.occluders)
 
     def hidden(self, points_r: NDArray[np.float64], eye_r: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Which of some rig points (rows, columns, 3) [m] a body keeps from an eye at `eye_r` (3,) [m].
+        """Occlusion mask of rig points (rows, columns, 3) [m] seen from `eye_r` (3,) [m].
 
-        A point on a surface is hidden by the surface's other parts as by everything else. Whether it lies in an image
-        is another question.
+        Self-occlusion of surfaces is included. The image borders are not considered.
         """
         hidden = np.zeros(points_r.shape[:-1], np.bool_)
         for body in self.bodies:
@@ -45,12 +44,12 @@ class Moment:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Things that move before a wall.
+    """Moving bodies in front of a wall.
 
     Attributes:
-        surfaces: what is to be tracked; none ever hides another.
+        surfaces: the tracked surfaces; they never occlude each other.
         wall: texture of the wall, centred on the rig's z axis.
-        occluders: what is always in front of the surfaces.
+        occluders: bodies that are always in front of the surfaces.
         T_rw: pose of the wall: its plane is z = 0 of frame w; by default z = `WALL_Z` of the rig.
     """
 
@@ -60,5 +59,5 @@ class Scene:
     T_rw: Pose = field(default_factory=lambda: pose.from_rotation_vector((0, 0, 0), (0, 0, WALL_Z)))
 
     def at(self, t: float) -> Moment:
-        """Where everything is at time `t` [s] after the start."""
+        """All bodies at time `t` [s] after the start."""
         return Moment(tuple(surface.at(t) for surface in self.surfaces), tuple(thing.at(t) for thing in self.occluders))

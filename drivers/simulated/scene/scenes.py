@@ -1,4 +1,4 @@
-"""The scenes there are, each before a textured wall; what an address chooses of them."""
+"""The available scenes and their settings."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,27 +17,27 @@ from drivers.simulated.shapes.printed import TARGETS, paper_size, print_texture
 from drivers.simulated.shapes.rectangle import Rectangle
 from drivers.simulated.shapes.strip import Strip
 
-#: What the wall's texture covers [m]; beyond it the wall has the colour of the texture's edge.
+#: Size of the wall's texture [m]; beyond it the edge texels are repeated.
 _WALL = (4.0, 3.0)
 
 
 @dataclass(frozen=True)
 class SceneSettings:
-    """What can be chosen of a scene.
+    """Settings of a scene.
 
     Attributes:
-        seed: of motion and texture.
-        bend: largest bend of a sheet from end to end [rad].
+        seed: random seed of motion and texture.
+        bend: maximum bend of a sheet from end to end [rad].
         speed: factor on the speed of all motion.
-        excursion: what happens to the surfaces on top of their motion.
-        hand: whether a hand crosses the view.
-        fine: whether what is printed on a sheet has details of the size of a colour camera's pixels.
+        excursion: displacement of the surfaces in addition to their motion.
+        hand: True if a hand crosses the view.
+        fine: True for a print with details of the size of a colour camera's pixels.
         stiffness: bending stiffness of the strip per width [N·m].
         weight: mass of the strip per area [kg/m²].
         distance, reflectivity, tilt: of the bare wall [m], [rad].
-        printed: what is printed on the calibration board, one of `TARGETS`.
-        hold_s: how long it is still in each pose [s].
-        reach: how far to the sides it is held.
+        printed: pattern of the calibration board, one of `TARGETS`.
+        hold_s: duration of each of its poses [s].
+        reach: lateral range of its poses.
     """
 
     seed: int = 1
@@ -76,7 +76,7 @@ def sheet(settings: SceneSettings) -> Scene:
 
 
 def board(settings: SceneSettings) -> Scene:
-    """A rigid checker board of 0.30 × 0.20 m, squares of 50 mm, that moves and turns; nothing bends it."""
+    """A rigid checkerboard of 0.30 × 0.20 m, squares of 50 mm, that moves and turns."""
     width, height = 0.30, 0.20
     motion = Motion(
         seed=settings.seed,
@@ -102,7 +102,7 @@ def strip(settings: SceneSettings) -> Scene:
 
 
 def pair(settings: SceneSettings) -> Scene:
-    """Two sheets of 0.20 × 0.15 m side by side, at rest 8 cm apart; each has a motion and a print of its own."""
+    """Two sheets of 0.20 × 0.15 m side by side, at rest 8 cm apart, with independent motion and print."""
     width, height, middle = 0.20, 0.15, 0.14
     motions = [
         Motion(
@@ -125,7 +125,7 @@ def pair(settings: SceneSettings) -> Scene:
 
 
 def wall(settings: SceneSettings) -> Scene:
-    """Nothing but a wall of one brightness, for static sequences: `settings.distance` away and turned about y."""
+    """A bare wall of uniform brightness, for static sequences: `settings.distance` away and turned about y."""
     T_rw = pose.from_rotation_vector((0, settings.tilt, 0), (0, 0, settings.distance))
     return Scene((), Texture(np.full((2, 2, 4), settings.reflectivity, np.float32), 1.0), T_rw=T_rw)
 
@@ -138,7 +138,7 @@ def target(settings: SceneSettings) -> Scene:
     return _scene(settings, Rectangle(width, height, board_motion, print_texture(board_), settings.excursion))
 
 
-#: The scenes by the name that an address calls them.
+#: Scenes by their name in an address.
 SCENES: Mapping[str, Callable[[SceneSettings], Scene]] = {
     "sheet": sheet,
     "board": board,
@@ -162,5 +162,5 @@ def _print(settings: SceneSettings, seed: int, width: float, height: float) -> T
 
 
 def _wall(seed: int) -> Texture:
-    """Paler than the sheet, and so dark in places that a time-of-flight sensor gets no return."""
+    """Wall texture with less contrast than the sheet, in places too dark for a time-of-flight return."""
     return smooth_pattern(seed + 1, *_WALL, (0.2, 0.05), 100.0, color=(0.3, 0.6), infrared=(0.12, 0.7))

@@ -1,4 +1,4 @@
-"""A rectangle rolled onto a cylinder: where its material points are."""
+"""Material points of a rectangle rolled onto a cylinder."""
 
 import numpy as np
 from numpy.typing import NDArray

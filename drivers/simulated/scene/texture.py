@@ -1,4 +1,4 @@
-"""What covers the simulated surfaces: colour and infra-red reflectivity over material coordinates."""
+"""Textures: colour and infra-red reflectivity over material coordinates."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """Reflectivities on a regular grid that is centred on a rectangle.
+    """Reflectivities on a regular grid, centred on a rectangle.
 
     Attributes:
         texels: (rows, columns, 4): red, green, blue and infra-red reflectivity, 0 to 1.
@@ -41,12 +41,12 @@ def smooth_pattern(
     color: Range,
     infrared: Range,
 ) -> Texture:
-    """A random pattern without edges: noise of several sizes, independent in every channel.
+    """Random pattern without edges: smoothed noise at several scales, independent in every channel.
 
     Args:
-        seed: of the noise.
-        width, height: of the rectangle that is covered [m].
-        scales: deviations of the Gaussians that smooth the noise [m]; each counts half as much as the one before.
+        seed: random seed.
+            width, height: of the rectangle [m].
+            scales: σ of the smoothing Gaussians [m]; each has half the weight of the previous one.
         density: texels per metre.
         color, infrared: lowest and highest reflectivity of red, green and blue, and of infra-red.
     """
@@ -65,21 +65,22 @@ def smooth_pattern(
 def fine_pattern(
     seed: int, width: float, height: float, color: Range, infrared: Range, density: float = 2500.0
 ) -> Texture:
-    """A print with details of the size of a pixel: like most prints it varies more in brightness than in hue.
+    """Fine print with details of the size of a pixel; like most prints it varies more in brightness than in hue.
 
-    Noise smoothed by σ changes between dark and bright every 4.4 σ on average. The two sizes of detail here do so every
-    4.4 and 2.2 mm; an image of 640 pixels that is as wide as the simulated colour head's has one pixel for 1.8 mm at a
-    distance of 1 m. Two thirds of a channel's variance are common to all channels, which is what demosaicing relies on.
+    Noise smoothed by σ alternates between dark and bright every 4.4 σ on average, so the two finest scales do so every
+    4.4 and 2.2 mm. For comparison, an image of 640 px with the simulated colour head's field of view has one pixel per
+    1.8 mm at a distance of 1 m. Two thirds of a channel's variance are common to all channels, which demosaicing relies
+    on.
 
     Args:
-        seed: of the noise.
-        width, height: of the rectangle that is covered [m].
-        color, infrared: lowest and highest reflectivity of red, green and blue, and of infra-red.
-        density: texels per metre.
+        seed: random seed.
+            width, height: of the rectangle [m].
+            color, infrared: minimum and maximum reflectivity of red, green and blue, and of infra-red.
+            density: texels per metre.
     """
     shape = (round(height * density) + 1, round(width * density) + 1)
     generator = np.random.default_rng([seed, 3])
-    planes = np.zeros((5, *shape), np.float32)  # what all channels share, and what each has for its own
+    planes = np.zeros((5, *shape), np.float32)  # common to all channels, and one per channel
     for scale, part in ((0.001, 1.0), (0.0005, 0.7), (0.01, 0.7)):
         for i in range(len(planes)):
             noise = gaussian_filter(generator.standard_normal(shape, np.float32), scale * density, mode="wrap")
@@ -91,7 +92,7 @@ def fine_pattern(
 
 
 def checkerboard(width: float, height: float, square: float, density: float = 1600.0) -> Texture:
-    """Squares of edge `square` [m] with reflectivities 0.25 and 0.85, blurred by 1 mm."""
+    """Checkerboard of squares of edge `square` [m] with reflectivities 0.25 and 0.85, blurred by 1 mm."""
     shape = (round(height * density) + 1, round(width * density) + 1)
     b, a = np.indices(shape) / density
     black = (np.floor(a / square) + np.floor(b / square)) % 2 == 0

@@ -1,4 +1,4 @@
-"""A light barrier: a lamp, a receiver, and whether something is between them."""
+"""Light barrier: a binary sensor with a lamp and a receiver."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from drivers.simulated.sensors.exposure import Exposure, stream_of
 
 @dataclass(frozen=True)
 class BarrierNoise:
-    """How often the receiver errs, independently in every exposure.
+    """Error rates of the receiver, independent in every exposure.
 
     Attributes:
         miss: probability that an interrupted beam is reported as free.
@@ -26,8 +26,8 @@ class BarrierNoise:
 class Barrier:
     """Stream `binary` (mono8, one pixel): 255 where the beam is interrupted, 0 where it is free.
 
-    The beam begins at the sensor's origin and ends `length_m` along its z axis. A camera model has no length: whoever
-    synthesises the barrier has to be told it, in the sensor's noise model.
+    The beam begins at the sensor's origin and ends `length_m` along its z axis. A camera model has no length, so the
+    sensor's noise model carries it for the synthesis.
 
     Attributes:
         length_m: from the lamp to the receiver [m].
@@ -42,7 +42,7 @@ class Barrier:
         self.streams = (stream_of(name, "binary", Kind.BINARY, "mono8", camera, rate_hz),)
 
     def interrupted(self, moment: Moment) -> bool:
-        """Whether a body is in the beam."""
+        """True if a body is in the beam."""
         receiver_r = self.camera.center + self.length_m * self.camera.T_rs[:3, 2]
         return bool(moment.hidden(receiver_r[None, None], self.camera.center)[0, 0])
 

@@ -1,4 +1,4 @@
-"""A colour head that delivers the mosaic its sensor measured: of each pixel the channel behind its own filter."""
+"""Colour head with raw Bayer images: each pixel has the channel of its own filter."""
 
 from dataclasses import dataclass
 
@@ -10,19 +10,19 @@ from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.color import SIGMA, Picture, digitize
 from drivers.simulated.sensors.exposure import Exposure, stream_of
 
-#: The arrangements of the filters there are: first row left and right, second row left and right.
+#: Bayer patterns: first row left and right, second row left and right.
 ORDERS = ("rggb", "bggr", "grbg", "gbrg")
 
 
 @dataclass(frozen=True)
 class Mosaic:
-    """What happens to light between the lens and the numbers.
+    """Image formation on the Bayer sensor.
 
     Attributes:
-        order: of the filters, one of `ORDERS`.
-        blur_px: defocus: standard deviation of the Gaussian that each point of the scene becomes before the filters.
-        crosstalk: share c of what a pixel collects that its four neighbours read, a quarter each. Where the scene is
-            smooth, red pixels then read (1 − c) R + c G, blue ones alike, and green ones (1 − c) G + c (R + B) / 2.
+        order: filter pattern, one of `ORDERS`.
+        blur_px: defocus: standard deviation of the Gaussian point spread function before the filters.
+        crosstalk: fraction c of a pixel's light that is measured by its four neighbours, a quarter each. In smooth
+            areas, red pixels then read (1 − c) R + c G, blue ones alike, and green ones (1 − c) G + c (R + B) / 2.
     """
 
     order: str = "grbg"
@@ -30,7 +30,7 @@ class Mosaic:
     crosstalk: float = 0.0
 
     def expose(self, levels: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What the pixels (height, width) collect of colours (height, width, 3)."""
+        """Mosaic (height, width) of a colour image (height, width, 3)."""
         if self.blur_px > 0:
             levels = np.asarray(gaussian_filter(levels, (self.blur_px, self.blur_px, 0), mode="nearest"), np.float32)
         mosaic = np.empty(levels.shape[:2], np.float32)
@@ -40,7 +40,7 @@ class Mosaic:
         return self._leak(mosaic) if self.crosstalk > 0 else mosaic
 
     def _leak(self, mosaic: NDArray[np.float32]) -> NDArray[np.float32]:
-        framed = np.pad(mosaic, 1, mode="reflect")  # across the border the filters go on alternating
+        framed = np.pad(mosaic, 1, mode="reflect")  # reflection continues the filter pattern across the border
         around = framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]
         return ((1 - self.crosstalk) * mosaic + 0.25 * self.crosstalk * around).astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""The scene in colour, and a colour head that delivers it."""
+"""Colour rendering of the scene, and a colour head."""
 
 from dataclasses import replace
 
@@ -18,20 +18,20 @@ from drivers.simulated.sensors.view import View
 #: Standard deviation of a pixel's channel, in levels of 256.
 SIGMA = 2.5
 
-#: How much darker a surface is that is seen edge-on than one that faces the camera.
+#: Relative darkening of a surface seen edge-on, compared with one that faces the camera.
 SHADING = 0.2
 
-#: Quantiles of the normal distribution at 65536 equal steps: looking one up takes a fifth of the time of drawing it.
+#: Quantiles of the normal distribution at 65536 equal steps: a table lookup takes a fifth of the time of a normal draw.
 _NORMAL = ndtri((np.arange(2**16) + 0.5) / 2**16).astype(np.float32)
 
 
 class Picture:
-    """The scene in colour, before noise and digits.
+    """Colour rendering of the scene, before noise and quantisation.
 
     Args:
-        camera: who looks.
-        scene: at what.
-        samples: lines of sight per pixel and axis, of which a pixel is the mean; one, through its centre, is enough
+        camera: the camera.
+            scene: the scene.
+        samples: rays per pixel and axis (supersampling); one, through the centre, is enough
             unless the texture has details of the size of a pixel.
     """
 
@@ -42,13 +42,13 @@ class Picture:
         self._wall = _levels(self._view.wall)
 
     def take(self, moment: Moment) -> NDArray[np.float32]:
-        """Levels of 256 (height, width, 3) at one moment; a pixel at a rim holds the mean of what it sees."""
+        """Image (height, width, 3) in levels of 256 at one moment, antialiased at rims."""
         levels = self._wall.copy()
         for sight in self._view.look(moment):
             levels[sight.region] += sight.share[..., None] * (_levels(sight) - levels[sight.region])
         if self._samples == 1:
             return levels
-        # Across whole pixels this is their mean, ten times as fast as NumPy's.
+        # For integer factors this is the mean, ten times as fast as NumPy's.
         size = (self.camera.width, self.camera.height)
         return cv2.resize(levels, size, interpolation=cv2.INTER_AREA).astype(np.float32, copy=False)
 
@@ -70,14 +70,14 @@ class Color:
 
 def digitize(levels: NDArray[np.float32], sigma: float, generator: np.random.Generator) -> NDArray[np.uint8]:
     """Adds noise of deviation `sigma` to levels of 256 and rounds to 8 bits."""
-    # What `generator.bytes` would give, in a quarter of the time.
+    # Same result as `generator.bytes`, in a quarter of the time.
     words = generator.integers(0, 2**64, size=-(-levels.size // 4), dtype=np.uint64)
     draws = words.astype("<u8", copy=False).view("<u2")[: levels.size]
     return _quantize(levels.reshape(-1), draws, np.float32(sigma) * _NORMAL).reshape(levels.shape)
 
 
 def _finer(camera: Camera, samples: int) -> Camera:
-    """The same camera with each pixel cut into `samples` × `samples`."""
+    """The camera with each pixel divided into `samples` × `samples`."""
     return replace(
         camera,
         width=samples * camera.width,
@@ -90,14 +90,14 @@ def _finer(camera: Camera, samples: int) -> Camera:
 
 
 def _levels(seen: RayImage) -> NDArray[np.float32]:
-    """Colours (height, width, 3) in levels of 256; 0 where nothing is seen."""
+    """Colours (height, width, 3) in levels of 256; 0 for a miss."""
     brightness = 255 * (1 - SHADING * (1 - np.nan_to_num(seen.cosine)))
     return (seen.albedo[..., :3] * brightness[..., None]).astype(np.float32, copy=False)
 
 
 @kernel
 def _quantize(levels: NDArray[np.float32], draws: NDArray[np.uint16], noise: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Rounds levels (n,) plus the noise (65536,) that draws (n,) choose."""
+    """Rounds levels (n,) plus noise (65536,) indexed by draws (n,)."""
     pixels = np.empty(levels.size, np.uint8)
     for i in range(levels.size):
         value = levels[i] + noise[draws[i]] + np.float32(0.5)

@@ -1,4 +1,4 @@
-"""One exposure: the moment that all heads of the simulated device see at once."""
+"""Interface of heads, and the data of one exposure."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,20 +11,20 @@ from drivers.contract.capabilities import ClockInfo, StreamInfo
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.scene.scene import Moment
 
-#: The simulated device's own clock; it counts from the first exposure.
+#: Clock of the simulated device; it counts from the first exposure.
 CLOCK = ClockInfo("simulated", 1e9)
 
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """What a head needs to take its frames.
+    """Input of a head for one exposure.
 
     Attributes:
         seq: number of the exposure.
-        moment: what is where.
-        generator: source of this head's noise in this exposure.
+        moment: all bodies.
+        generator: random generator of this head's noise in this exposure.
         t_ns: time since the first exposure [ns].
-        jitter_ns: what the stamp errs by [ns].
+        jitter_ns: error of the timestamp [ns].
         t_sigma_ns: standard deviation of that error [ns].
     """
 
@@ -44,7 +44,7 @@ class Exposure:
         geometry: Geometry = Geometry.NONE,
         invalid: float | None = None,
     ) -> Frame:
-        """A frame of this exposure; times count from the first exposure, as the device's ticks do."""
+        """A frame of this exposure; times and ticks are relative to the first exposure."""
         return Frame(
             sensor=stream.sensor,
             stream=stream.stream,
@@ -75,7 +75,7 @@ class Head(Protocol):
 
     @property
     def streams(self) -> tuple[StreamInfo, ...]:
-        """What it delivers."""
+        """Streams of the head."""
         ...
 
     def expose(self, exposure: Exposure) -> list[Frame]:

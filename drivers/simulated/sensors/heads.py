@@ -1,4 +1,4 @@
-"""The heads that an address asks for."""
+"""Makes heads from their names and settings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,16 +19,16 @@ from drivers.simulated.sensors.time_of_flight import TimeOfFlight, TimeOfFlightN
 
 @dataclass(frozen=True)
 class HeadFactory:
-    """What can be chosen of the heads.
+    """Settings of the heads, and the factory that makes them.
 
     Attributes:
-        sizes: width and height [px] of heads that differ from their default.
+        sizes: image sizes [px] of heads that differ from the default.
         rate_hz: exposures per second.
         noise: factor on all random errors.
         offset, wiggle, dark, pattern: offsets of the time-of-flight head; see `Address`.
-        lens: distortion of all heads that make images.
+        lens: distortion of all imaging heads.
         mosaic: of the Bayer head.
-        samples: lines of sight per pixel and axis of the colour and Bayer heads.
+        samples: rays per pixel and axis of the colour and Bayer heads.
     """
 
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
@@ -43,10 +43,10 @@ class HeadFactory:
     samples: int = 1
 
     def head(self, name: str, scene: Scene) -> Head:
-        """The head of a name in `OPTICS` or `BEAMS`, looking at a scene.
+        """The head with a name in `OPTICS` or `BEAMS`, observing a scene.
 
         Raises:
-            LensError: light from somewhere in the image cannot have come through the lens.
+            LensError: the distortion is not invertible in the image.
         """
         if name in BEAMS:
             beam, noise = BEAMS[name], BarrierNoise()

@@ -1,4 +1,4 @@
-"""An infra-red head: how bright the scene is in the sensor's own light."""
+"""Infra-red head with active illumination."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SIGMA = 50.0
 
 
 class Infrared:
-    """Stream `ir` (mono16): what of the sensor's own light comes back, as the time-of-flight head's amplitude is."""
+    """Stream `ir` (mono16): returned intensity of the sensor's own light, like the time-of-flight head's amplitude."""
 
     def __init__(self, name: str, camera: Camera, scene: Scene, rate_hz: float, sigma: float = SIGMA) -> None:
         self.camera = camera
@@ -24,7 +24,7 @@ class Infrared:
         self._wall = np.nan_to_num(returned(self._view.wall))
 
     def expose(self, exposure: Exposure) -> list[Frame]:
-        """Takes the infra-red image of one exposure; a pixel at a rim holds the mean of what it sees."""
+        """Takes the infra-red image of one exposure, antialiased at rims."""
         levels = self._wall.copy()
         for sight in self._view.look(exposure.moment):
             levels[sight.region] += sight.share * (np.nan_to_num(returned(sight)) - levels[sight.region])

@@ -1,4 +1,4 @@
-"""The geometry of the heads there are: where they look from, and how wide."""
+"""Geometry of the available heads: poses and fields of view."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ class Optics:
     position: tuple[float, float, float]
 
     def camera(self, width: int, height: int, lens: LensModel) -> Camera:
-        """A camera whose image has `width` pixels; without its lens it would see the same angle as any other width."""
+        """Camera of a given size; without distortion the field of view does not depend on the size."""
         focal = self.focal_ratio * width
         T_rs = pose.from_rotation_vector((0, 0, 0), self.position)
         return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, lens, T_rs)
@@ -27,14 +27,14 @@ class Optics:
 
 @dataclass(frozen=True)
 class Beam:
-    """Geometry of a light barrier: where its lamp and its receiver are in the rig [m]."""
+    """Geometry of a light barrier: positions of lamp and receiver in the rig [m]."""
 
     lamp: tuple[float, float, float]
     receiver: tuple[float, float, float]
 
     @property
     def camera(self) -> Camera:
-        """One pixel at the lamp that looks at the receiver."""
+        """Camera of one pixel at the lamp, oriented towards the receiver."""
         return Camera(1, 1, 1.0, 1.0, 0.0, 0.0, T_rs=pose.look_at(self.lamp, self.receiver))
 
     @property
@@ -43,7 +43,7 @@ class Beam:
         return math.dist(self.lamp, self.receiver)
 
 
-#: The heads that make images. The rig's frame is that of `tof`, whose geometry is that of a SwissRanger SR4000.
+#: Imaging heads. The rig's frame is that of `tof`, which has the geometry of a SwissRanger SR4000.
 OPTICS: Mapping[str, Optics] = {
     "tof": Optics(176, 144, 220 / 176, (0.0, 0.0, 0.0)),
     "color": Optics(320, 240, 275 / 320, (0.05, 0.0, 0.0)),
@@ -53,5 +53,5 @@ OPTICS: Mapping[str, Optics] = {
 }
 
 #: The light barriers. The beam crosses the view at 45° to the image planes and passes the right rim of a sheet of
-#: 0.30 m at rest with 3.5 mm to spare, so that it tells of motion to the side and of motion in depth alike.
+#: 0.30 m at rest with 3.5 mm clearance, so it is sensitive to lateral and to depth motion.
 BEAMS: Mapping[str, Beam] = {"barrier": Beam((0.455, 0.0, 0.70), (-0.145, 0.0, 1.30))}

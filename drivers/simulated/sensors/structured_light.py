@@ -1,4 +1,4 @@
-"""A structured-light head: z-depth whose random error and steps grow with the square of the distance."""
+"""Structured-light head: z-depth with random error and quantisation steps that grow with the squared distance."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ class StructuredLightNoise:
     """Errors of the disparity, in units of inverse depth.
 
     Attributes:
-        random: deviation of the inverse depth [1/m]; at z it is a deviation of random · z² (Khoshelham and Elberink,
+        random: σ of the inverse depth [1/m]; the σ of the depth is random · z² (Khoshelham and Elberink,
             Sensors 2012, for a Kinect v1).
-        step: the inverse depth comes in multiples of this [1/m].
-        least_cosine: surfaces met at a flatter angle return no pattern.
+        step: quantisation step of the inverse depth [1/m].
+        least_cosine: minimum cosine of incidence for a return.
     """
 
     random: float = 1.425e-3
@@ -31,11 +31,11 @@ class StructuredLightNoise:
 class StructuredLight:
     """Stream `depth` (z in mm, 16UC1, 0 without return).
 
-    There is no return where a rim crosses a pixel, where a body keeps the projector's light away (its shadow lies
-    beside it), and from surfaces that are nearly seen edge-on. The wall always returns.
+    No return where a rim crosses a pixel, in shadows of the projector, and from surfaces at grazing incidence. The
+    wall always returns.
 
     Attributes:
-        PROJECTOR_S: position of the projector in the sensor frame [m]; its distance is the baseline of a Kinect v1.
+        PROJECTOR_S: position of the projector in the sensor frame [m]; the baseline is that of a Kinect v1.
     """
 
     PROJECTOR_S = (0.075, 0.0, 0.0)
@@ -77,9 +77,9 @@ class StructuredLight:
         return 1 / (steps * self.noise.step)
 
     def _beside(self, region: tuple[slice, slice]) -> tuple[slice, slice]:
-        """The region and as many columns to its left as the shadow on anything behind a body can be wide.
+        """The region, extended to the left by the maximum width of the body's shadow.
 
-        A point at infinity behind a body at half a metre is the worst case.
+        Worst case: a body at half a metre in front of a point at infinity.
         """
         rows, columns = region
         width = int(np.ceil(self.PROJECTOR_S[0] * self.camera.fx / 0.5))

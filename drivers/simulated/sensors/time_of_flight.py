@@ -1,4 +1,4 @@
-"""A time-of-flight head: radial distance and amplitude, with errors that depend on the amplitude."""
+"""Time-of-flight head: radial distance and amplitude, with amplitude-dependent errors."""
 
 from dataclasses import dataclass
 
@@ -12,39 +12,38 @@ from drivers.simulated.sensors.active_light import returned
 from drivers.simulated.sensors.exposure import Exposure, stream_of
 from drivers.simulated.sensors.view import BodyImage, View
 
-#: Unambiguous range [m] and the steps that it is digitised in: a SwissRanger SR4000 at 30 MHz.
+#: Unambiguous range [m] and number of quantisation levels: a SwissRanger SR4000 at 30 MHz.
 RANGE_M, LEVELS = 5.0, 2**14
 
-#: Period of the wiggling error [m]: four to the unambiguous range, since the third and fifth harmonic cause it.
+#: Period of the wiggling error [m]: a quarter of the unambiguous range, since the third and fifth harmonic cause it.
 WIGGLE_M = RANGE_M / 4
 
-#: Seed of what distinguishes the pixels of this sensor.
+#: Seed of the fixed pattern noise.
 _MADE = 1
 
-#: σ of the default noise as a polynomial: row i belongs to the power i of the distance [m], column j to the power j of
-#: the amplitude. For amplitudes from 2000 to 10000 it errs by less than 0.3 mm; below, it is up to a quarter too small.
+#: Polynomial fit of σ of the default noise: row i is the power i of the distance [m], column j the power j of the
+#: amplitude. For amplitudes from 2000 to 10000 its error is below 0.3 mm; below, it is up to a quarter too small.
 SIGMA_POLYNOMIAL = ((1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14), (5.0e-4, 0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
 class TimeOfFlightNoise:
-    """The true law of the errors: at distance x [m] and amplitude a, what is measured is x + μ + σ · N(0, 1).
+    """True noise model: at distance x [m] and amplitude a, the measurement is x + μ + σ · N(0, 1).
 
-    μ(x, a) = mu_offset + mu_wiggle · sin(2π x / `WIGGLE_M`) + mu_amplitude / a, plus an offset that each pixel has for
-    itself, and σ(x, a) = sigma_offset + sigma_distance · x + sigma_amplitude / a. With the defaults μ is 0, and σ is 3
-    to 6.5 mm on the sheet and 4 to 25 mm on the wall. `SIGMA_POLYNOMIAL` is that σ as the tracker's noise model can
-    express it.
+    μ(x, a) = mu_offset + mu_wiggle · sin(2π x / `WIGGLE_M`) + mu_amplitude / a, plus fixed pattern noise, and σ(x, a) =
+    sigma_offset + sigma_distance · x + sigma_amplitude / a. With the defaults μ is 0, and σ is 3 to 6.5 mm on the sheet
+    and 4 to 25 mm on the wall. `SIGMA_POLYNOMIAL` approximates that σ in the tracker's noise model.
 
     Attributes:
         mu_offset: mean offset [m].
-        mu_wiggle: size of the periodic offset [m] ("wiggling": the modulated light is no sine).
+        mu_wiggle: amplitude of the periodic offset [m] ("wiggling": the modulation is not sinusoidal).
         mu_amplitude: mean offset times amplitude [m].
-        pattern: standard deviation of the pixels' own offsets [m], which never change ("fixed pattern").
-        sigma_offset: deviation of the brightest, closest return [m].
-        sigma_distance: growth of the deviation with the distance.
-        sigma_amplitude: deviation times amplitude [m].
+        pattern: standard deviation of the constant per-pixel offsets [m] (fixed pattern noise).
+        sigma_offset: σ of the brightest, closest return [m].
+            sigma_distance: growth of σ with the distance.
+            sigma_amplitude: σ times amplitude [m].
         amplitude: standard deviation of the measured amplitude.
-        least_amplitude: a weaker return is reported as none.
+        least_amplitude: minimum amplitude; weaker returns are invalid.
     """
 
     mu_offset: float = 0.0
@@ -58,22 +57,22 @@ class TimeOfFlightNoise:
     least_amplitude: float = 500.0
 
     def mu(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Mean offset [m] of the pixels on average, at distance `x` [m] and amplitude `a`."""
+        """Mean offset μ [m], averaged over pixels, at distance `x` [m] and amplitude `a`."""
         return self.mu_offset + self.mu_wiggle * np.sin(2 * np.pi / WIGGLE_M * x) + self.mu_amplitude / a
 
     def sigma(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.floating]:
-        """Deviation [m] at distance `x` [m] and amplitude `a`."""
+        """Standard deviation σ [m] at distance `x` [m] and amplitude `a`."""
         return self.sigma_offset + self.sigma_distance * x + self.sigma_amplitude / a
 
 
 class TimeOfFlight:
     """Streams `depth` (radial, 16UC1 in steps of `RANGE_M` / `LEVELS`) and `amplitude` (16UC1).
 
-    The amplitude is what of the sensor's light is `returned`. A pixel at a rim mixes what it sees of
-    a body and what is behind it by their amplitudes, which puts its distance between the two ("flying pixel").
+    The amplitude is the `returned` intensity. A pixel at a rim is the amplitude-weighted mean of body and background,
+    which puts its distance between the two ("flying pixel").
 
     Attributes:
-        pattern: the pixels' own offsets (height, width) [m]: those of the sensor, whatever the seed of a scene is.
+        pattern: fixed pattern noise (height, width) [m]; independent of the scene's seed.
     """
 
     def __init__(
@@ -109,7 +108,7 @@ class TimeOfFlight:
         ]
 
     def ideal(self, sights: tuple[BodyImage, ...]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Distance [m] and amplitude (height, width) before any noise; mixed at the rims, NaN where nothing is seen."""
+        """Noise-free distance [m] and amplitude (height, width); mixed at rims, NaN for a miss."""
         distance, amplitude = self._view.wall.distance.copy(), self._wall_amplitude.copy()
         for sight in sights:
             body = sight.share * returned(sight)

@@ -1,4 +1,4 @@
-"""What one camera sees of a scene: the wall once for all, the bodies before it anew for every exposure."""
+"""Ray casting of a scene for one camera: the wall once, the bodies in every exposure."""
 
 from dataclasses import dataclass
 
@@ -10,27 +10,27 @@ from calib.camera import Camera
 from drivers.simulated.scene.body import Body, RayImage
 from drivers.simulated.scene.scene import Moment, Scene
 
-#: What a body's outline may miss of it [px].
+#: Margin around a body's outline [px].
 _MARGIN = 3
 
 
 @dataclass(frozen=True, eq=False)
 class BodyImage(RayImage):
-    """What a region of an image sees of one body.
+    """Ray casting result of one body in an image region.
 
     Attributes:
-        region: rows and columns of the image; outside there is nothing of the body.
+        region: rows and columns of the image that contain the body.
     """
 
     region: tuple[slice, slice]
 
 
 class View:
-    """A scene through one camera.
+    """View of a scene from one camera.
 
     Attributes:
         rays: unit direction of every pixel in the sensor frame, (height, width, 3).
-        wall: what the camera would see without any body: a `BodyImage` of the whole image, its `share` 1.
+        wall: the wall without bodies: a `BodyImage` of the whole image with `share` 1.
     """
 
     def __init__(self, scene: Scene, camera: Camera) -> None:
@@ -39,7 +39,7 @@ class View:
         self.wall = self._look_at_wall(scene)
 
     def look(self, moment: Moment) -> tuple[BodyImage, ...]:
-        """What the camera sees of each body; whatever hides another comes after it."""
+        """Image of each body, occluding ones after occluded ones."""
         return tuple(self._look_at(body) for body in moment.bodies)
 
     def shadow(
@@ -49,11 +49,11 @@ class View:
         region: tuple[slice, slice],
         light_s: tuple[float, float, float],
     ) -> NDArray[np.bool_]:
-        """Where in a region (height, width) a body keeps a light from what the pixels see.
+        """Shadow mask (height, width) of an image region: True where a body blocks a light.
 
         Args:
-            body: what may be in between.
-            distance: radial distance that the pixels of the region see [m].
+            body: the shadowing body.
+            distance: radial distances in the region [m].
             region: rows and columns of the image.
             light_s: position of the light in the sensor frame [m].
         """
@@ -81,7 +81,7 @@ class View:
         )
 
     def _region(self, body: Body) -> tuple[slice, slice]:
-        """Rows and columns that contain a body, empty when it is out of sight."""
+        """Rows and columns that contain a body, empty if it is out of view."""
         pixels = self._camera.project(body.outline()).reshape(-1, 2)
         pixels = pixels[np.isfinite(pixels).all(axis=1)]
         if not pixels.size:

@@ -1,4 +1,4 @@
-"""Pixels at the rim of a body: what they see is the mean of many lines of sight."""
+"""Antialiasing: pixels at the rim of a body are the mean over many rays."""
 
 from collections.abc import Callable
 
@@ -6,23 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-#: Lines of sight per pixel and axis.
+#: Rays per pixel and axis.
 _SUBRAYS = 4
 
 Cast = Callable[[NDArray[np.float64]], NDArray[np.float32]]
 
 
 def cast_antialiased(cast: Cast, rays: NDArray[np.float64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What pixels see of a body: through their centres, and where the rim crosses a pixel the mean of all it sees.
+    """Casts a ray through each pixel centre, and supersamples pixels that the body's rim crosses.
 
-    Directions between pixels are interpolated from the neighbours', which is exact to second order in a pixel's size.
+    Directions between pixels are interpolated from the neighbours', accurate to second order in the pixel size.
 
     Args:
-        cast: maps unit directions (height, width, 3) to what they see, (channels, height, width), NaN for a miss.
+        cast: maps unit directions (height, width, 3) to results (channels, height, width), NaN for a miss.
         rays: unit directions of neighbouring pixels, (height, width, 3).
 
     Returns:
-        What the pixels see, (channels, height, width), and the part of each that the body fills, (height, width).
+        Results (channels, height, width), and the body's coverage of each pixel (height, width).
     """
     sight = cast(rays)
     hit = ~np.isnan(sight[0])

@@ -1,7 +1,7 @@
-"""Kernels that follow lines of sight to capsules: segments with a radius, of which a hand is made.
+"""Ray casting kernels for capsules (segments with a radius), which form a hand.
 
-Closed-form, and independent of every model a tracker may use. A capsule is a row (x, y, z of its first end, x, y, z
-from there to its other end, radius) [m], relative to the point where the lines of sight begin.
+Closed-form, and independent of the tracker's models. A capsule is a row (x, y, z of its first end, x, y, z of the
+vector to its other end, radius) [m], relative to the rays' origin.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: A capsule does not shadow its own lit side: what is nearer to its surface than this is not beyond it [m].
+#: Tolerance of the shadow test, so that a capsule does not shadow its own lit side [m].
 _CLEARANCE = 2e-3
 
 
@@ -17,12 +17,12 @@ _CLEARANCE = 2e-3
 def closest_approach(
     x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float
 ) -> tuple[float, float]:
-    """Where the line of sight in the unit direction (x, y, z) comes closest to the segment from a to a + b.
+    """Closest approach of the ray in unit direction (x, y, z) to the segment from a to a + b.
 
-    Seen along the line of sight the segment is one in the plane; its point nearest to the origin is s of its length.
+    In the projection along the ray, the segment's point closest to the origin is at the fraction s of its length.
 
     Returns:
-        (distance along the line of sight [m], distance of the line from the segment [m]).
+        (distance along the ray [m], distance of the ray from the segment [m]).
     """
     along_a, along_b = ax * x + ay * y + az * z, bx * x + by * y + bz * z
     across = bx * bx + by * by + bz * bz - along_b * along_b
@@ -37,9 +37,9 @@ def closest_approach(
 def intersect_capsule(
     x: float, y: float, z: float, ax: float, ay: float, az: float, bx: float, by: float, bz: float, radius: float
 ) -> float:
-    """Distance [m] at which the line of sight in the unit direction (x, y, z) enters a capsule; NaN if it misses.
+    """Distance [m] at which the ray in unit direction (x, y, z) enters a capsule; NaN for a miss.
 
-    First the infinite cylinder A λ² + 2 B λ + C = 0; where it is entered beyond an end, the ball at that end.
+    Intersection with the infinite cylinder A λ² + 2 B λ + C = 0; beyond an end, with the sphere at that end.
     """
     long = bx * bx + by * by + bz * bz
     along_a, along_b, ab = ax * x + ay * y + az * z, bx * x + by * y + bz * z, ax * bx + ay * by + az * bz
@@ -64,17 +64,18 @@ def intersect_capsule(
 def cast_capsules(
     rays: NDArray[np.float64], capsules: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], NDArray[np.int8]]:
-    """What every pixel sees of some capsules.
+    """Casts the ray of every pixel at capsules.
 
-    A rim covers as much of a pixel as a straight edge at its distance from the pixel's centre would.
+    The coverage of a pixel at a rim is that of a straight edge at the same distance from the pixel's centre.
 
     Args:
         rays: unit directions in the sensor frame, (height, width, 3).
         capsules: (n, 7), relative to the camera centre in the sensor frame [m].
 
     Returns:
-        (share, radial distance [m], cosine of incidence, number of the capsule), each (height, width); without a
-        capsule they are 0, NaN, NaN and -1. Where the centre misses, the distance is that of the nearest miss.
+        (share, radial distance [m], cosine of incidence, index of the capsule), each (height, width); 0, NaN, NaN and
+        -1
+            for a miss. If only the centre misses, the distance is that of the closest approach.
     """
     height, width = rays.shape[:2]
     share = np.zeros((height, width), np.float32)
@@ -114,7 +115,7 @@ def cast_capsules(
 def shadowed_by_capsules(
     points: NDArray[np.float64], light: NDArray[np.float64], capsules: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether capsules (n, 7), relative to the light, keep the light at `light` (3,) from points (height, width, 3)."""
+    """Shadow mask of points (height, width, 3): True where capsules (n, 7), relative to the light, block the light."""
     height, width = points.shape[:2]
     dark = np.zeros((height, width), np.bool_)
     for row in range(height):
@@ -133,7 +134,7 @@ def shadowed_by_capsules(
 
 @kernel
 def _cones(capsules: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A cone around each capsule: its axis (x, y, z) and the cosine of its half angle; most rays are in few of them."""
+    """Bounding cone of each capsule: axis (x, y, z) and cosine of the half angle."""
     cones = np.empty((len(capsules), 4))
     for i in range(len(capsules)):
         middle = capsules[i, 0:3] + 0.5 * capsules[i, 3:6]

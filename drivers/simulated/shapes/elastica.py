@@ -1,6 +1,6 @@
 """The heavy elastica: the exact shape of a thin elastic strip that is clamped at one end and sags under its weight.
 
-It is the planar equilibrium of an inextensible rod of linear bending stiffness, however far it bends (W. G. Bickley,
+Planar equilibrium of an inextensible rod of linear bending stiffness, for arbitrarily large bends (W. G. Bickley,
 "The heavy elastica", Philosophical Magazine 17, 1934). Let ψ be the angle between the strip and the vertical at the
 distance s from the clamp, B the bending stiffness and q the weight per length, both for the same width. The moment
 −B dψ/ds is that of all that hangs beyond s, so

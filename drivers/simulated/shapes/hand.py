@@ -1,4 +1,4 @@
-"""A hand on a forearm that crosses the view in front of what is tracked and hides a part of it."""
+"""Hand and forearm that cross the view and occlude part of the tracked surface."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ from calib.pose import Pose
 from drivers.simulated.scene.body import RayImage, Surface
 from drivers.simulated.shapes.capsules import cast_capsules, shadowed_by_capsules
 
-#: The hand's joints [m]: x to the side of the thumb, y from the fingers to the forearm, z towards what it covers.
+#: The hand's joints [m]: x towards the thumb, y from the fingers to the forearm, z towards the occluded surface.
 _WRIST, _ELBOW = (0.0, 0.065, 0.0), (0.0, 0.60, 0.0)
 _CARPUS = ((-0.018, 0.050, 0.0), (-0.006, 0.045, 0.0), (0.007, 0.045, 0.0), (0.019, 0.050, 0.0))
 _KNUCKLES = ((-0.036, -0.032, 0.0), (-0.013, -0.043, 0.0), (0.011, -0.045, 0.0), (0.034, -0.037, 0.0))
@@ -25,7 +25,7 @@ _SKIN = (0.78, 0.57, 0.47, 0.55)
 
 
 def _bones() -> NDArray[np.float64]:
-    """Capsules (n, 7) in the hand's frame: first end, the way to the other end, radius [m]."""
+    """Capsules (n, 7) in the hand's frame: first end, vector to the other end, radius [m]."""
     ends = [(_WRIST, (0.0, 0.13, 0.0), _NARROW), ((0.0, 0.13, 0.0), _ELBOW, _WIDE)]
     ends += [(carpus, knuckle, _PALM) for carpus, knuckle in zip(_CARPUS, _KNUCKLES)]
     ends += [(knuckle, tip, _FINGER) for knuckle, tip in zip(_KNUCKLES, _FINGERS)]
@@ -35,15 +35,14 @@ def _bones() -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """A hand that goes to and fro from one side of the view to the other, fingers up; the forearm comes from below.
+    """A hand that moves back and forth across the view, fingers up, with the forearm below.
 
-    It keeps its distance from the surfaces, as somebody's would who reaches across. During the first second it is out
-    of view, as it is between two passes. In the middle of a pass it hides about a quarter of a sheet of 0.30 × 0.20 m
-    from the rig's origin.
+    It keeps a distance from the surfaces. It is out of view during the first second and between two passes. In the
+    middle of a pass it occludes about a quarter of a sheet of 0.30 × 0.20 m from the rig's origin.
 
     Attributes:
-        seed: of direction, duration, height and slant of the passes.
-        surfaces: what it crosses without touching it.
+        seed: random seed of direction, duration, height and slant of the passes.
+        surfaces: the surfaces that it crosses without contact.
         speed: factor on the speed; 0 keeps it out of view.
     """
 
@@ -51,10 +50,10 @@ class Hand:
     surfaces: tuple[Surface, ...]
     speed: float = 1.0
 
-    #: Where it is when it is out of view [m from the middle]; when it begins to move [s].
+    #: Position out of view, from the middle [m]; start of the motion [s].
     AWAY, FIRST_S = 0.72, 1.0
 
-    #: How far its middle is below that of the surfaces, and before their nearest point [m].
+    #: Distance of its centre below that of the surfaces, and in front of their nearest point [m].
     BELOW, CLEARANCE = 0.073, 0.095
 
     def at(self, t: float) -> "PlacedHand":
@@ -70,13 +69,13 @@ class Hand:
         return PlacedHand(pose.from_rotation_vector((0, 0, slant + 0.05 * np.sin(2 * angle + phase)), position))
 
     def crossings(self, count: int) -> list[float]:
-        """The times [s] at which it is in the middle of its first passes."""
+        """Times [s] of the middle of its first passes."""
         period_s = self._path[1] / self.speed
         return [self.FIRST_S + period_s * (0.25 + 0.5 * i) for i in range(count)]
 
     @cached_property
     def _path(self) -> tuple[float, float, float, float, float]:
-        """Side it begins on, time there and back [s], height [m], slant [rad], phase of its small motions [rad]."""
+        """Initial side, period [s], height [m], slant [rad], phase of its small motions [rad]."""
         generator = np.random.default_rng([self.seed, 4])
         side = 1.0 if generator.random() < 0.5 else -1.0
         low, high = (13.0, -0.008, -0.12, 0.0), (15.0, 0.008, 0.12, 2 * np.pi)

@@ -1,4 +1,4 @@
-"""Calibration boards as the simulated device knows them: their print, and where they are."""
+"""Simulated calibration boards: their texture and ground-truth pose."""
 
 from collections.abc import Mapping
 
@@ -11,39 +11,39 @@ from calib.pose import Pose
 from drivers.simulated.scene.body import Surface
 from drivers.simulated.scene.texture import Texture
 
-#: The boards by the name that an address calls them; all about 0.36 × 0.24 m.
+#: Boards by their name in an address; all about 0.36 × 0.24 m.
 TARGETS: Mapping[str, Target] = {
     "chessboard": Chessboard(8, 5, 0.04),
     "charuco": Charuco(9, 6, 0.04, 0.03, "4x4_50"),
     "circles": Circles(8, 5, 0.04, 0.02),
 }
 
-#: Texels per metre, and the deviation of the blur [m] that stands for lenses: heads see points, not areas.
+#: Texels per metre, and σ of the blur [m] that models lenses, since heads sample points, not areas.
 _DENSITY, _BLUR = 2000.0, 0.0012
-#: Reflectivities of ink and paper_size, in all light: black ink is not black in infra-red.
+#: Reflectivities of ink and paper in all channels: black ink is not black in infra-red.
 _INK, _PAPER = 0.15, 0.85
 
 
 def print_texture(target: Target) -> Texture:
-    """The print with its white rim, centred on the paper_size."""
+    """Texture of a board with its white margin, centred on the paper."""
     white = gaussian_filter(raster(target, _DENSITY)[0], _BLUR * _DENSITY, mode="nearest")
     texels = np.repeat((_INK + (_PAPER - _INK) * white)[..., None], 4, axis=-1)
     return Texture(texels.astype(np.float32), _DENSITY)
 
 
 def paper_size(target: Target) -> tuple[float, float]:
-    """Width and height of the paper_size [m]."""
+    """Width and height of the paper [m]."""
     rows, columns = raster(target, _DENSITY)[0].shape
     return columns / _DENSITY, rows / _DENSITY
 
 
 def board_pose(surface: Surface, target: Target, t: float) -> Pose:
-    """The true `T_rb` of a board at time `t` [s]: its frame b is that of `calib.views`, r is the rig.
+    """Ground-truth pose `T_rb` of a board at time `t` [s]: its frame b is that of `calib.views`, r is the rig.
 
     Args:
         surface: of the scene `target`: `parse(uri).build().scene.surfaces[0]`.
-        target: what is print_texture on it, one of `TARGETS`.
-        t: after the first exposure; of exposure k it is k divided by the rate.
+        target: its pattern, one of `TARGETS`.
+        t: time since the first exposure [s]; exposure k is at k divided by the rate.
     """
     corners = surface.at(t).grid(2, 2)
     along, down = corners[0, 1] - corners[0, 0], corners[1, 0] - corners[0, 0]

@@ -1,7 +1,6 @@
-"""Kernels that follow lines of sight to the sheet: closed-form, and independent of every model a tracker may use.
+"""Ray casting kernels for a sheet on a cylinder: closed-form, and independent of the tracker's models.
 
-They share this file because a kernel's cached machine code is renewed when its own file changes, not when a kernel that
-it calls does.
+They share a file because Numba's cache of a kernel is invalidated by changes of its own file, not of its callees.
 """
 
 import numpy as np
@@ -15,7 +14,7 @@ _FLAT = 1e-6
 #: Sub-rays per pixel and axis where the sheet ends within a pixel.
 _SUBRAYS = 4
 
-#: A surface does not shadow itself across less than this [m].
+#: Tolerance of the shadow test, so that a surface does not shadow itself [m].
 _CLEARANCE = 2e-3
 
 
@@ -34,10 +33,10 @@ def intersect(
     half_width: float,
     half_height: float,
 ) -> tuple[float, float, float, float]:
-    """First point where a line of sight meets the sheet; all in the bend frame of the placement [m].
+    """First intersection of a ray with the sheet; all in the bend frame of the placement [m].
 
-    The cylinder κ(x² + z²) = 2z is a quadratic A λ² + 2 B λ + C = 0 in the distance λ along the ray. Its roots are
-    taken as q/A and C/q, so that the one that stays finite as κ → 0 becomes the plane's without a case distinction.
+    The cylinder κ(x² + z²) = 2z is a quadratic A λ² + 2 B λ + C = 0 in the distance λ along the ray. Its roots
+    are computed as q/A and C/q, so the one that stays finite as κ → 0 becomes the plane's without a case distinction.
     The normal at (x, z) is (−κx, 1 − κz).
 
     Returns:
@@ -69,7 +68,7 @@ def intersect(
 def cast(
     rays: NDArray[np.float64], T_bs: NDArray[np.float64], sheet: NDArray[np.float64]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """What the centre of every pixel sees of the sheet.
+    """Casts the ray of every pixel centre at the sheet.
 
     Args:
         rays: unit directions in the sensor frame, (height, width, 3).
@@ -78,7 +77,7 @@ def cast(
 
     Returns:
         sight: (4, height, width): radial distance [m], material a, b [m], cosine of incidence; NaN for a miss.
-        share: (height, width): part of the pixel that the sheet fills, here 0 or 1.
+            share: (height, width): coverage of the pixel by the sheet, here 0 or 1.
     """
     height, width = rays.shape[:2]
     sight = np.empty((4, height, width), np.float32)
@@ -101,10 +100,10 @@ def antialias_edges(
     sight: NDArray[np.float32],
     share: NDArray[np.float32],
 ) -> None:
-    """Replaces what `cast` found at the rim of the sheet by means over sub-rays, in place.
+    """Antialiases the result of `cast` at the rim of the sheet by means over sub-rays, in place.
 
-    Directions between pixels are interpolated from the neighbours', which is exact to second order in a pixel's size.
-    Written out in scalars: small arrays would take as long as all the rest.
+    Directions between pixels are interpolated from the neighbours', accurate to second order in the pixel size.
+    In scalars, because small arrays would take as long as all the rest.
     """
     height, width = rays.shape[:2]
     center = share.copy()
@@ -144,7 +143,7 @@ def antialias_edges(
 def shadowed(
     points_b: NDArray[np.float64], light_b: NDArray[np.float64], sheet: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
-    """Whether the sheet keeps the light at `light_b` (3,) from points (height, width, 3); all in the bend frame [m]."""
+    """Shadow mask: True where the sheet blocks `light_b` (3,) from points (height, width, 3), in the bend frame [m]."""
     height, width = points_b.shape[:2]
     dark = np.empty((height, width), np.bool_)
     curvature, cosine, sine, offset, half_width, half_height = sheet
@@ -165,7 +164,7 @@ def lookup(
 ) -> NDArray[np.float32]:
     """Bilinear samples (height, width, channels) of a texture (rows, columns, channels) at texel coordinates.
 
-    Coordinates (height, width) beyond the texture read its edge; NaN reads zero.
+    Coordinates (height, width) are clamped to the texture; NaN reads zero.
     """
     height, width = columns.shape
     channels = texture.shape[2]
@@ -190,7 +189,7 @@ def lookup(
 def _follow(
     x: float, y: float, z: float, T_bs: NDArray[np.float64], sheet: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
-    """Meets the sheet with the sensor's line of sight in direction (x, y, z); as `intersect`."""
+    """Intersects the sensor's ray in direction (x, y, z) with the sheet; as `intersect`."""
     return intersect(
         T_bs[0, 3],
         T_bs[1, 3],

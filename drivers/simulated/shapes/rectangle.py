@@ -15,12 +15,12 @@ from drivers.simulated.scene.surface import surface_points
 from drivers.simulated.scene.texture import Texture
 from drivers.simulated.shapes.raycast import antialias_edges, cast, shadowed
 
-#: The rectangle is found in images by a grid of this many points per side.
+#: Points per side of the grid that bounds the rectangle in images.
 _OUTLINE_POINTS = 13
 
 
 class Trajectory(Protocol):
-    """What says where a rectangle is, such as `drivers.simulated.scene.motion.Motion`."""
+    """Motion of a rectangle, such as `drivers.simulated.scene.motion.Motion`."""
 
     def at(self, t: float) -> Placement:
         """The placement at time `t` [s] after the start."""
@@ -33,9 +33,9 @@ class Rectangle:
 
     Attributes:
         width, height: of the flat rectangle [m].
-        motion: where it is, and how it is bent.
-        texture: what covers it.
-        excursion: what happens to it on top of the motion.
+        motion: placement over time.
+        texture: its texture.
+            excursion: displacement in addition to the motion.
     """
 
     width: float
@@ -56,8 +56,8 @@ class PlacedRectangle:
     """The rectangle at one moment; see `drivers.simulated.scene.body.SurfaceBody`.
 
     Attributes:
-        width, height, texture: as of the moving rectangle.
-        placement: where it is, and how it is bent.
+        width, height, texture: as in `Rectangle`.
+            placement: pose and bend.
     """
 
     width: float
@@ -92,7 +92,7 @@ class PlacedRectangle:
         return np.ascontiguousarray(pose.inverse(self.placement.T_rb) @ T_rs)
 
     def _shape(self) -> NDArray[np.float64]:
-        """The kernels' description: curvature, cosine and sine of the direction, offset, half width, half height."""
+        """Kernel parameters: curvature, cosine and sine of the direction, offset, half width, half height."""
         direction = self.placement.direction
         bend = (self.placement.curvature, np.cos(direction), np.sin(direction), self.placement.offset)
         return np.array([*bend, self.width / 2, self.height / 2])

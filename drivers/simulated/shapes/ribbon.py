@@ -1,7 +1,7 @@
-"""Kernels that follow lines of sight to a ribbon: a planar curve of chords, extended sideways.
+"""Ray casting kernels for a ribbon: a planar polyline, extruded sideways.
 
-Everything is in the profile frame: x and y in the plane of the curve, z across the ribbon. A ribbon is its nodes
-(n, 4): x, y [m], and the direction of the curve there as a unit vector; nodes are at equal distances along the curve.
+All in the profile frame: x and y in the plane of the curve, z across the ribbon. A ribbon is given by nodes (n, 4):
+x, y [m], and the unit tangent of the curve; nodes are equidistant along the curve.
 """
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: A ribbon does not shadow itself across less than this [m].
+#: Tolerance of the shadow test, so that a ribbon does not shadow itself [m].
 _CLEARANCE = 2e-3
 
 
@@ -24,12 +24,12 @@ def intersect_ribbon(
     nodes: NDArray[np.float64],
     half_width: float,
 ) -> tuple[float, float, float, float]:
-    """First point where a line of sight meets the ribbon.
+    """First intersection of a ray with the ribbon.
 
-    Seen from the side the line of sight is a line in the plane; it crosses the chords whose ends lie on its two sides.
+    In the side view the ray is a line in the plane; it crosses the chords whose ends lie on opposite sides of it.
 
     Returns:
-        (distance [m], how far along the curve in chords, distance across [m], cosine of incidence); NaN if it misses.
+        (distance [m], position along the curve in chords, position across [m], cosine of incidence); NaN for a miss.
     """
     best, place, across, cosine = np.inf, np.nan, np.nan, np.nan
     square = dx * dx + dy * dy
@@ -55,7 +55,7 @@ def intersect_ribbon(
 def cast_ribbon(
     rays: NDArray[np.float64], T_ps: NDArray[np.float64], nodes: NDArray[np.float64], half_width: float
 ) -> NDArray[np.float32]:
-    """What some lines of sight see of a ribbon.
+    """Casts rays at a ribbon.
 
     Args:
         rays: unit directions in the sensor frame, (height, width, 3).
@@ -85,7 +85,7 @@ def cast_ribbon(
 def shadowed_by_ribbon(
     points_p: NDArray[np.float64], light_p: NDArray[np.float64], nodes: NDArray[np.float64], half_width: float
 ) -> NDArray[np.bool_]:
-    """Whether a ribbon keeps the light at `light_p` (3,) from points (height, width, 3) [m]."""
+    """Shadow mask (height, width): True where a ribbon blocks `light_p` (3,) from points (height, width, 3) [m]."""
     height, width = points_p.shape[:2]
     dark = np.empty((height, width), np.bool_)
     ox, oy, oz = light_p[0], light_p[1], light_p[2]

@@ -1,4 +1,4 @@
-"""A thin elastic strip, held at one end, that sags under its weight."""
+"""Thin elastic strip, clamped at one end, that sags under its weight."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,19 +22,19 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """A strip in a gripper that moves, turns about the vertical and tilts so slowly that the strip is always at rest.
+    """A strip in a gripper that moves, turns about the vertical and tilts, quasi-statically.
 
-    Nothing moves during the first second, nor ever if the speed is 0. The gripper never rolls, so the strip stays in a
-    vertical plane and its shape is that of `elastica`.
+    It is at rest during the first second, and always if the speed is 0. The gripper never rolls, so the strip stays in
+    a vertical plane and its shape is the solution of `elastica`.
 
     Attributes:
         seed: of the motion.
         length, width: of the flat strip [m].
         stiffness: bending stiffness per width, E t³ / 12 (1 − ν²) for a plate of thickness t [N·m].
         weight: mass per area [kg/m²].
-        texture: what covers it; its x axis is along the strip.
+        texture: its texture, with the x axis along the strip.
         speed: factor on the speed of the motion.
-        excursion: what happens to it on top of the motion; it must not turn, or gravity would change the shape.
+        excursion: displacement in addition to the motion; must not rotate, or gravity would change the shape.
     """
 
     seed: int
@@ -46,7 +46,8 @@ class Strip:
     speed: float = 1.0
     excursion: Excursion = field(default_factory=Excursion)
 
-    #: The gripper at rest, and how far it moves [m]; angles of tilt (between strip and vertical) and of turning [rad].
+    #: Rest position and maximum displacement of the gripper [m]; mean tilt (between strip and vertical), amplitude of
+    #: tilt and of turning [rad].
     REST, REACH = (0.0, -0.13, 1.07), (0.03, 0.02, 0.03)
     TILT, TILTING, TURNING = np.deg2rad(55), np.deg2rad(15), np.deg2rad(20)
 
@@ -71,8 +72,8 @@ class PlacedStrip:
 
     Attributes:
         width: of the strip [m].
-        texture: what covers it.
-        T_rp: pose of the profile: origin in the middle of the clamp, x horizontally away from it, y down, z across.
+        texture: its texture.
+            T_rp: pose of the profile: origin in the middle of the clamp, x horizontally away from it, y down, z across.
         profile: the shape.
     """
 
@@ -83,7 +84,7 @@ class PlacedStrip:
 
     @property
     def T_rg(self) -> Pose:
-        """Pose of the gripper: origin in the middle of the clamp, x along the strip as it leaves it, y across."""
+        """Pose of the gripper: origin in the middle of the clamp, x along the clamped end of the strip, y across."""
         sine, cosine = np.sin(self.profile.angle[0]), np.cos(self.profile.angle[0])
         T_pg = pose.identity()
         T_pg[:3, :3] = np.array([[sine, 0.0, cosine], [cosine, 0.0, -sine], [0.0, 1.0, 0.0]])
@@ -120,6 +121,6 @@ class PlacedStrip:
         return np.ascontiguousarray(pose.inverse(self.T_rp) @ T_rs)
 
     def _nodes(self) -> NDArray[np.float64]:
-        """The kernels' description of the curve, (n, 4)."""
+        """Kernel parameters: nodes of the curve, (n, 4)."""
         angle = self.profile.angle
         return np.stack([self.profile.reach, self.profile.drop, np.sin(angle), np.cos(angle)], axis=1)
