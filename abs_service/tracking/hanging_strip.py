@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observer
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.elastica import heavy_elastica
-from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.initial_detection import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.session import Plan, Tracking
@@ -98,7 +98,7 @@ def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Pla
         raise StiffnessError(f"{recording.path}: no strip was tracked in {sets} frame sets")
     longest = max(tracked.values(), key=len)
     model, shown, frames = longest[len(longest) // 2]
-    seen = sight(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
+    seen = detect_object(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
     hangings = [hanging(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
     return HangingStrip(model, hangings, sets - len(longest), shown, seen.points)
 

@@ -9,8 +9,7 @@ import numpy as np
 from abs_service.pairing.image_decoders import kinds
 from abs_service.pairing.observation import Observation, Observer
 from abs_service.tracker import status
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
-from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, detect_object
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
@@ -39,7 +38,7 @@ class ModelSettings(Protocol):
         """Width and height [m] of a flat board before the sensor that `build` takes for its object."""
         ...
 
-    def build(self, sighting: Sighting) -> DeformationModel:
+    def build(self, detection: InitialDetection) -> DeformationModel:
         """The model of an object as it is first seen."""
         ...
 
@@ -149,7 +148,7 @@ class Tracking:
                 self._adopt(*self._begin(observation), observation)
             elif told or self._watch.overdue(observation.t_host_ns) or self._unseen.difference(observation.missing):
                 self._look_again(self._tracker, told, observation)
-        except (SightingError, ModelError) as error:
+        except (DetectionError, ModelError) as error:
             notes = (str(error),)
         if self._tracker is None:
             return _initializing(observation, notes)
@@ -165,14 +164,14 @@ class Tracking:
         self._told = True
 
     def _look_again(self, tracker: Tracker, told: bool, observation: Observation) -> None:
-        """Begins anew if the object is in sight; SightingError or ModelError if it is not, or not the lost one."""
+        """Begins anew if the object is in sight; DetectionError or ModelError if it is not, or not the lost one."""
         if not told and self._watch.keeps_mesh(observation.t_host_ns):
-            tracker.relocate(self._sight(observation).points)
+            tracker.relocate(self._detect(observation).points)
             return
         lost = tracker.model.mesh
         begun, mesh = self._begin(observation)
         if not told and self._watch.is_another(mesh, lost):
-            raise SightingError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+            raise DetectionError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
         self._adopt(begun, mesh, observation)
 
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
@@ -183,12 +182,12 @@ class Tracking:
         self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
         self.mesh_version += 1
 
-    def _sight(self, observation: Observation) -> Sighting:
-        return sight(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
+    def _detect(self, observation: Observation) -> InitialDetection:
+        return detect_object(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
 
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
         plan = self._plan
-        model = plan.model.build(self._sight(observation))
+        model = plan.model.build(self._detect(observation))
         synthesizer = plan.synthesis.build(self._rig, model.mesh)
         mesh = replace(
             dressed(model.mesh, observation.images, self._rig),

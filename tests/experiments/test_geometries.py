@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from calib.noise.base import pixels_where
 from evaluation.experiments import geometries
 from evaluation.experiments.base import Context
@@ -44,7 +44,7 @@ def test_geometries_differ() -> None:
 
 
 def test_the_known_sheet_has_the_true_control_points() -> None:
-    nothing = Sighting(np.zeros((0, 0), np.float32), SR4000, 0)
+    nothing = InitialDetection(np.zeros((0, 0), np.float32), SR4000, 0)
     model = KNOWN.build(nothing)
     assert model.rest == pytest.approx(KNOWN.control.ravel())
     control = sheet("corner").control(0.9)

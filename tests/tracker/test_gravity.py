@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.pairing.observation import Observer
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
-from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, detect_object
 from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import gravity, posed
@@ -139,7 +138,7 @@ def test_at_rest_the_normals_face_the_side_that_faces_the_sensor():
 class Seen:
     """What a simulated depth camera sees of a strip, and where it is."""
 
-    sighting: Sighting
+    detection: InitialDetection
     strip: PlacedStrip
 
 
@@ -150,7 +149,7 @@ def seen(uri: str, exposure: int) -> Seen:
     observation = Observer(rig).observe(frame_set(frames, 0))
     strip = simulation.scene.at(exposure / 30).surfaces[0]
     assert isinstance(strip, PlacedStrip)
-    return Seen(sight(observation, rig, plan.reference, plan.region.build(), 300), strip)
+    return Seen(detect_object(observation, rig, plan.reference, plan.region.build(), 300), strip)
 
 
 @pytest.mark.parametrize(("stiffness", "degrees"), [(0.003, 5.5), (0.01, 3.0), (0.05, 1.5)])
@@ -159,7 +158,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
     places, angles, sizes, bends = [], [], [], []
     for seed in range(2, 14):
         case = seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", seed)
-        found = find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]))
+        found = find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]))
         places.append(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3])
         cosines = np.abs(np.sum(found.T_rg[:3, :3] * case.strip.T_rg[:3, :3], axis=0))
         angles.append(np.rad2deg(np.arccos(np.minimum(cosines, 1))).max())
@@ -178,7 +177,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
 def test_lengths_scatter_as_they_say_they_do(stiffness):
     """In a strip that sags by 80°, the end at the gripper once turned away from the camera: 50 mm too long."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
-    found = [find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
     errors = np.array([(one.length - 0.30) / one.length_deviation for one in found])
     assert np.sqrt(np.mean(errors**2)) < 1.2
     assert np.abs(errors).max() < 3
@@ -188,7 +187,7 @@ def test_lengths_scatter_as_they_say_they_do(stiffness):
 def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
     """Pixels at the rim, which show what is behind as well, once bent the strip: it seemed up to a third less stiff."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
-    found = [find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
+    found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
     # To first order, the angle by which a strip bends is in proportion to the load.
     turned = [np.ptp(case.strip.profile.angle) for case in cases]
     errors = np.array([np.log(abs(one.turn[-1]) / true) for one, true in zip(found, turned)])
@@ -198,7 +197,7 @@ def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
 
 def test_which_end_is_held_is_what_the_user_says():
     case = seen("simulated://strip?seed=2&stiffness=0.05", 2)
-    held = gravity.Settings(towards_gripper=(0, 1, 0), length_m=0.3).build(case.sighting)
+    held = gravity.Settings(towards_gripper=(0, 1, 0), length_m=0.3).build(case.detection)
     end = case.strip.grid(3, 3)[1, -1]
     assert np.linalg.norm(held.mesh.vertices - end, axis=1)[0] < 0.04
     assert np.linalg.norm(held.mesh.vertices - case.strip.T_rg[:3, 3], axis=1)[0] > 0.2
@@ -208,27 +207,27 @@ def test_too_little_to_see_is_said():
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
     distance = np.full((144, 176), np.nan, np.float32)
     distance[70:74, 80:90] = 1.0
-    with pytest.raises(SightingError, match="the strip is too small in the depth image: 40 pixels, 100 needed"):
-        gravity.Settings().build(Sighting(distance, camera, 300))
+    with pytest.raises(DetectionError, match="the strip is too small in the depth image: 40 pixels, 100 needed"):
+        gravity.Settings().build(InitialDetection(distance, camera, 300))
 
 
 def test_a_wall_is_no_strip():
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
     wall = (1.6 / camera.rays()[..., 2]).astype(np.float32)
-    with pytest.raises(SightingError, match="the object is no strip"):
-        gravity.Settings().build(Sighting(wall, camera, 300))
+    with pytest.raises(DetectionError, match="the object is no strip"):
+        gravity.Settings().build(InitialDetection(wall, camera, 300))
 
 
 def test_a_strip_of_another_length_is_not_the_one_that_is_meant():
     case = seen("simulated://strip?seed=2", 2)
-    with pytest.raises(SightingError, match=r"differs by more than 20% from length_m = 0\.2"):
-        gravity.Settings(length_m=0.2).build(case.sighting)
+    with pytest.raises(DetectionError, match=r"differs by more than 20% from length_m = 0\.2"):
+        gravity.Settings(length_m=0.2).build(case.detection)
 
 
 @pytest.mark.parametrize("seed", [1, 8])
 def test_a_few_pixels_between_strip_and_wall_do_not_mislead(seed):
     case = seen(f"simulated://strip?seed={seed}&stiffness=0.01", seed)
-    found = find_strip(case.sighting, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]), 0.3)
+    found = find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]), 0.3)
     assert np.linalg.norm(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3]) < 10e-3  # two pixels; without care it was 40 mm
 
 
@@ -238,7 +237,7 @@ def test_gravity_without_direction_is_refused():
 
 
 def test_with_a_fixed_gripper_only_the_bends_are_left():
-    shape = gravity.Settings(segments=3, gripper="fixed").build(seen("simulated://strip?seed=2", 2).sighting)
+    shape = gravity.Settings(segments=3, gripper="fixed").build(seen("simulated://strip?seed=2", 2).detection)
     assert shape.rest.shape == shape.scales.shape == (3,)
     assert posed.Posed(shape).rest.shape == (9,)
 

@@ -5,8 +5,7 @@ import pytest
 
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
-from abs_service.tracker.detection.initialization import sight
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, detect_object
 from abs_service.tracker.detection.regions import nearest
 from calib import pose
 from calib.camera import Camera
@@ -51,7 +50,7 @@ TURNS = np.deg2rad([0, 20, 45, 70, 90, 135])
 @pytest.mark.parametrize("tilt", [0.0, 0.4])
 def test_the_mesh_is_the_rectangle(turn, tilt):
     T_ro = placed(turn, tilt)
-    mesh = grid_mesh(Sighting(rectangle(T_ro), TOF, 300))
+    mesh = grid_mesh(InitialDetection(rectangle(T_ro), TOF, 300))
     points = pose.transform(pose.inverse(T_ro), mesh.vertices)
     np.testing.assert_allclose(points[:, 2], 0, atol=5e-4)  # in the plane
     assert np.abs(points[:, 0]).max() < WIDTH / 2 + 0.006  # a pixel is 4.5 mm wide
@@ -62,7 +61,7 @@ def test_the_mesh_is_the_rectangle(turn, tilt):
 
 @pytest.mark.parametrize("vertices", [60, 150, 300, 1000])
 def test_there_are_about_as_many_vertices_as_wanted(vertices):
-    mesh = grid_mesh(Sighting(rectangle(placed()), TOF, vertices))
+    mesh = grid_mesh(InitialDetection(rectangle(placed()), TOF, vertices))
     assert len(mesh.vertices) == pytest.approx(vertices, rel=0.2)
     assert len(np.unique(mesh.faces)) == len(mesh.vertices)  # none is left over
 
@@ -70,7 +69,7 @@ def test_there_are_about_as_many_vertices_as_wanted(vertices):
 @pytest.mark.parametrize("turn", TURNS)
 def test_faces_are_seen_from_the_camera_and_the_chart_follows_the_long_side(turn):
     T_ro = placed(turn, 0.2)
-    mesh = grid_mesh(Sighting(rectangle(T_ro), TOF, 200))
+    mesh = grid_mesh(InitialDetection(rectangle(T_ro), TOF, 200))
     corners = mesh.vertices[mesh.faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert np.all(np.einsum("ni,ni->n", normals, corners[:, 0] - TOF.center) < 0)
@@ -85,7 +84,7 @@ def test_faces_are_seen_from_the_camera_and_the_chart_follows_the_long_side(turn
 def test_noise_is_averaged():
     distance = rectangle(placed())
     noisy = distance + np.random.default_rng(1).normal(0, 5e-3, distance.shape).astype(np.float32)
-    points = pose.transform(pose.inverse(placed()), grid_mesh(Sighting(noisy, TOF, 300)).vertices)
+    points = pose.transform(pose.inverse(placed()), grid_mesh(InitialDetection(noisy, TOF, 300)).vertices)
     assert points[:, 2].std() < 3e-3
 
 
@@ -94,7 +93,7 @@ def test_no_face_spans_a_jump_in_distance():
     near, far = rectangle(placed()), rectangle(placed(z=1.2))
     distance = near.copy()
     distance[:, 90:] = far[:, 90:]
-    mesh = grid_mesh(Sighting(distance, TOF, 200))
+    mesh = grid_mesh(InitialDetection(distance, TOF, 200))
     z = pose.transform(TOF.T_sr, mesh.vertices)[:, 2]
     assert np.ptp(z[mesh.faces], axis=1).max() < 0.02
     assert z.min() < 1.02
@@ -104,7 +103,7 @@ def test_no_face_spans_a_jump_in_distance():
 def test_a_hole_in_the_object_is_a_hole_in_the_mesh():
     distance = rectangle(placed())
     distance[60:85, 75:100] = np.nan
-    mesh = grid_mesh(Sighting(distance, TOF, 400))
+    mesh = grid_mesh(InitialDetection(distance, TOF, 400))
     centers = TOF.project(mesh.vertices[mesh.faces].mean(axis=1))
     assert not np.any(np.all((centers > (78, 63)) & (centers < (96, 81)), axis=1))
 
@@ -112,27 +111,27 @@ def test_a_hole_in_the_object_is_a_hole_in_the_mesh():
 def test_too_little_of_an_object_is_an_error():
     distance = np.full((144, 176), np.nan, np.float32)
     distance[70, 60:100] = 1.0
-    with pytest.raises(SightingError, match=rf"too small in the depth image: \d+ vertices, {LEAST_VERTICES} needed"):
-        grid_mesh(Sighting(distance, TOF, 100))
+    with pytest.raises(DetectionError, match=rf"too small in the depth image: \d+ vertices, {LEAST_VERTICES} needed"):
+        grid_mesh(InitialDetection(distance, TOF, 100))
 
 
 def test_an_object_of_a_single_pixel_is_an_error():
     distance = np.full((144, 176), np.nan, np.float32)
     distance[70, 60] = 1.0
-    with pytest.raises(SightingError, match="too small"):
-        grid_mesh(Sighting(distance, TOF, 100))
+    with pytest.raises(DetectionError, match="too small"):
+        grid_mesh(InitialDetection(distance, TOF, 100))
 
 
 def test_nothing_in_sight_is_an_error():
     nothing = observation(tof=depth_image(np.full((144, 176), np.nan)))
-    with pytest.raises(SightingError, match="no connected surface"):
-        sight(nothing, RIG, "tof", nearest.Settings(), 300)
+    with pytest.raises(DetectionError, match="no connected surface"):
+        detect_object(nothing, RIG, "tof", nearest.Settings(), 300)
 
 
 def test_without_a_depth_image_there_is_no_mesh_yet():
     for seen in (observation(), observation(color=gradient_image())):
-        with pytest.raises(SightingError, match="no depth image from tof yet"):
-            sight(seen, RIG, "tof", nearest.Settings(), 300)
+        with pytest.raises(DetectionError, match="no depth image from tof yet"):
+            detect_object(seen, RIG, "tof", nearest.Settings(), 300)
 
 
 def gradient_image() -> ColorImage:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import box, mask, nearest
 
 SHAPE = (48, 64)
@@ -58,7 +58,7 @@ def test_the_largest_step_decides_what_is_connected():
 
 
 def test_an_empty_image_has_no_surface():
-    with pytest.raises(SightingError, match="least_pixels = 200"):
+    with pytest.raises(DetectionError, match="least_pixels = 200"):
         selected(nearest.Settings(), np.full(SHAPE, np.nan, np.float32))
 
 
@@ -80,13 +80,13 @@ def test_a_box_selects_the_points_in_it():
 
 def test_an_empty_box_is_an_error():
     region = box.Settings((0.25, 0.25, 2.0), (0.5, 0.75, 3.0))
-    with pytest.raises(SightingError, match=r"\[0.25, 0.25, 2.0\] … \[0.5, 0.75, 3.0\] holds no surface"):
+    with pytest.raises(DetectionError, match=r"\[0.25, 0.25, 2.0\] … \[0.5, 0.75, 3.0\] holds no surface"):
         region.select(grid_points(), np.ones(SHAPE, np.float32))
 
 
 @pytest.mark.parametrize("highest", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0)])
 def test_a_box_inside_out_is_an_error(highest):
-    with pytest.raises(SightingError, match=r"lowest = \[0.0, 0.0, 0.0\] must be below highest"):
+    with pytest.raises(DetectionError, match=r"lowest = \[0.0, 0.0, 0.0\] must be below highest"):
         box.Settings((0.0, 0.0, 0.0), highest)
 
 
@@ -115,13 +115,13 @@ def test_a_mask_selects_what_was_drawn_and_returned(tmp_path, channels):
 
 def test_a_mask_of_another_size_is_an_error(tmp_path):
     path, _ = drawn(tmp_path, 1)
-    with pytest.raises(SightingError, match=r"mask is \(64, 48\) pixels, the depth image \(32, 24\)"):
+    with pytest.raises(DetectionError, match=r"mask is \(64, 48\) pixels, the depth image \(32, 24\)"):
         mask.Settings(path).build().select(np.zeros((24, 32, 3)), np.ones((24, 32), np.float32))
 
 
 def test_a_mask_over_nothing_is_an_error(tmp_path):
     path, _ = drawn(tmp_path, 1)
-    with pytest.raises(SightingError, match="holds no surface"):
+    with pytest.raises(DetectionError, match="holds no surface"):
         selected(mask.Settings(path), np.full(SHAPE, np.nan, np.float32))
 
 
@@ -130,5 +130,5 @@ def test_a_mask_that_cannot_be_read_is_named(tmp_path, content):
     path = tmp_path / "mask.png"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(SightingError, match=r"mask\.png' is missing or no image"):
+    with pytest.raises(DetectionError, match=r"mask\.png' is missing or no image"):
         mask.Settings(path).build()

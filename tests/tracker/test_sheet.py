@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.rectangle_fit import LEAST_PIXELS, find_sheet
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models.flexpad import Settings
@@ -48,8 +48,8 @@ def rectangle(T_rp: np.ndarray, size: tuple[float, float] = A4) -> np.ndarray:
     return np.where((np.abs(x) < size[0] / 2) & (np.abs(y) < size[1] / 2), distance, np.nan)
 
 
-def seen(distance: np.ndarray, vertices: int = 300) -> Sighting:
-    return Sighting(distance.astype(np.float32), CAMERA, vertices)
+def seen(distance: np.ndarray, vertices: int = 300) -> InitialDetection:
+    return InitialDetection(distance.astype(np.float32), CAMERA, vertices)
 
 
 def assert_is(found: Sheet, T_rp: np.ndarray, size: tuple[float, float], pixels: float = 0.5) -> None:
@@ -98,7 +98,7 @@ def test_noise_spikes_and_a_finger_do_not_move_it():
 
 
 def refused(distance: np.ndarray) -> str:
-    with pytest.raises(SightingError) as caught:
+    with pytest.raises(DetectionError) as caught:
         find_sheet(seen(distance))
     return str(caught.value)
 
@@ -142,11 +142,11 @@ def test_a_known_size_takes_the_place_of_the_detected_one():
 
 
 def test_a_sheet_of_another_size_is_refused():
-    sighting = seen(rectangle(placed(), (0.25, 0.15)))
-    with pytest.raises(SightingError, match=r"0\.25\d m × 0\.15\d m, .* more than 15% from .* = 0\.297 m × 0\.21 m"):
-        Settings(width_m=A4[0], height_m=A4[1]).build(sighting)
-    assert Settings(width_m=A4[0], height_m=A4[1], size_tolerance=0.4).build(sighting).mesh.vertices.shape[1] == 3
-    assert Settings().build(sighting).mesh.vertices.shape[1] == 3
+    detection = seen(rectangle(placed(), (0.25, 0.15)))
+    with pytest.raises(DetectionError, match=r"0\.25\d m × 0\.15\d m, .* more than 15% from .* = 0\.297 m × 0\.21 m"):
+        Settings(width_m=A4[0], height_m=A4[1]).build(detection)
+    assert Settings(width_m=A4[0], height_m=A4[1], size_tolerance=0.4).build(detection).mesh.vertices.shape[1] == 3
+    assert Settings().build(detection).mesh.vertices.shape[1] == 3
 
 
 @pytest.mark.parametrize("vertices", [4, 30, 300, 2000])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated, remaining, sandwich
@@ -118,7 +118,7 @@ def test_a_mesh_knows_how_far_noise_put_its_vertices_from_the_surface(tilt):
     far, said = [], []
     for seed in range(6):
         noise = np.random.default_rng(seed).normal(0, 4e-3, true.shape)
-        mesh = grid_mesh(Sighting((true + noise).astype(np.float32), CAMERA, 150))
+        mesh = grid_mesh(InitialDetection((true + noise).astype(np.float32), CAMERA, 150))
         far.append((mesh.vertices @ normal - normal @ [0.0, 0.0, 1.0]) ** 2)
         said.append(mesh.deviation**2)
     scatter, expected = np.sqrt(np.mean(np.concatenate(far))), np.sqrt(np.mean(np.concatenate(said)))

@@ -7,7 +7,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 
@@ -28,7 +28,7 @@ LONGEST_SIDE = 5.0
 LEAST_PART = 0.1
 
 
-def grid_mesh(sighting: Sighting) -> Mesh:
+def grid_mesh(detection: InitialDetection) -> Mesh:
     """Lays a square grid over the object in the image, along the sides of the smallest rectangle around it.
 
     What one camera sees is one distance per direction, so the grid never folds, whatever the object's shape. Every
@@ -39,11 +39,11 @@ def grid_mesh(sighting: Sighting) -> Mesh:
         The mesh without colours; its chart is the grid.
 
     Raises:
-        SightingError: the object is too small in the image.
+        DetectionError: the object is too small in the image.
     """
-    distance, camera = sighting.distance, sighting.camera
+    distance, camera = detection.distance, detection.camera
     valid = np.isfinite(distance)
-    spacing = float(np.sqrt(np.count_nonzero(valid) / sighting.vertices))
+    spacing = float(np.sqrt(np.count_nonzero(valid) / detection.vertices))
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
@@ -54,7 +54,7 @@ def grid_mesh(sighting: Sighting) -> Mesh:
     chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
     used = np.unique(faces)
     if len(used) < LEAST_VERTICES:
-        raise SightingError(
+        raise DetectionError(
             f"the object is too small in the depth image: {len(used)} vertices, {LEAST_VERTICES} needed"
         )
     position_of = np.full(rows * columns, -1, np.int32)

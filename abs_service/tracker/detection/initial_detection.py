@@ -1,4 +1,4 @@
-"""An object as the reference sensor first sees it: what a model is made from."""
+"""Detection of the object in the first depth image, from which mesh and model are made."""
 
 from dataclasses import dataclass, field
 
@@ -6,22 +6,27 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.pairing.images import DepthImage
+from abs_service.pairing.observation import Observation
+from abs_service.tracker.detection.regions.base import Region
 from calib.camera import Camera
+from calib.noise.base import DepthNoise, without_offset
+from calib.rig import Rig
 
 
-class SightingError(ValueError):
-    """An object that is not in sight, or of which there is too little to track."""
+class DetectionError(ValueError):
+    """An object that is not in view, or of which too little is visible to track it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sighting:
-    """One depth image of the object alone.
+class InitialDetection:
+    """One depth image, segmented.
 
     Attributes:
         distance: radial distances (height, width) [m] without mean offset, NaN outside the object.
         camera: the camera that measured them.
-        vertices: about how many vertices the mesh is to have.
-        surroundings: the same image with everything around the object; empty if nobody knows.
+        vertices: approximate number of vertices of the mesh to be made.
+        surroundings: the same image without segmentation; empty if unknown.
     """
 
     distance: NDArray[np.float32]
@@ -31,14 +36,14 @@ class Sighting:
 
     @property
     def points(self) -> NDArray[np.float64]:
-        """Rig coordinates (k, 3) [m] of the object's pixels, row by row."""
+        """Rig coordinates (k, 3) [m] of the object's pixels, in row-major order."""
         points = self.camera.unproject(self.distance).reshape(-1, 3)
         return points[np.isfinite(points[:, 0])]
 
     def beside(self, reach_px: int) -> NDArray[np.float64]:
-        """Rig coordinates (k, 3) [m] of pixels outside the object, at most `reach_px` beside one of its own.
+        """Rig coordinates (k, 3) [m] of the pixels outside the object that lie at most `reach_px` beside it.
 
-        Which pixels show the object is decided with care, so that those at its rim are often left out.
+        Segmentation is conservative: it often excludes the object's own pixels at its rim.
         """
         if not self.surroundings.size:
             return np.zeros((0, 3))
@@ -46,3 +51,20 @@ class Sighting:
         near = cv2.dilate(inside, np.ones((2 * reach_px + 1, 2 * reach_px + 1))) > inside
         points = self.camera.unproject(np.where(near, self.surroundings, np.nan).astype(np.float32)).reshape(-1, 3)
         return points[np.isfinite(points[:, 0])]
+
+
+def detect_object(
+    observation: Observation, rig: Rig, reference: str, region: Region, vertices: int
+) -> InitialDetection:
+    """Segments the reference sensor's depth image with a region, for a mesh of about `vertices` vertices.
+
+    Raises:
+        DetectionError: there is no depth image, or no object in it.
+    """
+    image, noise = observation.images.get(reference), rig.sensors[reference].noise
+    if not (isinstance(image, DepthImage) and isinstance(noise, DepthNoise)):
+        raise DetectionError(f"no depth image from {reference} yet")
+    camera = rig.sensors[reference].camera
+    distance = without_offset(noise, image.distance, image.amplitude)
+    inside = region.select(camera.unproject(distance), distance)
+    return InitialDetection(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices, distance)

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from calib import pose
 from calib.camera import Camera
@@ -27,22 +27,22 @@ LEAST_GAP_M = 0.01
 LEAST_OVERLAP = 0.93
 
 
-def find_sheet(sighting: Sighting) -> Sheet:
+def find_sheet(detection: InitialDetection) -> Sheet:
     """The sheet in sight: a plane through its points, and the rectangle around its outline on that plane.
 
     A long side across the image points to the right, another one up.
 
     Raises:
-        SightingError: too little is in sight, or it is not flat, or no rectangle.
+        DetectionError: too little is in sight, or it is not flat, or no rectangle.
     """
-    camera = sighting.camera
-    seen = np.isfinite(sighting.distance)
+    camera = detection.camera
+    seen = np.isfinite(detection.distance)
     if np.count_nonzero(seen) < LEAST_PIXELS:
-        raise SightingError(f"the object has {np.count_nonzero(seen)} pixels, a sheet needs {LEAST_PIXELS}")
+        raise DetectionError(f"the object has {np.count_nonzero(seen)} pixels, a sheet needs {LEAST_PIXELS}")
     window = _window(seen)
     rows, columns = np.indices(seen.shape)[:, *window]
     rays = camera.directions(np.stack([columns, rows], axis=-1)) @ camera.T_rs[:3, :3].T
-    points = camera.center + rays * sighting.distance[window][..., None]
+    points = camera.center + rays * detection.distance[window][..., None]
     T_rp = _plane(points[seen[window]], camera)
     pixels = _pixels_on_plane(pose.transform(pose.inverse(T_rp), points))
     corner = np.array([columns[0, 0], rows[0, 0]])
@@ -80,7 +80,7 @@ def _pixels_on_plane(points_p: NDArray[np.float64]) -> NDArray[np.bool_]:
     """The largest connected set of pixels (height, width) with points near the plane z = 0; specks do not count.
 
     Raises:
-        SightingError: the points (height, width, 3), NaN where there is none, are on no plane.
+        DetectionError: the points (height, width, 3), NaN where there is none, are on no plane.
     """
     valid = points_p[np.isfinite(points_p[..., 2])]
     _check_flat(valid)
@@ -94,7 +94,7 @@ def _check_flat(points_p: NDArray[np.float64]) -> None:
     """Fits a paraboloid to points (k, 3), which averages their noise.
 
     Raises:
-        SightingError: it rises by more than `LARGEST_BOW_M` over them.
+        DetectionError: it rises by more than `LARGEST_BOW_M` over them.
     """
     a, b, z = points_p[:: len(points_p) // MOST_POINTS + 1].T
     arch = np.column_stack([a * a, a * b, b * b])
@@ -105,7 +105,7 @@ def _check_flat(points_p: NDArray[np.float64]) -> None:
         coefficients = np.linalg.lstsq(terms * weight[:, None], z * weight, rcond=None)[0]
     bow = float(np.ptp(arch @ coefficients[:3]))
     if bow > LARGEST_BOW_M:
-        raise SightingError(f"the object arches by {bow * 1e3:.0f} mm; a sheet must be flat to be found")
+        raise DetectionError(f"the object arches by {bow * 1e3:.0f} mm; a sheet must be flat to be found")
 
 
 def _outline(pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -156,12 +156,12 @@ def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet
     """Compares the object's pixels (height, width) with those whose places (height, width, 2) are in the rectangle.
 
     Raises:
-        SightingError: they have less than `LEAST_OVERLAP` in common.
+        DetectionError: they have less than `LEAST_OVERLAP` in common.
     """
     rectangle = np.all(np.abs(places) < (sheet.width / 2, sheet.height / 2), axis=-1)
     overlap = np.count_nonzero(pixels & rectangle) / np.count_nonzero(pixels | rectangle)
     if overlap < LEAST_OVERLAP:
-        raise SightingError(
+        raise DetectionError(
             f"the object is no rectangle: it has {overlap:.0%} in common with one of "
             f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, a sheet {LEAST_OVERLAP:.0%} at least"
         )

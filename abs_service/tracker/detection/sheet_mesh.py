@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from abs_service.tracker.detection.grid_mesh import triangles
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.pose import Pose
@@ -29,11 +29,11 @@ class Sheet:
         """The same sheet with known sides [m].
 
         Raises:
-            SightingError: a detected side differs by more than the share `tolerance` from the known one.
+            DetectionError: a detected side differs by more than the share `tolerance` from the known one.
         """
         long, short = max(width, height), min(width, height)
         if max(abs(self.width / long - 1), abs(self.height / short - 1)) > tolerance:
-            raise SightingError(
+            raise DetectionError(
                 f"the rectangle in sight is {self.width:.3f} m × {self.height:.3f} m, which differs by more than "
                 f"{tolerance:.0%} from width_m × height_m = {long:g} m × {short:g} m"
             )

@@ -17,7 +17,7 @@ from abs_service.tracker.detection.elastica_fit import (
     load_deviation,
     normals_at,
 )
-from abs_service.tracker.detection.initial_detection import Sighting, SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.mesh import Mesh
 from calib import pose
@@ -88,28 +88,28 @@ class Strip:
         return Sheet(self.T_rg @ T_gp, self.length, self.width).mesh(vertices)
 
 
-def find_strip(sighting: Sighting, gravity: Vector, towards_gripper: Vector, length: float = 0.0) -> Strip:
+def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Vector, length: float = 0.0) -> Strip:
     """Fits a heavy elastica to the points of a strip; where its edges are tells the rest.
 
     Args:
-        sighting: the strip alone.
+        detection: the strip alone.
         gravity: unit vector (3,) in the rig.
         towards_gripper: vector (3,) in the rig that tells the held end from the other one.
         length: free length if it is known [m], else 0: as it is seen.
 
     Raises:
-        SightingError: too little to see, or no strip.
+        DetectionError: too little to see, or no strip.
     """
-    seen = sighting.points
+    seen = detection.points
     if len(seen) < LEAST_PIXELS:
-        raise SightingError(f"the strip is too small in the depth image: {len(seen)} pixels, {LEAST_PIXELS} needed")
+        raise DetectionError(f"the strip is too small in the depth image: {len(seen)} pixels, {LEAST_PIXELS} needed")
     seen = seen[:: -(-len(seen) // MOST_PIXELS)]
     plane = find_plane(seen, gravity)
     hang = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
-    points = np.concatenate([seen, sighting.beside(RIM_PX)])
+    points = np.concatenate([seen, detection.beside(RIM_PX)])
     fitted = _Fitted(plane, hang, np.arange(len(points)) < len(seen), (0.0, 0.0), False, 0.0)
     for _ in range(5):
-        fitted = _refine(fitted, points, sighting.camera)
+        fitted = _refine(fitted, points, detection.camera)
     share = float(np.mean(fitted.belongs[: len(seen)]))
     _check((fitted.hang.length, fitted.sides[1] - fitted.sides[0]), length, share)
     hang = fitted.hang.cut(fitted.hang.length - (length or fitted.hang.length), fitted.hang.length)
@@ -165,16 +165,16 @@ def _check(size: tuple[float, float], length: float, share: float) -> None:
     """Whether what is seen can be the strip.
 
     Raises:
-        SightingError: it is wider than long, of another length than the given one [m] (0: not given), or no such curve.
+        DetectionError: it is wider than long, of another length than the given one [m] (0: not given), or no such curve.
     """
     if share < LEAST_SHARE:
-        raise SightingError(
+        raise DetectionError(
             f"the object hangs like no strip: {share:.0%} of it lie on one curve, {LEAST_SHARE:.0%} needed"
         )
     if size[1] > size[0]:
-        raise SightingError(f"the object is no strip: it is {size[0]:.3f} m long, but {size[1]:.3f} m wide")
+        raise DetectionError(f"the object is no strip: it is {size[0]:.3f} m long, but {size[1]:.3f} m wide")
     if length and abs(size[0] / length - 1) > LENGTH_TOLERANCE:
-        raise SightingError(
+        raise DetectionError(
             f"the strip in sight is {size[0]:.3f} m long, which differs by more than {LENGTH_TOLERANCE:.0%} from "
             f"length_m = {length:g}"
         )

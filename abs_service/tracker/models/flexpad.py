@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.rectangle_fit import find_sheet
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.fused_cost import Step, deforming
@@ -60,17 +60,17 @@ class Settings:
         """Width and height [m] of a flat board that the model can be built from: the sheet."""
         return (self.width_m, self.height_m) if self.width_m else BOARD
 
-    def build(self, sighting: Sighting) -> "FlexPad":
+    def build(self, detection: InitialDetection) -> "FlexPad":
         """The model of a flat sheet.
 
         Raises:
-            SightingError: what is seen is no flat rectangle, or not of the given size.
+            DetectionError: what is seen is no flat rectangle, or not of the given size.
             ModelError: the sheet is too large for the least radius.
         """
-        sheet = find_sheet(sighting)
+        sheet = find_sheet(detection)
         if self.width_m:
             sheet = sheet.of_size(self.width_m, self.height_m, self.size_tolerance)
-        return FlexPad(sheet, sighting.vertices, self.least_radius_m, self.bend_deviation)
+        return FlexPad(sheet, detection.vertices, self.least_radius_m, self.bend_deviation)
 
 
 class FlexPad:

@@ -8,7 +8,7 @@ import scipy  # its parts are imported when they are first used
 from annotated_types import Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.parts.arc import arc
@@ -55,15 +55,15 @@ class Settings:
         """Unit vector (3,) of gravity in the rig."""
         return np.array(self.gravity) / np.linalg.norm(self.gravity)
 
-    def build(self, sighting: Sighting) -> "Gravity":
+    def build(self, detection: InitialDetection) -> "Gravity":
         """The model of a strip that hangs as it is seen.
 
         Raises:
-            SightingError: too little is seen, or no strip.
+            DetectionError: too little is seen, or no strip.
         """
         held = np.array(self.towards_gripper) if any(self.towards_gripper) else -self.down
-        strip = find_strip(sighting, self.down, held, self.length_m)
-        return Gravity(strip, self.segments, self.gripper == "free", sighting.vertices, self.down)
+        strip = find_strip(detection, self.down, held, self.length_m)
+        return Gravity(strip, self.segments, self.gripper == "free", detection.vertices, self.down)
 
 
 class Gravity:

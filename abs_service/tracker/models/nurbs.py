@@ -8,7 +8,7 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
@@ -53,13 +53,13 @@ class Settings:
         """Width and height [m] of a flat board that the model can be built from: any."""
         return BOARD
 
-    def build(self, sighting: Sighting) -> "Nurbs":
+    def build(self, detection: InitialDetection) -> "Nurbs":
         """The surface of an object of any smooth shape.
 
         Raises:
-            ModelError, SightingError: the object is too small, or no such surface can carry it.
+            ModelError, DetectionError: the object is too small, or no such surface can carry it.
         """
-        return self.of_mesh(grid_mesh(sighting))
+        return self.of_mesh(grid_mesh(detection))
 
     def of_mesh(self, mesh: Mesh) -> "Nurbs":
         """Fits the rest surface to the mesh by least squares and binds every vertex to it.

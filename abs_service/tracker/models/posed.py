@@ -7,7 +7,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from calib import pose
 from calib.jit import kernel, prange
@@ -34,13 +34,13 @@ class Settings:
         """Width and height [m] of a flat board that the shape can be built from."""
         return self.shape.board
 
-    def build(self, sighting: Sighting) -> "Posed":
+    def build(self, detection: InitialDetection) -> "Posed":
         """The shape of an object with a pose.
 
         Raises:
-            ModelError, SightingError: the shape cannot be built.
+            ModelError, DetectionError: the shape cannot be built.
         """
-        return Posed(self.shape.build(sighting))
+        return Posed(self.shape.build(detection))
 
 
 class Posed:

@@ -7,7 +7,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
 from calib import pose
@@ -22,13 +22,13 @@ class Settings:
         """Width and height [m] of a flat board that the model can be built from: any."""
         return BOARD
 
-    def build(self, sighting: Sighting) -> "Rigid":
+    def build(self, detection: InitialDetection) -> "Rigid":
         """The rigid model of an object of any shape.
 
         Raises:
-            SightingError: the object is too small.
+            DetectionError: the object is too small.
         """
-        return Rigid(grid_mesh(sighting))
+        return Rigid(grid_mesh(detection))
 
 
 class Rigid:

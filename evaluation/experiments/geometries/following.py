@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD
 from abs_service.tracker.models.nurbs import Nurbs
@@ -150,7 +150,7 @@ class KnownSheet:
         a, b, c, d = (part.ravel() for part in (place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]))
         return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
-    def build(self, sighting: Sighting) -> Nurbs:
+    def build(self, detection: InitialDetection) -> Nurbs:
         """The model of the sheet, which lies exactly where the first frame shows it."""
         u, w = (part.ravel() for part in np.meshgrid(*self.places, indexing="ij"))
         points = SplineSurface((4, 4), 2, *self.places).points(self.control).reshape(-1, 3)

@@ -10,7 +10,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation, Source
 from abs_service.tracker import status
 from abs_service.tracker.detection.grid_mesh import triangles
-from abs_service.tracker.detection.initial_detection import Sighting
+from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Estimate
@@ -88,7 +88,7 @@ class Template:
         """Width and height [m] of the sheet."""
         return SIZE
 
-    def build(self, sighting: Sighting) -> DeformationModel:
+    def build(self, detection: InitialDetection) -> DeformationModel:
         """The model, in the first pose."""
         if self.setup.model == "flexpad":
             turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)

@@ -17,6 +17,6 @@ class Region(Protocol):
             distance: radial distances (height, width) [m], NaN without return.
 
         Raises:
-            SightingError: there is no object.
+            DetectionError: there is no object.
         """
         ...

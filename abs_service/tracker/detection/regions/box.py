@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 
 LEAST_PIXELS = 16
 
@@ -23,7 +23,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.lowest, self.highest)):
-            raise SightingError(
+            raise DetectionError(
                 f"lowest = {list(self.lowest)} must be below highest = {list(self.highest)} on every axis"
             )
 
@@ -36,5 +36,5 @@ class Settings:
         with np.errstate(invalid="ignore"):
             inside = np.all((points_r >= self.lowest) & (points_r <= self.highest), axis=-1)
         if np.count_nonzero(inside) < LEAST_PIXELS:
-            raise SightingError(f"the box {list(self.lowest)} … {list(self.highest)} holds no surface")
+            raise DetectionError(f"the box {list(self.lowest)} … {list(self.highest)} holds no surface")
         return inside

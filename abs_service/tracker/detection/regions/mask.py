@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 
 LEAST_PIXELS = 16
 
@@ -27,11 +27,11 @@ class Settings:
         """Loads the mask.
 
         Raises:
-            SightingError: the file is missing or no image.
+            DetectionError: the file is missing or no image.
         """
         image = cv2.imread(str(self.file), cv2.IMREAD_UNCHANGED)
         if image is None:
-            raise SightingError(f"file = {str(self.file)!r} is missing or no image")
+            raise DetectionError(f"file = {str(self.file)!r} is missing or no image")
         if image.ndim == 3:
             image = image[..., 3] if image.shape[2] == 4 else image.max(axis=2)
         return Mask(image > 0)
@@ -46,8 +46,8 @@ class Mask:
     def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Pixels (height, width) of the mask that have a return."""
         if self._mask.shape != distance.shape:
-            raise SightingError(f"the mask is {self._mask.shape[::-1]} pixels, the depth image {distance.shape[::-1]}")
+            raise DetectionError(f"the mask is {self._mask.shape[::-1]} pixels, the depth image {distance.shape[::-1]}")
         inside = self._mask & np.isfinite(distance)
         if np.count_nonzero(inside) < LEAST_PIXELS:
-            raise SightingError("the mask holds no surface")
+            raise DetectionError("the mask holds no surface")
         return inside

@@ -8,7 +8,7 @@ from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_segments import connected_surfaces
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,6 @@ class Settings:
         sizes = np.bincount(labels.ravel(), minlength=count)
         candidates = [label for label in range(1, count) if sizes[label] >= self.least_pixels]
         if not candidates:
-            raise SightingError(f"no connected surface of at least least_pixels = {self.least_pixels} pixels in sight")
+            raise DetectionError(f"no connected surface of at least least_pixels = {self.least_pixels} pixels in sight")
         nearest = min(candidates, key=lambda label: float(np.median(distance[labels == label])))
         return labels == nearest
