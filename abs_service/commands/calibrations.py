@@ -20,7 +20,6 @@ from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera
 
 #: What a camera table is put on when all of it is there.
-_BLANK = Camera(1, 1, 1.0, 1.0, 0.0, 0.0)
 
 
 class StoredCalibrationError(Exception):
@@ -85,9 +84,10 @@ def camera(name: str, table: config.CameraTable, path: Path) -> Camera:
     Raises:
         StoredCalibrationError: it leaves the image and the camera matrix to the device.
     """
-    if table.fx is None:
+    found = table.own()
+    if found is None:
         raise StoredCalibrationError(f"{path}: sensors.{name}.camera: width, height, fx, fy, cx, cy are missing")
-    return table.applied_to(_BLANK)
+    return found
 
 
 def _plugin(settings: Any, folder: Path) -> dict[str, Any]:

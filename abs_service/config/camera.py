@@ -16,6 +16,9 @@ Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 Size = Annotated[int, Field(ge=1, le=65535)]
 Focal = Annotated[FiniteFloat, Field(gt=0)]
 
+#: A camera of which `applied_to` keeps nothing but the pose.
+_REPLACED = Camera(1, 1, 1.0, 1.0, 0.0, 0.0)
+
 _MATRIX = ("width", "height", "fx", "fy", "cx", "cy")
 
 
@@ -84,6 +87,10 @@ class CameraTable(BaseModel):
             )
         lens_of(self.lens_model or Lens.name, self.lens or ())
         return self
+
+    def own(self) -> Camera | None:
+        """The camera that the table describes by itself; None if it leaves the camera matrix to the device."""
+        return None if self.fx is None else self.applied_to(_REPLACED)
 
     def applied_to(self, factory: Camera) -> Camera:
         """The factory calibration with what the table says in its place."""

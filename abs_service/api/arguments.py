@@ -1,0 +1,93 @@
+"""From the arguments of a tracker to the configuration of a rig file, with its defaults and checks."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from abs_service import config
+from abs_service.api.errors import ArgumentError
+from abs_service.tracking.session import ModelSettings
+from calib.rig import Noise
+
+#: What a rig file holds for a part of a tracker, `{"type": "hybrid", "steps": 4}`.
+Table = Mapping[str, Any]
+
+
+class NoiseSettings(Protocol):
+    """Settings of a noise model."""
+
+    def build(self) -> Noise:
+        """The noise model."""
+        ...
+
+
+#: A model and a noise model: settings such as `Nurbs(4, 4)`, or a table of a rig file.
+ModelPart = ModelSettings | Table
+NoisePart = NoiseSettings | Table
+
+#: Names in the configuration of a tracker that is made from arguments.
+TRACKER, DEPTH, COLOR = "tracker", "depth", "color"
+
+#: Keys of that configuration by the arguments that give them, for messages.
+_ARGUMENTS = {
+    f"trackers.{TRACKER}.mesh.": "",
+    f"trackers.{TRACKER}.": "",
+    f"sensors.{COLOR}.noise": "color_noise",
+    f"sensors.{DEPTH}.": "",
+}
+
+
+def configuration(
+    sensor: Table, color_noise: NoisePart | None, tracker: Table, vertices: int | None
+) -> config.ServiceConfig:
+    """The configuration of one tracker with a depth camera and, if it has a noise model, a colour camera.
+
+    Args:
+        sensor: keys of the depth sensor's table; None leaves one out.
+        color_noise: noise model of the colour camera.
+        tracker: keys of the tracker's table; None leaves one out.
+        vertices: about how many vertices the mesh is to have; None: the default of a rig file.
+
+    Raises:
+        ArgumentError: names all that is wrong.
+    """
+    sensors = {DEPTH: _keys(sensor)}
+    if color_noise is not None:
+        sensors[COLOR] = _keys({"noise": color_noise})
+    mesh = {} if vertices is None else {"mesh": {"vertices": vertices}}
+    tables = {
+        "version": 1,
+        "name": "arrays",
+        "devices": {"arrays": {"uri": "arrays://"}},
+        "sensors": {name: {"device": "arrays", **table} for name, table in sensors.items()},
+        "synchronisation": {"reference": f"{DEPTH}/depth"},
+        "trackers": {TRACKER: {"sensors": list(sensors), **_keys(tracker), **mesh}},
+    }
+    try:
+        return config.from_tables(tables, "Tracker", Path.cwd())
+    except config.ConfigError as error:
+        raise ArgumentError(in_arguments(str(error))) from error
+
+
+def in_arguments(message: str) -> str:
+    """A message about a configuration in terms of the arguments that it was made from."""
+    for key, argument in _ARGUMENTS.items():
+        message = message.replace(key, argument)
+    return message
+
+
+def _keys(given: Table) -> dict[str, Any]:
+    return {key: _plain(key, value) for key, value in given.items() if value is not None}
+
+
+def _plain(name: str, value: Any) -> Any:
+    """A value as a TOML file would hold it."""
+    if isinstance(value, Mapping):
+        return {key: _plain(f"{name}.{key}", part) for key, part in value.items()}
+    if is_dataclass(value) and not isinstance(value, type):
+        table = {field.name: getattr(value, field.name) for field in fields(value)}
+        return {"type": type(value).__module__.rpartition(".")[2]} | _keys(table)
+    if isinstance(value, type) or callable(value):
+        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = a.Nurbs(4, 4), or a table")
+    return value

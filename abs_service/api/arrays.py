@@ -1,0 +1,180 @@
+"""Arrays of one moment, checked, as the frames that a device would deliver."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from abs_service.api.errors import ArgumentError
+from abs_service.pairing.image_decoders import BAYER_ORDERS, kinds
+from abs_service.tracking.session import streams
+from calib.camera import Camera
+from calib.noise.base import DepthNoise
+from calib.rig import Rig
+from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
+
+#: A depth image whose median is larger [m] is one in millimetres.
+FARTHEST_M = 100.0
+
+#: Encodings of 8- and 16-bit images of the brightness.
+_GREY = {"u1": "mono8", "u2": "mono16"}
+
+
+class FrameBuilder:
+    """Makes frame sets for the sensors of one tracker.
+
+    Args:
+        rig: the tracker's sensors.
+        reference: the depth sensor that `depth_m`, `amplitude` and `deviation_m` are of.
+        geometry: length in depth images, "z" or "radial".
+        bayer: order of the colour filters in a Bayer mosaic's upper left corner, row by row.
+
+    Raises:
+        ArgumentError: an unknown geometry or order.
+    """
+
+    def __init__(self, rig: Rig, reference: str, geometry: str, bayer: str):
+        if geometry not in ("z", "radial"):
+            raise ArgumentError(f'geometry = {geometry!r}: must be "z" or "radial"')
+        if bayer not in BAYER_ORDERS:
+            raise ArgumentError(f"bayer = {bayer!r}: must be one of {', '.join(BAYER_ORDERS)}")
+        self._rig = rig
+        self._geometry = Geometry(geometry)
+        self._bayer = bayer
+        self._cameras = {sensor.head: sensor.camera for sensor in rig.sensors.values()}
+        self._streams = [f"{head}/{stream}" for head, stream in streams(rig.sensors.values())]
+        pictures = [one for one in self._streams if one.endswith(("/color", "/bayer"))]
+        own = {"depth_m": Kind.DEPTH, "amplitude": Kind.AMPLITUDE, "deviation_m": Kind.DEVIATION}
+        #: Stream of every argument that has one.
+        self._arguments = {name: f"{reference}/{kind}" for name, kind in own.items()}
+        self._arguments = {name: stream for name, stream in self._arguments.items() if stream in self._streams}
+        if len(pictures) == 1:
+            self._arguments["image"] = pictures[0]
+        self._last_ns: int | None = None
+        self._seq = 0
+
+    def frame_set(self, time_s: float, given: Mapping[str, ArrayLike | None]) -> FrameSet:
+        """The frames of one moment.
+
+        Args:
+            time_s: the moment [s].
+            given: arrays by the argument that they were given as or by their stream, "tof/depth"; None for none.
+
+        Raises:
+            ArgumentError: an array that does not fit, that nothing uses or that is missing; a time that is not later.
+        """
+        t_ns = self._time_ns(time_s)
+        labels = {stream: name for name, stream in self._arguments.items()}
+        frames: dict[tuple[str, str], Frame] = {}
+        for name, array in given.items():
+            if array is None:
+                continue
+            stream = self._arguments.get(name, name)
+            if stream not in self._streams:
+                raise ArgumentError(f"{name} is given, but the tracker uses no such image; it uses {self._uses()}")
+            head, _, kind = stream.partition("/")
+            label = labels.get(stream, f"streams[{stream!r}]")
+            frames[head, kind] = self._frame(head, Kind(kind), np.asarray(array), label, t_ns)
+        self._check_complete(frames, labels)
+        self._last_ns, self._seq = t_ns, self._seq + 1
+        return FrameSet(self._seq - 1, t_ns, frames)
+
+    def _uses(self) -> str:
+        labels = {stream: name for name, stream in self._arguments.items()}
+        return ", ".join(labels.get(stream, f"streams[{stream!r}]") for stream in self._streams)
+
+    def _time_ns(self, time_s: float) -> int:
+        if not np.isfinite(time_s):
+            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds")
+        t_ns = round(float(time_s) * 1e9)
+        if self._last_ns is not None and t_ns <= self._last_ns:
+            raise ArgumentError(f"time_s = {time_s}: must be later than the frame before, {self._last_ns * 1e-9:g}")
+        return t_ns
+
+    def _check_complete(self, frames: Mapping[tuple[str, str], Frame], labels: Mapping[str, str]) -> None:
+        """Refuses a depth image without what its noise model depends on."""
+        for sensor in self._rig.sensors.values():
+            if not isinstance(sensor.noise, DepthNoise) or (sensor.head, "depth") not in frames:
+                continue
+            for kind in kinds(sensor.noise):
+                stream = f"{sensor.head}/{kind}"
+                if (sensor.head, kind.value) not in frames:
+                    raise ArgumentError(
+                        f'{labels.get(stream, f"streams[{stream!r}]")} is missing: the noise model of "{sensor.head}" '
+                        "depends on it"
+                    )
+
+    def _frame(self, head: str, kind: Kind, array: NDArray[Any], label: str, t_ns: int) -> Frame:
+        camera = self._cameras[head]
+        if kind == Kind.BINARY:
+            array = np.full((camera.height, camera.width), array.astype(bool).any(), np.uint8)
+        shape = array.shape[:2] if kind == Kind.COLOR and array.ndim == 3 else array.shape
+        if shape != (camera.height, camera.width):
+            raise ArgumentError(f"{label} has shape {array.shape}, the camera has {camera.height} × {camera.width}")
+        pixels, encoding = self._pixels(kind, array, label)
+        is_depth = kind == Kind.DEPTH
+        return Frame(
+            sensor=head,
+            stream=kind.value,
+            kind=kind,
+            data=pixels,
+            encoding=encoding,
+            t_host_ns=t_ns,
+            t_arrival_ns=t_ns,
+            seq=self._seq,
+            geometry=self._geometry if is_depth else Geometry.NONE,
+            invalid=0.0 if is_depth else None,
+            calib_id=camera.calib_id,
+        )
+
+    def _pixels(self, kind: Kind, array: NDArray[Any], label: str) -> tuple[NDArray[Any], str]:
+        """The pixels as a frame holds them, and their encoding."""
+        if kind in (Kind.DEPTH, Kind.DEVIATION):
+            return _metres(array, label), "32FC1"
+        if kind == Kind.BINARY:
+            return array, "mono8"
+        if kind == Kind.BAYER and array.dtype == np.uint8:
+            return np.ascontiguousarray(array), f"bayer_{self._bayer}8"
+        if kind == Kind.COLOR and array.ndim == 3 and array.shape[2] == 3 and array.dtype == np.uint8:
+            return np.ascontiguousarray(array), "rgb8"
+        if kind == Kind.COLOR and array.ndim == 2 and array.dtype.str[1:] in _GREY:
+            return np.ascontiguousarray(array, f"<{array.dtype.str[1:]}"), _GREY[array.dtype.str[1:]]
+        if kind in (Kind.COLOR, Kind.BAYER):
+            raise ArgumentError(
+                f"{label} holds {array.dtype} of shape {array.shape}, must be uint8, 0…255: red, green, blue in "
+                "the last axis, or one channel if the noise model is Grey or Bayer"
+            )
+        if array.dtype.kind not in "uif":
+            raise ArgumentError(f"{label} holds {array.dtype}, must be numbers")
+        return np.ascontiguousarray(array, "<f4"), "32FC1"
+
+
+def object_mask(mask: ArrayLike, camera: Camera) -> NDArray[np.bool_]:
+    """Pixels of an object, where a mask is not zero.
+
+    Raises:
+        ArgumentError: a mask of another size than the camera's.
+    """
+    pixels = np.asarray(mask)
+    if pixels.shape != (camera.height, camera.width):
+        raise ArgumentError(f"mask has shape {pixels.shape}, the depth camera has {camera.height} × {camera.width}")
+    return pixels != 0
+
+
+def _metres(array: NDArray[Any], label: str) -> NDArray[np.float32]:
+    """Lengths [m], NaN where there is none: where they are not finite."""
+    if array.dtype.kind != "f":
+        raise ArgumentError(f"{label} holds {array.dtype}, must be floating-point metres: millimetres * 0.001")
+    metres = array.astype("<f4")
+    metres[~np.isfinite(metres)] = np.nan
+    some = metres[::4, ::4]
+    returns = some[np.abs(some) > 0]
+    if returns.size and np.median(returns) > FARTHEST_M:
+        raise ArgumentError(
+            f"{label} has a median of {np.median(returns):g}, must be metres, less than {FARTHEST_M:g}: "
+            "millimetres * 0.001"
+        )
+    if (metres < 0).any():
+        raise ArgumentError(f"{label} holds {np.nanmin(metres):g}: must be positive; NaN or 0 means no return")
+    return metres

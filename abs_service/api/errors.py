@@ -1,0 +1,5 @@
+"""The error of a call."""
+
+
+class ArgumentError(ValueError):
+    """An argument that cannot be used; the message names it, its value and what is allowed."""

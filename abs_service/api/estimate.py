@@ -1,0 +1,78 @@
+"""An estimate as arrays, with the triangles of its mesh."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker import estimate as tracker_estimate
+from abs_service.tracker.estimate import Status
+from abs_service.tracker.mesh import Mesh
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Deformation at one moment, with the mesh that is deformed.
+
+    Attributes:
+        time_s: the moment [s], on the clock of the images.
+        status: INITIALIZING until an object is found, TRACKING, DEGRADED or LOST.
+        reasons: why it is not TRACKING.
+        theta: parameters (dim,) of the deformation model, SI units; empty while INITIALIZING.
+        covariance: of theta (dim, dim); NaN while LOST.
+        vertices: deformed mesh (n, 3) [m] in the frame of the rig; that of the depth camera unless its pose differs.
+        vertex_covariance: of every vertex (n, 3, 3) [m²]; NaN while LOST.
+        faces: vertex indices (m, 3) of the triangles.
+        undeformed: the mesh at rest (n, 3) [m].
+        mesh_version: counts the meshes; theta and vertices are comparable between estimates of one version.
+        inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
+        residuals: normalised residual of every sensor: standard deviation of measured minus synthesised values, divided
+            by the σ of its noise model; near 1 if the noise model is right, NaN if nothing was measured.
+        evaluations: how often the cost of a candidate was computed.
+        missing: sensors that did not contribute.
+    """
+
+    time_s: float
+    status: Status
+    reasons: tuple[str, ...]
+    theta: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    vertices: NDArray[np.float32]
+    vertex_covariance: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    undeformed: NDArray[np.float64]
+    mesh_version: int
+    inlier_share: float
+    residuals: Mapping[str, float]
+    evaluations: int
+    missing: tuple[str, ...]
+
+
+def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int) -> Estimate:
+    """The estimate of a tracker with its mesh; None before the first object was found."""
+    unknown = np.nan if found.status == Status.LOST else 1.0
+    return Estimate(
+        time_s=found.t_host_ns * 1e-9,
+        status=found.status,
+        reasons=found.reasons,
+        theta=found.theta,
+        covariance=found.covariance * unknown,
+        vertices=found.vertices,
+        vertex_covariance=found.vertex_covariance * unknown,
+        faces=np.zeros((0, 3), np.int32) if mesh is None else _read_only(mesh.faces),
+        undeformed=np.zeros((0, 3)) if mesh is None else _read_only(mesh.vertices),
+        mesh_version=version,
+        inlier_share=found.inlier_share,
+        residuals={fit.sensor: fit.normalized_residual for fit in found.fits},
+        evaluations=found.evaluations,
+        missing=found.missing,
+    )
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """A view that cannot be written to: the tracker goes on with the array."""
+    view = array.view()
+    view.setflags(write=False)
+    return view

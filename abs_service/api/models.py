@@ -1,0 +1,35 @@
+"""Deformation models by their public names; docs/models.md describes them."""
+
+from abs_service.tracker.models import nurbs
+from abs_service.tracker.models.flexpad import Settings as FlexPad
+from abs_service.tracker.models.gravity import Settings as Gravity
+from abs_service.tracker.models.posed import Settings as Posed
+from abs_service.tracker.models.rigid import Settings as Rigid
+
+__all__ = ["FlexPad", "Gravity", "Nurbs", "Posed", "Rigid"]
+
+_DEFAULT = nurbs.Settings()
+
+
+def Nurbs(
+    long: int = _DEFAULT.control_points[0],
+    short: int = _DEFAULT.control_points[1],
+    *,
+    degree: int = _DEFAULT.degree,
+    weights: tuple[tuple[float, ...], ...] = _DEFAULT.weights,
+    margin: float = _DEFAULT.margin,
+    smoothing: float = _DEFAULT.smoothing,
+) -> nurbs.Settings:
+    """A NURBS surface of any smooth shape; theta lists x, y, z of its control points row by row [m].
+
+    Args:
+        long, short: control points along the object's long and short side, 3 to 12.
+        degree: polynomial degree of the splines, 1 to 4.
+        weights: weight of every control point, a table of `long` rows and `short` columns; empty: all 1.
+        margin: share of the object's size by which the rest surface extends beyond it on every side.
+        smoothing: weight of the bending of the rest surface when it is fitted to the vertices.
+
+    Raises:
+        ValueError: weights of another shape.
+    """
+    return nurbs.Settings((long, short), degree, weights, margin, smoothing)

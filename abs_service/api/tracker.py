@@ -1,0 +1,220 @@
+"""A tracker of arrays: one call per frame, no process, no file, no thread."""
+
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from abs_service import config, wiring
+from abs_service.api import arguments
+from abs_service.api import noise as noise_models
+from abs_service.api.arguments import ModelPart, NoisePart, Table
+from abs_service.api.arrays import FrameBuilder, object_mask
+from abs_service.api.errors import ArgumentError
+from abs_service.api.estimate import Estimate, with_mesh
+from abs_service.pairing.observation import ObservationError
+from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.detection.regions.mask import Mask
+from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import streams as streams_of
+from abs_service.tracking.warmup import warm_up
+from calib.camera import Camera
+from calib.noise.base import NoiseError
+from drivers.contract.frame import FrameSet
+
+if TYPE_CHECKING:
+    from abs_service.api.recording import Recording
+
+
+class Tracker:
+    """Finds an object in depth images, then estimates its deformation, frame by frame.
+
+    The first frame of an installation compiles the kernels, which takes up to a minute; see `warm_up`.
+
+    Args:
+        depth: camera of the depth images.
+        model: deformation model: `Nurbs(4, 4)`, `FlexPad()`, `Gravity()`, `Rigid()` or `Posed(…)`.
+        noise: noise model of the depths, one of `noise`; None: `noise.StructuredLight()`, a Kinect v1.
+        color: camera of the colour images with its pose `T_rs`, which maps its coordinates to those of the rig.
+        color_noise: `noise.Color()`, `noise.Grey()` or `noise.Bayer()`; None: `noise.Color()`.
+        texture: noise model of the amplitudes, `noise.Intensity("amplitude", …)`, if they are to be tracked as a
+            picture of the surface.
+        range_m: largest distance that the depth camera can report.
+        outlier_share: share of the depths that come from anywhere.
+        vertices: about how many vertices the mesh has.
+        region: where the object is in the first frame, unless `track` is given a mask.
+        synthesis, objective, optimizer, priors, relief, status, reinitialization: tables like those of a tracker in a
+            rig file, as is `region`: `priors={"stretch": 0.1}`.
+        budget_evaluations: how often a search may compute the cost of a candidate per frame.
+        budget_ms: time that a search may take [ms]; None: as long as it needs, with equal results from equal images.
+        geometry: length in depth images: "z" along the optical axis, or "radial" from the camera centre.
+        bayer: order of the colour filters in the upper left corner of a Bayer mosaic, row by row.
+
+    None stands for the default of a rig file, wherever nothing else is said.
+
+    Raises:
+        ArgumentError: an argument that cannot be used.
+    """
+
+    def __init__(
+        self,
+        depth: Camera,
+        model: ModelPart,
+        *,
+        noise: NoisePart | None = None,
+        color: Camera | None = None,
+        color_noise: NoisePart | None = None,
+        texture: NoisePart | None = None,
+        range_m: float | None = None,
+        outlier_share: float | None = None,
+        vertices: int | None = None,
+        region: Table | None = None,
+        synthesis: Table | None = None,
+        objective: Table | None = None,
+        optimizer: Table | None = None,
+        priors: Table | None = None,
+        relief: Table | None = None,
+        status: Table | None = None,
+        reinitialization: Table | None = None,
+        budget_evaluations: int | None = None,
+        budget_ms: float | None = None,
+        geometry: Literal["z", "radial"] = "z",
+        bayer: Literal["rggb", "bggr", "grbg", "gbrg"] = "rggb",
+    ):
+        if color is None and color_noise is not None:
+            raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
+        noise = noise_models.StructuredLight() if noise is None else noise
+        sensor = {"noise": noise, "texture": texture, "range_m": range_m, "outlier_share": outlier_share}
+        parts = {"model": model, "region": region, "synthesis": synthesis, "objective": objective}
+        parts |= {"optimizer": optimizer, "priors": priors, "relief": relief, "status": status}
+        parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}
+        cameras = {arguments.DEPTH: depth}
+        if color is not None:
+            cameras[arguments.COLOR] = color
+            color_noise = noise_models.Color() if color_noise is None else color_noise
+        settings = arguments.configuration(sensor, color_noise, parts, vertices)
+        self._configure(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
+
+    @classmethod
+    def configured(
+        cls,
+        settings: config.ServiceConfig,
+        name: str,
+        cameras: Mapping[str, Camera],
+        geometry: str = "z",
+        bayer: str = "rggb",
+        budget_ms: float | None = None,
+    ) -> Self:
+        """One tracker of a configuration; `Rig.tracker` is the way to it.
+
+        Raises:
+            ArgumentError: the configuration has no such tracker, a sensor has no camera, or a part cannot be made.
+        """
+        tracker = cls.__new__(cls)
+        tracker._configure(settings, name, cameras, geometry, bayer, budget_ms)  # noqa: SLF001  a second constructor
+        return tracker
+
+    def _configure(
+        self,
+        settings: config.ServiceConfig,
+        name: str,
+        cameras: Mapping[str, Camera],
+        geometry: str,
+        bayer: str,
+        budget_ms: float | None,
+    ) -> None:
+        try:
+            plan = wiring.plan(settings, name)
+            rig = wiring.rig(settings, name, cameras)
+            self._region = _RegionOrMask(plan.region.build())
+        except (wiring.PlanError, NoiseError, SightingError) as error:
+            raise ArgumentError(arguments.in_arguments(str(error))) from error
+        if budget_ms is not None and not budget_ms > 0:
+            raise ArgumentError(f"budget_ms = {budget_ms}: must be more than 0, or None for no limit")
+        self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
+        self._budget_ns = np.inf if budget_ms is None else budget_ms * 1e6
+        self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
+        self._session = Tracking(rig, replace(plan, region=self._region))
+
+    def track(
+        self,
+        depth_m: ArrayLike | None = None,
+        *,
+        time_s: float,
+        image: ArrayLike | None = None,
+        amplitude: ArrayLike | None = None,
+        deviation_m: ArrayLike | None = None,
+        mask: ArrayLike | None = None,
+        streams: Mapping[str, ArrayLike] | None = None,
+    ) -> Estimate:
+        """The estimate for the images of one moment.
+
+        Args:
+            depth_m: distances (height, width) [m], floating-point; NaN, infinity or 0 means no return.
+            time_s: the moment [s]; later than that of the frame before.
+            image: of the colour camera: (height, width, 3) red, green, blue as uint8; one channel, (height, width), if
+                its noise model is `Grey` (uint8 or uint16) or `Bayer` (uint8).
+            amplitude: amplitudes of a time-of-flight camera (height, width), if a noise model depends on them.
+            deviation_m: σ of every distance (height, width) [m], if the noise model is `Measured`.
+            mask: pixels of the object (height, width) in `depth_m`, boolean or not zero. It counts where the object is
+                looked for: in the first frame, and after it was lost.
+            streams: images of a rig's further sensors, by "sensor/stream".
+
+        Raises:
+            ArgumentError: an array that does not fit, that nothing uses or that is missing; a time that is not later.
+        """
+        given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
+        self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
+        return self._track(self._frames.frame_set(time_s, given | dict(streams or {})))
+
+    def replay(self, recording: "Recording") -> Iterator[Estimate]:
+        """The estimates for a recording, frame set by frame set, as `abs-service replay` makes them.
+
+        Raises:
+            ArgumentError: the recording lacks images that the tracker uses.
+            RecordingError: a part of the file is damaged.
+        """
+        needed = [f"{head}/{stream}" for head, stream in streams_of(self._rig.sensors.values())]
+        missing = [stream for stream in needed if stream not in recording.streams]
+        if missing:
+            raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
+        self._region.mask = None
+        synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
+        for frame in recording.frames():
+            yield from map(self._track, synchroniser.add(frame))
+        yield from map(self._track, synchroniser.flush())
+
+    def reinitialize(self) -> None:
+        """Looks for the object anew in the next frame; safe from any thread."""
+        self._session.reinitialize()
+
+    def warm_up(self) -> None:
+        """Compiles the kernels: up to a minute once per installation, then about a second per process."""
+        warm_up(wiring.noises(self._settings, self._name), self._plan)
+
+    def _track(self, frames: FrameSet) -> Estimate:
+        begin_ns = time.monotonic_ns()
+        try:
+            found = self._session.track(frames, lambda: time.monotonic_ns() - begin_ns < self._budget_ns)
+        except ObservationError as error:
+            raise ArgumentError(str(error)) from error
+        return with_mesh(found, self._session.mesh, self._session.mesh_version)
+
+
+class _RegionOrMask:
+    """The pixels of a mask while there is one, else of the region. It is its own settings."""
+
+    def __init__(self, region: Region):
+        self.mask: NDArray[np.bool_] | None = None
+        self._region = region
+
+    def build(self) -> Region:
+        return self
+
+    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+        region = self._region if self.mask is None else Mask(self.mask)
+        return region.select(points_r, distance)
