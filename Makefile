@@ -22,7 +22,7 @@ evaluate: .venv/.all ## measure how well it tracks: make evaluate ARGS="all --qu
 bench: .venv/.all ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
 	@$(BIN)/pytest evaluation/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
 cost: .venv/.all ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
-	@$(BIN)/python -m evaluation.benchmarks.growth docs/images/cost.png
+	@$(BIN)/python -m evaluation.pictures.cost_growth docs/images/cost.png
 proto: .venv/.all ## regenerate the wire code from proto/absmsg/v1/*.proto
 	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/absmsg/v1/*.proto
 constraints: .venv/.all ## resolve the pinned requirements again: make constraints ARGS=--upgrade

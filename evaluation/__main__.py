@@ -1,18 +1,18 @@
-"""Measures how well it all works: the experiments of the paper and more, each with a report.
+"""Command line of the evaluation: runs experiments and writes a report of each.
 
-  python -m evaluation geometries --out results            one experiment, in full
-  python -m evaluation geometries --out results --quick    the same in seconds, with fewer and shorter sequences
+  python -m evaluation geometries --out results            one experiment in full
+  python -m evaluation geometries --out results --quick    the same in seconds, on fewer and shorter sequences
   python -m evaluation all --out results --quick           every experiment
-  python -m evaluation list                                what experiments there are
-  python -m evaluation recordings --out results --data D   one that needs recordings which are not part of the program
-  python -m evaluation geometries --out results --set frames=100 --set seeds=1    with other settings than its own
+  python -m evaluation list                                names and titles of the experiments
+  python -m evaluation recordings --out results --data D   an experiment on recordings that are not in the repository
+  python -m evaluation geometries --out results --set frames=100 --set seeds=1    changed settings
 
 Writes OUT/EXPERIMENT/report.html with tables and pictures, and report.json with the same numbers. Equal seeds give
-equal numbers, but for measured times.
+equal numbers, except for measured times.
 
-The exit code is 0 if all ran, 1 if a required goal is missed, 2 if an experiment cannot run here. A goal that is missed
-without being required is said, and changes no exit code; --json tells all of them. `all` passes over an experiment that
-lacks data or packages, and says so.
+The exit code is 0 if all experiments ran, 1 if a required goal is missed, 2 if an experiment cannot run here. Other
+missed goals are printed and leave the exit code unchanged; --json lists all goals. `all` skips an experiment that lacks
+data or packages, with a message.
 """
 
 import argparse
@@ -34,16 +34,18 @@ from abs_service.cli import THREADS
 from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
 from abs_service.supervision.exit_codes import Exit, is_for_user
-from evaluation import experiments
-from evaluation.experiments import base
+from evaluation import experiment
+
+#: Packages of `evaluation` whose modules with a TITLE are experiments.
+GROUPS = ("paper", "inputs", "method", "calibration", "service")
 
 
 class EvaluateOptionError(Exception):
-    """Options that do not go together, or a name of no experiment."""
+    """Incompatible options, or the name of no experiment."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs the chosen experiments and returns the exit code."""
+    """Runs the selected experiments and returns the exit code."""
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
     parser = argparse.ArgumentParser(
@@ -55,7 +57,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except Exception as error:
-        if not is_for_user(error):
+        own = type(error).__module__.partition(".")[0] in ("evaluation", "__main__")
+        if not (own or is_for_user(error)):
             raise
         print(f"evaluation: error: {error}", file=sys.stderr)
         return Exit.USER
@@ -68,8 +71,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--quick", action="store_true", help="seconds instead of minutes, on fewer and shorter sequences"
     )
-    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of everything random (default: 0)")
-    parser.add_argument("--data", metavar="DIR", type=Path, help="recordings that are not part of the program")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="of all random numbers (default: 0)")
+    parser.add_argument("--data", metavar="DIR", type=Path, help="recordings that are not in the repository")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="a setting of the experiment, as in TOML"
     )
@@ -79,49 +82,54 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Runs the experiments, writes their reports and says whether the goals are met."""
+    """Runs the experiments, writes their reports and prints their goals."""
     known = available()
     if arguments.experiment == "list":
-        print("\n".join(f"{name:<14} {known[name].TITLE}" for name in known))
+        print("\n".join(f"{name:<18} {known[name].TITLE}" for name in known))
         return Exit.OK
-    chosen = list(known) if arguments.experiment == "all" else [arguments.experiment]
-    _check(arguments, chosen, known)
+    selected = list(known) if arguments.experiment == "all" else [arguments.experiment]
+    _check(arguments, selected, known)
     worst = Exit.OK
-    for name in chosen:
+    for name in selected:
         try:
-            made = _measure(name, known[name], arguments)
-        except base.UnavailableError as error:
+            report = _measure(name, known[name], arguments)
+        except experiment.UnavailableError as error:
             if arguments.experiment != "all":
                 raise
-            print(f"{name}: passed over: {error}", file=sys.stderr)
+            print(f"{name}: skipped: {error}", file=sys.stderr)
             continue
-        _say(made, name, page.write(made, _folder(arguments.out, name) / "report"), arguments.json)
-        worst = max(worst, made.exit_code or Exit.OK)
+        _print(report, name, page.write(report, _folder(arguments.out, name) / "report"), arguments.json)
+        worst = max(worst, report.exit_code or Exit.OK)
     return worst
 
 
 def available() -> dict[str, Any]:
-    """The experiments by name; imports all of them."""
-    names = sorted(module.name for module in pkgutil.iter_modules(experiments.__path__))
-    modules = {name: import_module(f"{experiments.__name__}.{name}") for name in names}
-    return {name: module for name, module in modules.items() if hasattr(module, "TITLE")}
+    """Experiments by name, sorted; imports all modules of all groups."""
+    found = {}
+    for group in GROUPS:
+        package = import_module(f"evaluation.{group}")
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            candidate = import_module(module.name)
+            if hasattr(candidate, "TITLE"):
+                found[module.name.rpartition(".")[2]] = candidate
+    return dict(sorted(found.items()))
 
 
-def _check(arguments: argparse.Namespace, chosen: Sequence[str], known: dict[str, Any]) -> None:
-    if unknown := [name for name in chosen if name not in known]:
-        titles = "\n".join(f"  {name:<14} {experiment.TITLE}" for name, experiment in known.items())
-        raise EvaluateOptionError(f'there is no experiment "{unknown[0]}"; there are, and all:\n{titles}')
+def _check(arguments: argparse.Namespace, selected: Sequence[str], known: dict[str, Any]) -> None:
+    if unknown := [name for name in selected if name not in known]:
+        titles = "\n".join(f"  {name:<18} {one.TITLE}" for name, one in known.items())
+        raise EvaluateOptionError(f'there is no experiment "{unknown[0]}"; available are all and:\n{titles}')
     if arguments.out is None:
-        raise EvaluateOptionError("--out DIR is needed: the folder that the reports go to")
+        raise EvaluateOptionError("--out DIR is required: the folder for the reports")
     if arguments.set and arguments.experiment == "all":
-        raise EvaluateOptionError("--set changes one experiment's settings; all have settings of their own")
+        raise EvaluateOptionError("--set changes the settings of one experiment and cannot be used with all")
     if arguments.data is not None and not arguments.data.is_dir():
         raise EvaluateOptionError(f"--data {arguments.data}: there is no such folder")
 
 
-def _settings(usual: Any, changes: Sequence[str]) -> Any:
+def _settings(defaults: Any, changes: Sequence[str]) -> Any:
     """An experiment's settings with some of them changed."""
-    values, known = {}, {field.name: type(getattr(usual, field.name)) for field in fields(usual)}
+    values, known = {}, {field.name: type(getattr(defaults, field.name)) for field in fields(defaults)}
     for change in changes:
         key = change.partition("=")[0].strip()
         try:
@@ -132,49 +140,51 @@ def _settings(usual: Any, changes: Sequence[str]) -> Any:
             raise EvaluateOptionError(f"--set {change}: there is no such setting; there are: {', '.join(known)}")
         values[key] = tuple(value) if isinstance(value, list) else value
         if not isinstance(values[key], known[key]):
-            raise EvaluateOptionError(f"--set {change}: must be {known[key].__name__}, as in {getattr(usual, key)!r}")
-    return replace(usual, **values)
+            raise EvaluateOptionError(
+                f"--set {change}: must be {known[key].__name__}, as in {getattr(defaults, key)!r}"
+            )
+    return replace(defaults, **values)
 
 
 def _folder(out: Path, name: str) -> Path:
     try:
         (out / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise EvaluateOptionError(f"--out {out}: cannot be made: {error.strerror}") from error
+        raise EvaluateOptionError(f"--out {out}: cannot be created: {error.strerror}") from error
     return out / name
 
 
-def _measure(name: str, experiment: Any, arguments: argparse.Namespace) -> Report:
+def _measure(name: str, chosen: Any, arguments: argparse.Namespace) -> Report:
     """Runs one experiment."""
-    said = ["evaluate", name, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
-    said += ["--data", str(arguments.data)] if arguments.data is not None else []
-    said += [word for pair in arguments.set for word in ("--set", pair)]
-    trace = provenance.trace([*said, "--out", str(arguments.out)], [])
-    settings = _settings(experiment.QUICK if arguments.quick else experiment.Settings(), arguments.set)
-    begun = time.monotonic()
+    words = [name, *(["--quick"] if arguments.quick else []), "--seed", str(arguments.seed)]
+    words += ["--data", str(arguments.data)] if arguments.data is not None else []
+    words += [word for pair in arguments.set for word in ("--set", pair)]
+    origin = provenance.trace([*words, "--out", str(arguments.out)], [], program="python -m evaluation")
+    settings = _settings(chosen.QUICK if arguments.quick else chosen.Settings(), arguments.set)
+    start_s = time.monotonic()
     with Console(stderr=True).status(name) as status:
-        context = base.Context(arguments.seed, arguments.data, lambda text: status.update(f"{name}: {text}"))
-        findings = experiment.run(settings, context)
-    made = {
-        "commit": provenance.commit(Path(experiments.__path__[0])) or "unknown",
+        context = experiment.Context(arguments.seed, arguments.data, lambda text: status.update(f"{name}: {text}"))
+        findings = chosen.run(settings, context)
+    conditions = {
+        "commit": provenance.commit(Path(__file__).parent) or "unknown",
         "seed": arguments.seed,
         "settings": asdict(settings),
-        "seconds": round(time.monotonic() - begun, 1),
+        "seconds": round(time.monotonic() - start_s, 1),
     }
-    title = f"{experiment.TITLE} (quick)" if arguments.quick else experiment.TITLE
-    return base.report(title, findings, made, trace)
+    title = f"{chosen.TITLE} (quick)" if arguments.quick else chosen.TITLE
+    return experiment.report(title, findings, conditions, origin)
 
 
-def _say(made: Report, name: str, written: Sequence[Path], as_json: bool) -> None:
+def _print(report: Report, name: str, written: Sequence[Path], as_json: bool) -> None:
     if as_json:
-        content = to_json(made)
+        content = to_json(report)
         kept = {key: content[key] for key in ("title", "verdict", "verdicts", "values")}
         print(json.dumps({"experiment": name, **kept, "report": str(written[0])}, ensure_ascii=False))
         return
-    print(f"{made.title}, {made.values['seconds']:g} s")
-    for verdict in made.verdicts:
+    print(f"{report.title}, {report.values['seconds']:g} s")
+    for verdict in report.verdicts:
         advice = f" {verdict.advice}" if verdict.advice else ""
-        print(f"  {page.MARKS[verdict.level]} {base.GOALS.words[verdict.level]}: {verdict.text}{advice}")
+        print(f"  {page.MARKS[verdict.level]} {experiment.GOALS.words[verdict.level]}: {verdict.text}{advice}")
     print(f"  {written[0]}")
 
 

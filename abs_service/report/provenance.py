@@ -49,7 +49,11 @@ class Provenance:
 
 
 def trace(
-    arguments: Sequence[str], data: Sequence[Path], clock: Callable[[], int] = time.time_ns, home: Path | None = None
+    arguments: Sequence[str],
+    data: Sequence[Path],
+    clock: Callable[[], int] = time.time_ns,
+    home: Path | None = None,
+    program: str = "abs-service",
 ) -> Provenance:
     """The provenance of what a command is about to compute.
 
@@ -58,6 +62,7 @@ def trace(
         data: files and folders that it reads.
         clock: wall-clock time [ns since the epoch].
         home: folder that is written as `~`; None for the user's.
+        program: name of the program on the command line.
 
     Raises:
         DataError: one of the files cannot be read.
@@ -65,7 +70,7 @@ def trace(
     away = str(Path.home() if home is None else home).rstrip("/")
     said = [argument.replace(f"{away}/", "~/") if away else argument for argument in arguments]
     date = datetime.fromtimestamp(clock() // 1_000_000_000, UTC).isoformat().replace("+00:00", "Z")
-    command = " ".join(["abs-service", *map(_quoted, said)])
+    command = " ".join([program, *map(_quoted, said)])
     return Provenance(command, date, data=tuple(fingerprint(path) for path in data))
 
 

@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from calib.warp.mesh import MeshWarp
-from evaluation.experiments.warping.comparison import SCENES, SOURCE, TARGET, least_ms, opencv_alone_ms
+from evaluation.inputs.warping.comparison import SCENES, SOURCE, TARGET, least_ms, opencv_alone_ms
 from tests.calib.warp_scenes import image
 
 

@@ -16,7 +16,7 @@ from calib.board.target import Chessboard
 from calib.sequences import reference
 from calib.sequences.reference import Kind
 from calib.sequences.static import reduce
-from evaluation.studies.noise_board import ERRORS, at_rest, filmed, learnt, true_distances
+from evaluation.calibration.noise_board import ERRORS, at_rest, filmed, learnt, true_distances
 from tests.calibration.simulated import Filmed, record, scene
 
 

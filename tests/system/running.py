@@ -17,7 +17,7 @@ from absmsg.v1.health_pb2 import Health
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus.contract import Sample
-from evaluation.experiments.live.listener import connect
+from evaluation.service.live.listener import connect
 
 #: The first start on a machine compiles the kernels.
 START_S = 150.0

@@ -7,7 +7,7 @@ import pytest
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from mcap.reader import make_reader
 
-from evaluation.experiments.live.proc import children
+from evaluation.service.live.proc import children
 from tests.system.running import is_running, kill, wait_until
 
 pytestmark = pytest.mark.slow

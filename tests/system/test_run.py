@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import config
-from evaluation.experiments.live.proc import children
+from evaluation.service.live.proc import children
 from tests.system.running import TRACKING, is_running, wait_until
 
 pytestmark = pytest.mark.slow

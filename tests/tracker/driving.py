@@ -15,7 +15,7 @@ from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
-from evaluation.experiments.tracked import Judge, with_noise
+from evaluation.sequences import TruthEvaluator, with_noise
 
 CONFIG = config.load_default()
 TRACKER = next(iter(CONFIG.trackers))
@@ -62,11 +62,11 @@ def drive(
     in_time: Callable[[], bool] = lambda: True,
 ) -> Iterator[Step]:
     """Tracks exposures; `change` alters the frames of an exposure before the tracker sees them."""
-    judge = Judge(tracking)
+    evaluator = TruthEvaluator(tracking)
     for k in exposures:
         frames, truth = simulation.expose(k)
         estimate = tracking.track(frame_set(change(k, frames), k), in_time)
-        yield Step(estimate, judge.errors(estimate, truth.points_r))
+        yield Step(estimate, evaluator.errors(estimate, truth.points_r))
 
 
 def mean_errors(steps: list[Step]) -> tuple[float, float]:

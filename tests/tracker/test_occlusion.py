@@ -2,7 +2,7 @@
 
 import pytest
 
-from evaluation.studies.occlusion import occlusion
+from evaluation.method.occlusion import occlusion
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated, remaining, sandwich
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
-from evaluation.studies.posterior import coverage
+from evaluation.method.posterior import coverage
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
 from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
 

@@ -1,0 +1,1 @@
+"""Experiments on camera and noise calibration."""

@@ -1,0 +1,173 @@
+"""What `abs-service calibrate noise` finds on simulated walls and real static parts, and a sensor's own deviations.
+
+  python -m evaluation.calibration.noise_calibration [DATA] [--only walls petit o3r]
+
+DATA is the folder of data sets with sl_rgbd_deform_petit (frames 200 to 319 of a PrimeSense-type sensor; hands squeeze
+a toy on a table) and tof_ifm_o3r (one frame of an ifm O3R); without it there are the simulated walls only.
+"""
+
+import argparse
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.calibration.noise import measurement, sigma_consistency
+from abs_service.calibration.shots import sequences
+from calib.camera import Camera
+from calib.noise.base import pixels_where
+from calib.noise.per_pixel import PerPixel
+from calib.sequences import local
+from calib.sequences.static import Static, reduce
+from drivers.contract.frame import Frame, Kind
+from drivers.image_folder.images import DepthImages, ImageFolder
+from drivers.image_folder.listing import by_number
+from drivers.o3r.buffers import O3rBuffers
+from drivers.simulated.address import parse
+
+#: The paper's calibration (5.1): distances [m] and reflectivities of the simulated walls, and frames of each.
+DISTANCES, MATERIALS, FRAMES = (0.7, 1.0, 1.3, 1.6, 1.9), (0.9, 0.5, 0.3), 30
+
+#: What the simulated time-of-flight heads err by systematically.
+HEADS = {
+    "tof, no systematic error": "sensors=tof&tof=176x144",
+    "tof, offset, dark and wiggling": "sensors=tof&tof=176x144&offset=0.02&dark=-8&wiggle=0.002",
+    "tof, and a fixed pattern of 3 mm": "sensors=tof&tof=176x144&offset=0.02&dark=-8&wiggle=0.002&pattern=0.003",
+    "structured light": "sensors=structured_light&structured_light=320x240",
+}
+
+#: Bins of distance [mm] and the deviations [mm] that were measured in them with everything that moves left in.
+BINS = ((450, 550), (550, 650), (650, 800), (800, 1000), (1000, 1300), (1300, 1700), (2200, 2800), (2800, 3500))
+WITH_MOTION = (0.41, 0.50, 0.85, 3.68, 2.00, 2.33, 8.70, 12.27)
+
+PETIT = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
+
+
+def walls(query: str) -> tuple[measurement.Found, Any]:
+    """Calibrates on walls at known distances, turned by 4°."""
+    found, depths, head = [], [], None
+    for depth in DISTANCES:
+        for number, reflectivity in enumerate(MATERIALS):
+            seed = round(100 * depth) + number
+            uri = f"simulated://wall?distance={depth}&reflectivity={reflectivity}&tilt=4&seed={seed}&{query}"
+            simulation = parse(uri).build()
+            ((name, head),) = simulation.heads.items()
+            frames = (frame for k in range(FRAMES) for frame in simulation.frames(k))
+            found += sequences.of_frames(f"{depth} m, {reflectivity}", frames, {name: head.camera}, "", FRAMES)
+            # The head may sit beside the rig's origin, where the wall is as far as the address says.
+            depths.append(depth - float(head.camera.center[0]) * math.tan(math.radians(4)))
+    region = np.ones(found[0].lengths.shape[1:], bool)
+    return measurement.calibrate(found, depths, region, np.random.default_rng(0), lambda text: None), head
+
+
+def errors(found: measurement.Found, head: Any) -> tuple[float, float, float, float]:
+    """Error of σ [%] and of μ [mm] over all pixels of all sequences: 99th percentiles, and root mean squares."""
+    sigma, mu = [], []
+    for static, reference in zip(found.statics, found.references):
+        pixels = np.isfinite(reference.distance)
+        x, a, p = reference.distance[pixels], static.brightness[pixels], pixels_where(pixels)
+        if hasattr(head.noise, "sigma"):
+            pattern = head.pattern[pixels]
+            law, offset = head.noise.sigma(x, a), head.noise.mu(x, a) + pattern
+            if not isinstance(found.model, PerPixel):
+                law, offset = np.hypot(law, head.noise.pattern), offset - pattern
+        else:
+            law = x**2 * np.sqrt(head.noise.random**2 + head.noise.step**2 / 12)
+            law, offset = law * static.rays[..., 2][pixels], np.zeros(len(x))  # the error of z, along the ray
+        sigma.append(found.model.deviation(x, a, p) / law - 1)
+        mu.append((found.model.mean(x, a, p) - offset) * 1e3)
+    s, m = np.abs(np.concatenate(sigma)) * 100, np.abs(np.concatenate(mu))
+    return float(np.quantile(s, 0.99)), float(np.quantile(m, 0.99)), _rms(s), _rms(m)
+
+
+def _rms(values: NDArray[np.floating]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def petit(data: Path) -> tuple[Static, sequences.Sequence]:
+    """The static parts of the real sequence."""
+    files = by_number(data / "sl_rgbd_deform_petit", "depth_mm_*.png", 30.0)
+    folder = ImageFolder({"depth": DepthImages(files, PETIT, 0.001)})
+    (one,) = sequences.of_frames("petit", folder.frames(), folder.cameras, "depth", 120)
+    return reduce("petit", one.lengths, one.amplitude, PETIT.rays(), one.along, one.digit, 30), one
+
+
+def by_distance(static: Static, one: sequences.Sequence) -> list[tuple[float, float, float, int]]:
+    """Of every bin: median deviation of the static pixels' z and of all [mm], share that is not static, pixels."""
+    z = np.sort(one.lengths, axis=0)
+    middle = z[(np.isfinite(z).sum(axis=0) - 1).clip(0) // 2, *np.indices(z.shape[1:])] * 1e3
+    always = np.isfinite(one.lengths).all(axis=0)
+    everything = np.std(one.lengths, axis=0, ddof=1) * 1e3
+    found = []
+    for low, high in BINS:
+        inside = (middle >= low) & (middle < high)
+        still = inside & static.still
+        temporal = np.median(np.sqrt(static.variance[still]) * static.rays[..., 2][still]) * 1e3
+        found.append(
+            (float(temporal), float(np.median(everything[inside & always])),
+             float(1 - still.sum() / inside.sum()), int(still.sum()))
+        )  # fmt: skip
+    return found
+
+
+def o3r(data: Path) -> list[sigma_consistency.Claim]:
+    """How well the O3R's own deviation agrees with local planes, by distance."""
+    buffers = O3rBuffers(data / "tof_ifm_o3r" / "O3RBuffer.data")
+    frames = {frame.kind: frame for frame in buffers.frames() if isinstance(frame, Frame)}
+    distance, claimed = (frames[kind].si().astype(np.float64) for kind in (Kind.DEPTH, Kind.DEVIATION))
+    z = local.normalized(distance, claimed, buffers.cameras["depth"].rays())
+    found = [sigma_consistency.of_values("all", z)]
+    for near, far in ((0.2, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 2.0)):
+        found.append(sigma_consistency.of_values(f"{near} to {far} m", z[(distance >= near) & (distance < far)]))
+    return found
+
+
+def _print_walls() -> None:
+    print("| sensor | model | σ, 99 % | μ, 99 % | σ, rms | μ, rms | within σ | within 1.96 σ | fixed pattern |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name, query in HEADS.items():
+        found, head = walls(query)
+        sigma, mu, sigma_rms, mu_rms = errors(found, head)
+        fixed = float(np.median([row.fixed for _, row in found.rows])) * 1e3
+        quality = found.chosen.quality
+        print(
+            f"| {name} | {found.chosen.candidate.name} | {sigma:.1f} % | {mu:.2f} mm | {sigma_rms:.1f} % "
+            f"| {mu_rms:.2f} mm | {quality.within_one:.3f} | {quality.within_95:.3f} | {fixed:.2f} mm |",
+            flush=True,
+        )
+
+
+def _print_petit(data: Path) -> None:
+    static, one = petit(data)
+    print(f"\nsteps: {static.steps.growth * 1e3:.2f} mm at 1 m, ∝ x²; digits of {static.steps.digit * 1e3:.2g} mm\n")
+    print("| z mm | static σ mm | with motion, published | with motion, here | not static | pixels |")
+    print("|---|---|---|---|---|---|")
+    for (low, high), published, (still, moving, share, n) in zip(BINS, WITH_MOTION, by_distance(static, one)):
+        print(f"| {low} to {high} | {still:.2f} | {published:.2f} | {moving:.2f} | {share:.0%} | {n} |")
+
+
+def _print_o3r(data: Path) -> None:
+    print("\n| distance | pixels | within σ | within 1.96 σ | residual / claimed |")
+    print("|---|---|---|---|---|")
+    for claim in o3r(data):
+        print(f"| {claim.name} | {claim.pixels} | {claim.within_one:.3f} | {claim.within_95:.3f} | {claim.ratio:.2f} |")
+
+
+def main() -> None:
+    """Prints the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", nargs="?", type=Path, metavar="DATA")
+    parser.add_argument("--only", nargs="+", choices=("walls", "petit", "o3r"), default=["walls", "petit", "o3r"])
+    arguments = parser.parse_args()
+    if "walls" in arguments.only:
+        _print_walls()
+    if arguments.data is not None and "petit" in arguments.only:
+        _print_petit(arguments.data)
+    if arguments.data is not None and "o3r" in arguments.only:
+        _print_o3r(arguments.data)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Experiments on sensors and their images: several sensors, mosaics, warped input, real recordings."""

@@ -1,0 +1,69 @@
+"""What the tracker makes of recordings of real sensors; those that are not in the data folder are passed over."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from abs_service.report.content import Section
+from drivers.encoding.foreign_recording import ForeignRecordingError
+from evaluation.experiment import Context, Findings, UnavailableError
+from evaluation.inputs.recordings import azure, sigma_report, toy, toy_report
+
+__all__ = ["QUICK", "TITLE", "Settings", "run"]
+
+TITLE = "Real recordings: a soft toy (PrimeSense type), an ifm O3R and an Azure Kinect"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The full evaluation.
+
+    Attributes:
+        toy_frames: of the toy's sequence, from the first one on.
+        o3r_rounds: how often another tenth of the O3R's pixels is hidden.
+    """
+
+    toy_frames: int = 120
+    o3r_rounds: int = 5
+
+
+QUICK = Settings(toy_frames=6, o3r_rounds=1)
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Every recording that is there.
+
+    Raises:
+        UnavailableError: none is.
+    """
+    if context.data is None:
+        raise UnavailableError(f"needs --data DIR, a folder with {', '.join(_FOLDERS)}")
+    parts: dict[str, Callable[[Path], Findings]] = {
+        toy.FOLDER: lambda folder: toy_report.findings(folder, settings.toy_frames, context.seed, context.progress),
+        sigma_report.FOLDER: lambda folder: sigma_report.findings(folder, context.seed, settings.o3r_rounds),
+        azure.FOLDER: azure.findings,
+    }
+    found = []
+    for name, measure in parts.items():
+        context.progress(name)
+        found.append(_part(context.data / name, measure))
+    if not any(part.goals for part in found):
+        raise UnavailableError(f"--data {context.data} has none of {', '.join(_FOLDERS)} that could be read")
+    return Findings(
+        tuple(goal for part in found for goal in part.goals),
+        tuple(section for part in found for section in part.sections),
+        {name: value for part in found for name, value in part.values.items()},
+    )
+
+
+_FOLDERS = (toy.FOLDER, sigma_report.FOLDER, azure.FOLDER)
+
+
+def _part(folder: Path, measure: Callable[[Path], Findings]) -> Findings:
+    """What one recording shows, or only that it is not there."""
+    if not folder.is_dir():
+        return Findings((), (Section(folder.name, (f"{folder.name} is not in the data folder.",)),))
+    try:
+        return measure(folder)
+    except ForeignRecordingError as error:
+        return Findings((), (Section(folder.name, (f"{folder.name} cannot be read: {error}",)),))

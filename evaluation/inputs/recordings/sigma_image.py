@@ -1,0 +1,156 @@
+"""One frame of an ifm O3R: what the σ that the sensor tells for every pixel is worth in the likelihood.
+
+A tenth of the pixels is hidden from the tracker, which begins on each of the frame's large surfaces with a NURBS, under
+one noise model after the other. The hidden pixels then tell how likely they are, with the mesh as the true surface. The
+noise models' own parameters are those of greatest likelihood for what the other pixels deviate from local planes by.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.depth_segments import connected_surfaces
+from abs_service.tracker.models import nurbs
+from abs_service.tracker.optimizers import hybrid
+from abs_service.tracker.synthesis.rasterization.raster import Raster
+from abs_service.tracking.session import Tracking
+from calib.camera import Camera
+from calib.noise import constant, measured
+from calib.noise.base import DepthNoise
+from calib.noise.fit import quality
+from calib.noise.fit.quality import Quality
+from calib.noise.fit.samples import Samples, from_images
+from calib.rig import Rig, Sensor
+from calib.sequences import local
+from drivers.contract.frame import Frame, FrameSet, Kind
+from drivers.o3r.buffers import SENSOR, O3rBuffers
+from evaluation.sequences import demo_plan
+
+#: Neighbouring pixels whose distances differ by more show different surfaces [m].
+LARGEST_STEP_M = 0.015
+#: Surfaces with fewer pixels are left out.
+LEAST_PIXELS = 700
+#: One pixel in so many is hidden.
+PARTS = 10
+
+#: The box has edges that a smaller margin does not reach around.
+MODEL = nurbs.Settings((6, 6), margin=0.2)
+#: The mesh begins where the frame says; there is nothing to look for farther away.
+SEARCH = hybrid.Settings(restarts=0)
+
+CLAIMED = "the sensor's own σ as it is"
+ONE = "one σ for all pixels"
+FITTED = "the sensor's own σ, with factor and floor"
+
+
+@dataclass(frozen=True, eq=False)
+class O3rExposure:
+    """The frames of one exposure by what they hold, and what took them."""
+
+    frames: Mapping[Kind, Frame]
+    camera: Camera
+
+    def image(self, kind: Kind) -> NDArray[np.float64]:
+        """One of them (height, width) in SI units, NaN without return."""
+        return self.frames[kind].si().astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A noise model, and its agreement with pixels that nothing was fitted to."""
+
+    name: str
+    model: DepthNoise
+    quality: Quality
+    pixels: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Surface:
+    """The region of one surface of the frame, and its settings."""
+
+    label: int
+
+    def build(self) -> "_Surface":
+        return self
+
+    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+        labels, _ = connected_surfaces(distance, LARGEST_STEP_M)
+        return labels == self.label
+
+
+def read(folder: Path) -> O3rExposure:
+    """The frame."""
+    buffers = O3rBuffers(folder / "O3RBuffer.data")
+    return O3rExposure({frame.kind: frame for frame in buffers.frames()}, buffers.cameras[SENSOR])
+
+
+def compared(exposure: O3rExposure, generator: np.random.Generator, rounds: int) -> list[Row]:
+    """Every noise model's agreement with hidden pixels.
+
+    Args:
+        exposure: the frame.
+        generator: draws which pixels are hidden.
+        rounds: how often another tenth of them is, at most ten.
+    """
+    part = generator.permuted(np.arange(exposure.image(Kind.DEPTH).size) % PARTS).reshape(
+        exposure.image(Kind.DEPTH).shape
+    )
+    found: dict[str, list[tuple[DepthNoise, Samples]]] = {}
+    for hidden in range(rounds):
+        seen = _without(exposure, part == hidden)
+        for name, model in noises(seen).items():
+            for samples in _hidden(seen, model, exposure):
+                found.setdefault(name, []).append((model, samples))
+    return [_row(name, results) for name, results in found.items()]
+
+
+def _row(name: str, results: list[tuple[DepthNoise, Samples]]) -> Row:
+    model = results[-1][0]
+    judged = [(quality.goodness_of_fit(one, samples), len(samples)) for one, samples in results]
+    weights = np.array([count for _, count in judged])
+    names = ("log_likelihood", "outlier_share", "variance", "within_one", "within_95")
+    means = [float(np.average([getattr(one, key) for one, _ in judged], weights=weights)) for key in names]
+    return Row(name, model, Quality(*means), int(weights.sum()))
+
+
+def noises(exposure: O3rExposure) -> dict[str, DepthNoise]:
+    """The noise models, fitted to how pixels deviate from planes through their neighbours."""
+    distance, own = exposure.image(Kind.DEPTH), exposure.image(Kind.DEVIATION)
+    aside = local.normalized(distance, np.ones_like(distance), exposure.camera.rays())
+    samples = from_images(distance, distance - aside, own)
+    fitted = measured.fit(samples)
+    return {CLAIMED: measured.Measured(), ONE: replace(constant.fit(samples), offset=0.0), FITTED: fitted}
+
+
+def _without(exposure: O3rExposure, hidden: NDArray[np.bool_]) -> O3rExposure:
+    depth = exposure.frames[Kind.DEPTH]
+    data = np.where(hidden, depth.data.dtype.type(0), depth.data)
+    return replace(exposure, frames={**exposure.frames, Kind.DEPTH: replace(depth, data=data)})
+
+
+def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterator[Samples]:
+    """Of every surface the pixels that the tracker did not see, with the mesh that it found as the true surface."""
+    labels, count = connected_surfaces(seen.frames[Kind.DEPTH].si(), LARGEST_STEP_M)
+    sizes = np.bincount(labels.ravel(), minlength=count)
+    distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
+    unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)
+    for label in np.flatnonzero(sizes >= LEAST_PIXELS)[1:]:
+        found = _rendered(seen, noise, int(label))
+        there = unseen & np.isfinite(found)
+        yield from_images(np.where(there, distance, np.nan), found, own).take(there.ravel())
+
+
+def _rendered(exposure: O3rExposure, noise: DepthNoise, label: int) -> NDArray[np.float64]:
+    """Radial distances (height, width) [m] of the mesh that the tracker makes of a surface; NaN beside it."""
+    rig = Rig("o3r", {SENSOR: Sensor(SENSOR, exposure.camera, noise)})
+    plan = demo_plan(MODEL, reference=SENSOR, region=_Surface(label), vertices=300, optimizer=SEARCH)
+    tracking, frames = Tracking(rig, plan), {frame.key: frame for frame in exposure.frames.values()}
+    estimate = tracking.track(FrameSet(0, exposure.frames[Kind.DEPTH].t_host_ns, frames), lambda: True)
+    if tracking.mesh is None:
+        raise RuntimeError(f"surface {label}: {', '.join(estimate.reasons)}")
+    image = Raster(exposure.camera, tracking.mesh.faces).render(np.ascontiguousarray(estimate.vertices.T))
+    return np.where(np.isfinite(image), image, np.nan).astype(np.float64)

@@ -1,0 +1,157 @@
+"""The real sequence: a soft toy squeezed by a hand, 120 frames of a PrimeSense-type sensor.
+
+The images have no licence, so neither they nor parts of them are in this repository, and pictures show their edges
+only.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service import config, wiring
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracking.session import Tracking
+from abs_service.tracking.warmup import warm_up
+from calib.camera import Camera
+from drivers.contract.frame import FrameSet, Kind
+from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
+from drivers.image_folder.listing import by_number
+from evaluation.inputs.recordings.agreement import Agreement, agreement
+
+#: From the data's own description: 320 × 240, focal length 275 px, centre (160, 120); depth is z in millimetres.
+CAMERA = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
+RATE_HZ = 30.0
+FOLDER, TRACKER = "sl_rgbd_deform_petit", "toy"
+
+#: What the tracker is given in place of a frame set; None if it is to see nothing of that reference.
+Change = Callable[[int, FrameSet], FrameSet | None]
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceFrame:
+    """One frame set, with what it is judged by: radial distances [m] and the object's pixels (height, width)."""
+
+    frames: FrameSet
+    distance: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+    edges: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedFrame:
+    """The estimate of one reference, its mesh and how well that agrees with the undisturbed depth image.
+
+    Attributes:
+        index: of the reference.
+        solve_ms: time that the tracker took [ms].
+    """
+
+    index: int
+    estimate: Estimate
+    faces: NDArray[np.int32]
+    agreement: Agreement
+    solve_ms: float
+
+    @property
+    def tracking(self) -> bool:
+        """Whether the estimate says so."""
+        return self.estimate.status == Status.TRACKING
+
+
+class Toy:
+    """The sequence in memory.
+
+    Args:
+        folder: with depth_mm_*.png, color_*.png and seg_*.png, the object's mask: the toy and the hand on it.
+        frames: how many frames, from the first one on.
+    """
+
+    def __init__(self, folder: Path, frames: int):
+        depth, color, masks = (by_number(folder, f"{name}_*.png", RATE_HZ)[:frames] for name in _NAMES)
+        images = ImageFolder({"depth": DepthImages(depth, CAMERA, 0.001), "color": ColorImages(color, CAMERA)})
+        text = resources.files(__name__.rpartition(".")[0]).joinpath("toy.toml").read_text(encoding="utf-8")
+        self._settings = config.loads(text.replace("mask.png", masks[0].path.resolve().as_posix()), "toy.toml", folder)
+        self._rig = wiring.rig(self._settings, TRACKER, images.cameras)
+        synchroniser = wiring.synchroniser(self._settings, TRACKER, self._rig.sensors.values())
+        sets = [one for frame in images.frames() for one in synchroniser.add(frame)] + list(synchroniser.flush())
+        # As the service does before its first image; compiling is no part of a frame's time.
+        warm_up(wiring.noises(self._settings, TRACKER), wiring.plan(self._settings, TRACKER))
+        self.references = [_reference_frame(one, _mask(mask.path)) for one, mask in zip(sets, masks, strict=True)]
+
+    @cached_property
+    def budget_ms(self) -> float:
+        """What the live search may take for a frame set [ms]."""
+        return self._settings.trackers[TRACKER].budget_ms
+
+    def tracking(self) -> Tracking:
+        """A new tracker."""
+        return Tracking(self._rig, wiring.plan(self._settings, TRACKER))
+
+    def follow(
+        self, clock: Callable[[], int], change: Change = lambda _, frames: frames, budget_ms: float = np.inf
+    ) -> Iterator[TrackedFrame]:
+        """Tracks the sequence.
+
+        Args:
+            clock: time [ns], by which the search's time is measured.
+            change: makes of the frame set of a reference what the tracker sees.
+            budget_ms: what a search may take.
+        """
+        tracking = self.tracking()
+        for index, reference in enumerate(self.references):
+            frames = change(index, reference.frames)
+            if frames is None:
+                continue
+            begin_ns = clock()
+            estimate = tracking.track(frames, lambda begin_ns=begin_ns: clock() - begin_ns < budget_ms * 1e6)
+            solve_ms = (clock() - begin_ns) * 1e-6
+            if tracking.mesh is None:
+                raise RuntimeError(f"frame {index}: {', '.join(estimate.reasons)}")
+            faces = tracking.mesh.faces
+            found = agreement(estimate.vertices, faces, reference.distance, reference.mask, CAMERA)
+            yield TrackedFrame(index, estimate, faces, found, solve_ms)
+
+
+_NAMES = ("depth_mm", "color", "seg")
+
+
+def medians(frames: Sequence[TrackedFrame]) -> Agreement:
+    """The median of every number over some frames."""
+    return _reduced(frames, np.median, np.median)
+
+
+def worst(frames: Sequence[TrackedFrame]) -> Agreement:
+    """The largest residuals and the smallest shares of some frames."""
+    return _reduced(frames, np.max, np.min)
+
+
+def _reduced(
+    frames: Sequence[TrackedFrame], residuals: Callable[..., np.floating], shares: Callable[..., np.floating]
+) -> Agreement:
+    found = [frame.agreement for frame in frames]
+    return Agreement(
+        forward_mm=float(residuals([one.forward_mm for one in found])),
+        backward_mm=float(residuals([one.backward_mm for one in found])),
+        inside=float(shares([one.inside for one in found])),
+        covered=float(shares([one.covered for one in found])),
+    )
+
+
+def _reference_frame(frames: FrameSet, mask: NDArray[np.bool_]) -> ReferenceFrame:
+    images = {frame.kind: frame for frame in frames.frames.values()}
+    distance = images[Kind.DEPTH].si() * CAMERA.lookup.ray_length.astype(np.float32)
+    edges = cv2.Canny(np.ascontiguousarray(images[Kind.COLOR].data, np.uint8), 60, 140)
+    return ReferenceFrame(frames, distance, mask, np.asarray(edges, np.uint8))
+
+
+def _mask(path: Path) -> NDArray[np.bool_]:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise FileNotFoundError(path)
+    return np.asarray(image)[..., 3] > 0

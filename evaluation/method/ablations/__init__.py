@@ -1,0 +1,220 @@
+"""What a reader asks: what does each part contribute, and how much does it matter how much of it there is?"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from abs_service.report.content import Section
+from abs_service.tracker.models import flexpad, nurbs
+from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.optimizers import cma_es, hybrid
+from abs_service.tracker.posterior import priors
+from abs_service.tracking.session import Plan
+from calib.noise.base import DepthNoise
+from calib.noise.constant import Constant
+from calib.noise.tof_amplitude import TofAmplitude
+from calib.rig import Rig
+from drivers.simulated.sensors.time_of_flight import TimeOfFlightNoise
+from evaluation.experiment import Context, Findings, Goal, at_least, at_most
+from evaluation.method.ablations import report
+from evaluation.method.ablations.cold_start import Cold, Forgetful
+from evaluation.scenes.exposure import LabeledExposure
+from evaluation.sequences import (
+    TrackedSequence,
+    demo_plan,
+    demo_rig,
+    expose,
+    moving_indices,
+    simulate,
+    track,
+    with_noise,
+)
+
+TITLE = "Ablations: vertices, budget, warm start, priors, noise model"
+
+#: As good as no prior at all.
+FREE = 1e3
+
+#: Of the demo's time-of-flight sensor, on its sheet [m].
+MEAN_DEVIATION = 4.5e-3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much is measured.
+
+    Attributes:
+        seeds: sequences, each with a motion, print and noise of its own.
+        frames: of each.
+        every: exposures from one frame to the next, at 30 Hz.
+        bend: largest angle between two ends of the sheet [degrees].
+        speed: of all motion, by that of the demo.
+        noise: of all sensors, by that of the demo.
+        vertices, populations, generations: that are tried.
+        factors: on the σ of distances that the tracker believes in.
+    """
+
+    seeds: int = 3
+    frames: int = 30
+    every: int = 4
+    bend: float = 90.0
+    speed: float = 2.0
+    noise: float = 1.5
+    vertices: tuple[int, ...] = (100, 200, 400, 800, 1600)
+    populations: tuple[int, ...] = (8, 16, 32, 64)
+    generations: tuple[int, ...] = (3, 10, 30, 100, 300, 1000)
+    factors: tuple[float, ...] = (0.5, 1.0, 2.0)
+
+
+QUICK = Settings(seeds=1, frames=7, every=6, vertices=(100, 300), populations=(8, 32), generations=(3, 30))
+
+
+@dataclass(frozen=True, eq=False)
+class Variant:
+    """One line of a table.
+
+    Attributes:
+        name: what is different.
+        plan: of the tracker.
+        rig: the sensors as the tracker believes that they are.
+    """
+
+    name: str
+    plan: Plan
+    rig: Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """One table.
+
+    Attributes:
+        title: of the table.
+        variants: its lines.
+    """
+
+    title: str
+    variants: tuple[Variant, ...]
+
+
+def questions(settings: Settings) -> list[Question]:
+    """All tables, one for every question."""
+    rig = believed(settings.noise, 1.0)
+    tried = [
+        _question("Vertices", rig, {f"{count}": {"vertices": count} for count in settings.vertices}),
+        *_of_searches(settings, rig),
+        _question("Priors, NURBS", rig, {name: {"priors": one} for name, one in PRIORS.items()}),
+        _question(
+            "Priors, FlexPad",
+            rig,
+            {name: {"model": flexpad.Settings(0.3, 0.2), "priors": one} for name, one in PRIORS.items()}
+            | {"bends free": {"model": flexpad.Settings(0.3, 0.2, bend_deviation=FREE)}},
+        ),
+    ]
+    return [*tried, Question("Noise model of distances", _believed(settings))]
+
+
+def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
+    """What the budget of a search, its cost and its start do."""
+    search = cma_es.Settings()
+    populations = {f"{count}": {"optimizer": cma_es.Settings(count, 30)} for count in settings.populations}
+    generations = {f"{count}": {"optimizer": cma_es.Settings(16, count)} for count in settings.generations}
+    misplaced = {count: {**changes, "objective": MISPLACED} for count, changes in generations.items()}
+    starts = {
+        "prediction, step size and covariance": {"optimizer": search},
+        "prediction alone": {"optimizer": Forgetful(search)},
+        "none: every frame begins at rest": {"optimizer": Cold(search)},
+    }
+    return [
+        _question("Population of CMA-ES, 30 generations", rig, populations),
+        _question("Generations of CMA-ES, 16 candidates", rig, generations),
+        _question("Generations of CMA-ES, colours misplaced by 0.2 px", rig, misplaced),
+        _question("Warm start of CMA-ES, 20 generations", rig, starts),
+        _question("Warm start of hybrid", rig, {"prediction": {}, "none": {"optimizer": Cold(hybrid.Settings())}}),
+    ]
+
+
+def _believed(settings: Settings) -> tuple[Variant, ...]:
+    """The true law with a σ that is wrong by some factor, and models that know less."""
+    plan = demo_plan(nurbs.Settings())
+    laws = {f"{factor:g} σ": believed(settings.noise, factor) for factor in settings.factors}
+    laws["one σ everywhere"] = _with_noise(Constant(settings.noise * MEAN_DEVIATION))
+    return tuple(Variant(name, plan, rig) for name, rig in laws.items())
+
+
+#: Allows for colours that are not quite where they belong, which makes the cost of a frame smoother.
+MISPLACED = likelihood.Settings(misplacement_px=0.2)
+
+#: By what is left out. Without the motion prior nothing but the last frame's solution, where a search begins, is kept.
+PRIORS: Mapping[str, priors.Settings] = {
+    "all": priors.Settings(),
+    "no stretch prior": priors.Settings(stretch=FREE),
+    "no motion prior": priors.Settings(speed=FREE),
+    "no prediction": priors.Settings(memory_s=1e-6),
+    "neither stretch nor motion": priors.Settings(stretch=FREE, speed=FREE),
+}
+
+
+def believed(noise: float, factor: float) -> Rig:
+    """The demo's sensors, which err by `noise` of what they err there; distances by a σ that is wrong by a factor."""
+    law, true = factor * noise, TimeOfFlightNoise()
+    return _with_noise(TofAmplitude((law * true.sigma_offset, law * true.sigma_distance), law * true.sigma_amplitude))
+
+
+def _with_noise(noise: DepthNoise) -> Rig:
+    return with_noise(demo_rig(simulate("simulated://sheet")), "tof", noise)
+
+
+def _question(title: str, rig: Rig, lines: Mapping[str, Mapping[str, Any]]) -> Question:
+    plans = {name: demo_plan(**{"model": nurbs.Settings(), **changes}) for name, changes in lines.items()}
+    return Question(title, tuple(Variant(name, plan, rig) for name, plan in plans.items()))
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Answers all questions on the same sequences."""
+    context.progress("images")
+    sequences = [_exposures(settings, context.seed + 1 + number) for number in range(settings.seeds)]
+    found: dict[str, dict[str, list[TrackedSequence]]] = {}
+    for question in questions(settings):
+        found[question.title] = {}
+        for variant in question.variants:
+            context.progress(f"{question.title}: {variant.name}")
+            found[question.title][variant.name] = [
+                track(variant.rig, variant.plan, exposures) for exposures in sequences
+            ]
+    sections = (
+        Section("The scene", (_about(settings), report.scene(sequences[0]))),
+        *(Section(title, (report.table(title, lines),)) for title, lines in found.items()),
+        Section("Curves", (report.curves(found),)),
+    )
+    values = {title: {name: report.figures(runs) for name, runs in lines.items()} for title, lines in found.items()}
+    return Findings(_goals(values), sections, values)
+
+
+def _exposures(settings: Settings, seed: int) -> list[LabeledExposure]:
+    motion = f"bend={settings.bend:g}&speed={settings.speed:g}&noise={settings.noise:g}"
+    simulation = simulate(f"simulated://sheet?seed={seed}&{motion}")
+    return expose(simulation, moving_indices(settings.frames, settings.every))
+
+
+def _goals(values: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[Goal, ...]:
+    """What must hold whatever the figures are: no part of the default is a burden."""
+    sigma = values["Noise model of distances"]
+    wrong = max(sigma[name]["vertex_mm"] for name in sigma if name.endswith(" σ")) / sigma["1 σ"]["vertex_mm"]
+    of_priors = values["Priors, NURBS"]
+    without = min(figures["vertex_mm"] for name, figures in of_priors.items() if name != "all")
+    return (
+        at_most("Vertex error with a σ that is wrong by 2 / with the right one", wrong, 1.25),
+        at_least(
+            "Vertex error without the least useful prior / with all", without / of_priors["all"]["vertex_mm"], 0.98
+        ),
+    )
+
+
+def _about(settings: Settings) -> str:
+    return (
+        f"The demo's sheet, bent by up to {settings.bend:g}°, {settings.speed:g} times as fast, with "
+        f"{settings.noise:g} times the noise, one image in {settings.every / 30:.2g} s; time of flight and colour. "
+        "Whatever a line does not say is the default: NURBS of 4 × 4 control points, 300 vertices, hybrid. Figures are "
+        "means over the sequences."
+    )

@@ -1,0 +1,86 @@
+"""The honest rival: a B-spline sheet fitted to one depth image by Gauss–Newton, in plain NumPy."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from evaluation.scenes.bent_sheet import CAMERA, SIDE, Shot
+from evaluation.scenes.surfaces import knots
+
+CONTROL, DEGREE, ITERATIONS = 4, 3, 6
+
+#: Standard deviations: of an edge's relative change of length, of what is beside the silhouette [m], of a control
+#: point's motion between frames [m].
+EDGE, BESIDE_M, MOTION_M = 0.02, 0.005, 0.05
+
+
+class GaussNewton:
+    """4 × 4 control points, six iterations; residuals are distances, edge lengths, silhouette and motion.
+
+    Args:
+        vertices: the template (n, 3) [m] in its first pose, row by row.
+        sigma: standard deviation of the distances [m].
+        knows_hole: whether it is told which pixels are a hole; else what is missing there is beside the silhouette.
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], sigma: float, knows_hole: bool = False):
+        u = BSpline.design_matrix(np.linspace(0, 1, SIDE), knots(CONTROL, DEGREE), DEGREE).toarray()
+        self._basis = np.kron(u, u)
+        grid = np.arange(SIDE * SIDE).reshape(SIDE, SIDE)
+        steps = [(grid[:, :-1], grid[:, 1:]), (grid[:-1], grid[1:]), (grid[:-1, :-1], grid[1:, 1:])]
+        self._a, self._b = (np.concatenate([step[i].ravel() for step in steps]) for i in (0, 1))
+        self._length = np.linalg.norm(vertices[self._a] - vertices[self._b], axis=1)
+        self._change = self._basis[self._a] - self._basis[self._b]
+        self._control = np.linalg.pinv(self._basis) @ vertices
+        self._sigma, self._knows_hole = sigma, knows_hole
+
+    def track(self, shot: Shot) -> NDArray[np.float64]:
+        """Vertices (n, 3) [m] in a frame."""
+        points = CAMERA.unproject(shot.distance)
+        nearest = _nearest_on(shot.sheet)
+        before = self._control
+        for _ in range(ITERATIONS):
+            vertices = self._basis @ self._control
+            columns, rows = np.floor(CAMERA.project(vertices) + 0.5).astype(int).T
+            rows, columns = np.clip(rows, 0, CAMERA.height - 1), np.clip(columns, 0, CAMERA.width - 1)
+            use = ~shot.hole[rows, columns] if self._knows_hole else np.ones(len(rows), bool)
+            beside = use & ~shot.sheet[rows, columns]
+            rows, columns = nearest[:, rows, columns]
+            away = points[rows, columns] - vertices
+            ray = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+            on = use & ~beside & (np.abs(np.sum(away * ray, axis=1)) < 0.1)
+            edge = vertices[self._a] - vertices[self._b]
+            length = np.linalg.norm(edge, axis=1)
+            weight = 1 / (EDGE * self._length)
+            blocks = [
+                _rows(self._basis[on], ray[on] / self._sigma, np.sum(away * ray, axis=1)[on] / self._sigma),
+                _rows(self._change, edge * (weight / length)[:, None], (self._length - length) * weight),
+                *(
+                    _rows(self._basis[beside], np.tile(axis, (beside.sum(), 1)), away[beside] @ axis)
+                    for axis in np.eye(3) / BESIDE_M
+                ),
+                (np.eye(before.size) / MOTION_M, (before - self._control).ravel() / MOTION_M),
+            ]
+            system, target = (np.concatenate(part) for part in zip(*blocks))
+            step = np.linalg.solve(system.T @ system, system.T @ target)
+            self._control = self._control + step.reshape(-1, 3)
+        return self._basis @ self._control
+
+
+def _rows(
+    basis: NDArray[np.float64], direction: NDArray[np.float64], target: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rows (m, 3 · control points) of residuals that move along directions (m, 3), and what they should become."""
+    return np.einsum("mc,mi->mci", basis, direction).reshape(len(basis), 3 * basis.shape[1]), target
+
+
+def _nearest_on(sheet: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Row and column (2, height, width) of the pixel of the sheet that is nearest to every pixel."""
+    labels = cv2.distanceTransformWithLabels(
+        (~sheet).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )[1]
+    which = np.asarray(labels, np.intp)
+    table = np.zeros((2, int(which.max()) + 1), np.intp)
+    table[:, which[sheet]] = np.nonzero(sheet)
+    return table[:, which]

@@ -1,0 +1,127 @@
+"""Other programs that deform a template to measured points, each behind one function; not all need be installed."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.grid_mesh import triangles
+from evaluation.scenes.bent_sheet import SIDE, Shot
+
+#: Coherent point drift is tuned for points that are about one apart: it gets them in units of 100 mm.
+UNIT_M = 0.1
+
+ALPHA, BETA, ITERATIONS = 1.0, 1.0, 50
+
+
+#: Moves its second argument (n, 3) to its first (k, 3), both in units, with a package.
+Registration = Callable[[Any, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+
+class Follower(Protocol):
+    """Something that follows a template through frames, each from where it was in the last one."""
+
+    def track(self, shot: Shot) -> NDArray[np.floating]:
+        """Vertices (n, 3) [m] of the template in a frame."""
+        ...
+
+
+class PointSets:
+    """A registration of point sets, begun at the last frame's result.
+
+    Args:
+        vertices: the template (n, 3) [m] in its first pose.
+        package: what `register` needs.
+        register: see `Registration`.
+    """
+
+    def __init__(self, vertices: NDArray[np.float64], package: str, register: Registration):
+        self._vertices = vertices
+        self._module = import_module(package)
+        self._register = register
+
+    def track(self, shot: Shot) -> NDArray[np.float64]:
+        """Vertices (n, 3) [m] in a frame."""
+        moved = self._register(self._module, shot.cloud / UNIT_M, self._vertices / UNIT_M)
+        self._vertices = np.asarray(moved, np.float64) * UNIT_M
+        return self._vertices
+
+
+class Still:
+    """No tracking at all: how much there was to follow."""
+
+    def __init__(self, vertices: NDArray[np.float64]):
+        self._vertices = vertices
+
+    def track(self, shot: Shot) -> NDArray[np.float64]:
+        """The template's first pose."""
+        return self._vertices
+
+
+def _pycpd(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    drift = module.DeformableRegistration(alpha=ALPHA, beta=BETA, X=cloud, Y=source, max_iterations=ITERATIONS)
+    return drift.register()[0]
+
+
+def _biocpd(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    drift = module.DeformableRegistration(
+        alpha=ALPHA, beta=BETA, X=cloud, Y=source, max_iterations=ITERATIONS, num_eig=60
+    )
+    return drift.register()[0]
+
+
+def _rustcpd_full(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    return module.register_deformable(
+        cloud, source, alpha=ALPHA, beta=BETA, low_rank=None, max_iterations=ITERATIONS, parallel=False
+    ).points
+
+
+def _rustcpd_fast(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    return module.register_deformable(
+        cloud,
+        source,
+        alpha=ALPHA,
+        beta=BETA,
+        low_rank=60,
+        k=10,
+        max_iterations=20,
+        parallel=False,
+        single_precision=True,
+    ).points
+
+
+def _amberg(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    return module.nricp_amberg(_mesh(source), cloud, use_faces=False)
+
+
+def _sumner(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    return module.nricp_sumner(_mesh(source), cloud, use_faces=False)
+
+
+def _mesh(vertices: NDArray[np.float64]) -> Any:
+    faces = triangles(np.arange(SIDE * SIDE).reshape(SIDE, SIDE))
+    return import_module("trimesh").Trimesh(vertices, faces, process=False)
+
+
+#: What a row is called, the package that it needs, and its registration.
+KNOWN: Mapping[str, tuple[str, Registration]] = {
+    "pycpd": ("pycpd", _pycpd),
+    "biocpd, rank 60": ("biocpd", _biocpd),
+    "rustcpd, full rank": ("rustcpd", _rustcpd_full),
+    "rustcpd, rank 60, k 10, f32": ("rustcpd", _rustcpd_fast),
+    "trimesh nricp_amberg": ("trimesh.registration", _amberg),
+    "trimesh nricp_sumner": ("trimesh.registration", _sumner),
+}
+
+
+def installed(names: Sequence[str]) -> dict[str, Callable[[NDArray[np.float64]], Follower]]:
+    """Makers of those of the named rivals whose packages are installed."""
+    return {
+        name: partial(PointSets, package=package, register=register)
+        for name, (package, register) in KNOWN.items()
+        if name in names and find_spec(package.partition(".")[0])
+    }

@@ -1,0 +1,1 @@
+"""Experiments of the paper, E1 to E6."""

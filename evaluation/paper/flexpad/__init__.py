@@ -1,0 +1,208 @@
+"""E2: a sheet that bends as FlexPad says, so that the true Θ is known, before a sensor of known deviation.
+
+The simulator rolls a sheet onto a cylinder, exactly and with code of its own. If the bent direction is one of FlexPad's
+four and the cylinder touches the sheet's centre, both sides of that direction are bent alike and all others are flat.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models import flexpad
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.optimizers import cma_es, hybrid
+from abs_service.tracking.session import OptimizerSettings
+from calib.camera import Camera
+from calib.lens import Lens
+from calib.noise.tof_amplitude import TofAmplitude
+from calib.pose import Pose
+from calib.rig import Rig, Sensor
+from drivers.simulated.scene.motion import Motion, Placement
+from drivers.simulated.scene.scene import REST_Z, Scene
+from drivers.simulated.scene.texture import smooth_pattern
+from drivers.simulated.sensors.optics import OPTICS
+from drivers.simulated.sensors.time_of_flight import TimeOfFlight
+from drivers.simulated.shapes.rectangle import Rectangle
+from drivers.simulated.simulation import Simulation
+from evaluation.experiment import Context, Findings, at_least
+from evaluation.paper.flexpad import report
+from evaluation.paper.flexpad.report import Errors, Tracked
+from evaluation.paper.wall_calibration import learnt
+from evaluation.scenes.exposure import LabeledExposure
+from evaluation.sequences import (
+    TrackedSequence,
+    demo_plan,
+    euclidean_fitness,
+    expose,
+    mean_deviation,
+    moving_indices,
+    track,
+)
+
+TITLE = "E2: FlexPad on sheets whose bends are known"
+
+#: The sheet [m], and what of the sensor's light its print reflects, so that σ varies between 3 and 17 mm.
+WIDTH, HEIGHT = 0.30, 0.20
+REFLECTIVITY = 0.06, 0.9
+
+#: The directions in the order of the model's bends [degrees].
+DIRECTIONS = (0, 45, 90, 135)
+
+#: Nearer than this is the sheet, farther the wall [m].
+BETWEEN_M = 1.3
+
+#: Residual, in deviations, from which on the likelihood takes a measurement for an outlier (docs/noise.md).
+BOUND = 4.2
+
+MODEL = flexpad.Settings(WIDTH, HEIGHT)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How much is measured.
+
+    Attributes:
+        directions: that sheets bend in, of `DIRECTIONS`.
+        motions: sequences of each.
+        frames: of each sequence.
+        every: exposures from one frame to the next, at 30 Hz; one is taken of the first second, in which nothing moves.
+        bend: largest angle between two ends of a sheet [degrees].
+        published: frames of the first sequence that are searched with the paper's budget as well.
+        still: frames of each static sequence of the noise calibration.
+    """
+
+    directions: tuple[int, ...] = DIRECTIONS
+    motions: int = 2
+    frames: int = 50
+    every: int = 5
+    bend: float = 75.0
+    published: int = 20
+    still: int = 10
+
+
+QUICK = Settings(directions=(0, 135), motions=1, frames=16, every=8, published=0, still=2)
+
+
+@dataclass(frozen=True)
+class OneDirection:
+    """A motion of which only those bends are kept that FlexPad has.
+
+    Attributes:
+        motion: what is left of it.
+        degrees: the direction, from the long side.
+    """
+
+    motion: Motion
+    degrees: int
+
+    def at(self, t: float) -> Placement:
+        """The placement at time `t` [s] after the start."""
+        return replace(self.motion.at(t), direction=np.deg2rad(self.degrees), offset=0.0)
+
+
+@dataclass(frozen=True)
+class Bent:
+    """A sheet that bends in one direction and moves.
+
+    Attributes:
+        degrees: the direction.
+        seed: of its motion, print and noise.
+        bend: largest angle between two ends [degrees].
+    """
+
+    degrees: int
+    seed: int
+    bend: float
+
+    @cached_property
+    def moves(self) -> OneDirection:
+        """Its motion."""
+        rotation, bend = (np.deg2rad(13), np.deg2rad(13), np.deg2rad(10)), np.deg2rad(self.bend)
+        motion = Motion(self.seed, (0.0, 0.0, REST_Z), (0.04, 0.03, 0.05), rotation, bend, WIDTH, HEIGHT, 0.0, 0.0)
+        return OneDirection(motion, self.degrees)
+
+    def simulation(self) -> Simulation:
+        """The sheet before a wall, seen by a time-of-flight sensor of the SR4000's geometry without mean offset."""
+        pattern = smooth_pattern(self.seed, WIDTH, HEIGHT, (0.025, 0.01, 0.004), 800.0, (0.1, 0.95), REFLECTIVITY)
+        wall = smooth_pattern(self.seed + 1, 4.0, 3.0, (0.2, 0.05), 100.0, (0.3, 0.6), (0.12, 0.7))
+        scene = Scene((Rectangle(WIDTH, HEIGHT, self.moves, pattern),), wall)
+        return Simulation(scene, {"tof": TimeOfFlight("tof", _camera(), scene, 30.0)}, self.seed, 30.0)
+
+    def errors(self, followed: TrackedSequence) -> Errors:
+        """How far the estimates' parameters are from the true ones."""
+        bends, poses = followed.thetas[:, flexpad.BENDS], []
+        true = np.zeros_like(bends)
+        first = 2 * DIRECTIONS.index(self.degrees)
+        for number, estimate in enumerate(followed.estimates):
+            placement = self.moves.at(estimate.t_host_ns * 1e-9)
+            true[number, first : first + 2] = -2 * MODEL.least_radius_m * placement.curvature
+            poses.append(_pose_error(_unbent(followed.models[number], estimate.theta), placement.T_rp))
+        rotation, translation = np.mean(poses, axis=0)
+        return Errors(bends, true, followed.thetas[:, flexpad.HEIGHT], float(rotation), float(translation))
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Follows all sequences with the Euclidean fitness, bounded and not, and with the likelihood."""
+    context.progress("noise calibration")
+    noise = learnt("", settings.still, context.seed)
+    bents, tracked, sequences = [], [], []
+    for degrees in settings.directions:
+        for number in range(settings.motions):
+            context.progress(f"bends of {degrees}°, sequence {number + 1}")
+            bents.append(Bent(degrees, context.seed + 1 + 10 * degrees + number, settings.bend))
+            sequences.append(expose(bents[-1].simulation(), moving_indices(settings.frames, settings.every)))
+            tracked.append(_track(bents[-1], sequences[-1], noise, hybrid.Settings()))
+    few, budgets = sequences[0][: settings.published], {}
+    if few:
+        context.progress("the paper's budget")
+        published = cma_es.Settings(population=16, generations=400)
+        searches = {"hybrid": hybrid.Settings(), "CMA-ES, 400 × 16 at most": published}
+        budgets = {name: _track(bents[0], few, noise, search) for name, search in searches.items()}
+    goals = (
+        at_least("Surface error, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "surface_mm"), 1.0),
+        at_least("Error of the bends, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "bend"), 1.0),
+        at_least(
+            "Surface error, Euclidean that is bounded like the likelihood / likelihood",
+            report.ratio(tracked, "Euclidean, bounded", "surface_mm"),
+            1.0,
+        ),
+    )
+    return Findings(goals, report.sections(tracked, budgets, sequences[0]), report.values(tracked))
+
+
+def _track(bent: Bent, exposures: list[LabeledExposure], noise: TofAmplitude, search: OptimizerSettings) -> Tracked:
+    rig = Rig("sheet", {"tof": Sensor("tof", _camera(), noise)})
+    deviation = mean_deviation(rig, "tof", exposures[0], BETWEEN_M)
+    plain = euclidean_fitness(deviation)
+    fitness = {
+        "Euclidean": plain,
+        "Euclidean, bounded": replace(plain, cutoff_m=BOUND * deviation),
+        "likelihood": likelihood.Settings(),
+    }
+    plans = {name: demo_plan(MODEL, objective=objective, optimizer=search) for name, objective in fitness.items()}
+    followed = {name: track(rig, plan, exposures) for name, plan in plans.items()}
+    errors = {name: bent.errors(one) for name, one in followed.items()}
+    return Tracked(f"{bent.degrees}°, seed {bent.seed}", deviation, followed, errors)
+
+
+def _camera() -> Camera:
+    return OPTICS["tof"].camera(OPTICS["tof"].width, OPTICS["tof"].height, Lens())
+
+
+def _unbent(model: DeformationModel, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The vertices (n, 3) [m] that theta has without its bends: where its pose puts the flat sheet."""
+    flat = np.concatenate([np.zeros(flexpad.HEIGHT + 1), theta[flexpad.HEIGHT + 1 :]])
+    return model.deform(flat[None]).vertices[0].T.astype(np.float64)
+
+
+def _pose_error(flat: NDArray[np.float64], T_rp: Pose) -> tuple[float, float]:
+    """Angle [mrad] and distance [mm] between the pose of a flat mesh (n, 3), a regular grid, and the true one."""
+    center = flat.mean(axis=0)
+    axes = np.linalg.svd(flat - center, full_matrices=False)[2]  # along the long side, the short side, the normal
+    axes *= np.sign(np.einsum("ij,ji->i", axes, T_rp[:3, :3]))[:, None]
+    turned = np.linalg.norm(np.cross(axes, T_rp[:3, :3].T), axis=1)
+    angle = np.sqrt(np.sum(turned**2) / 2)  # of a small rotation about any axis
+    return float(angle * 1e3), float(np.linalg.norm(center - T_rp[:3, 3]) * 1e3)

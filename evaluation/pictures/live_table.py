@@ -1,0 +1,54 @@
+"""The picture of the live table in the README, taken from a real run of the demo rig.
+
+python -m evaluation.pictures.live_table docs/images/table.svg
+"""
+
+import argparse
+import io
+import tempfile
+from pathlib import Path
+from unittest import mock
+
+from rich.console import Console
+from rich.text import Text
+
+from abs_service.commands import run
+from abs_service.display.table import TableDisplay, draw
+from abs_service.supervision.rig_view import View
+
+#: Length of the run [s].
+DURATION_S = 15
+
+
+class _LastTable(TableDisplay):
+    """Keeps the last table that was drawn while everything ran."""
+
+    def __init__(self) -> None:
+        super().__init__(Console(file=io.StringIO(), force_terminal=True, width=108, height=40))
+        self._recorder = Console(file=io.StringIO(), record=True, width=108)
+        self._last: View | None = None
+
+    def update(self, view: View) -> None:
+        self._last = view
+        if view.elapsed_s > DURATION_S - 1 and not self._recorder.export_text(clear=False):
+            self._recorder.print(draw(view, Text("")))
+
+    def save(self, path: Path) -> None:
+        self._recorder.save_svg(str(path), title="abs-service run")
+
+
+def main() -> None:
+    """Runs the demo rig for some seconds and saves its table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("picture", type=Path)
+    picture = parser.parse_args().picture
+    display = _LastTable()
+    options = argparse.ArgumentParser()
+    run.add_arguments(options)
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "_display", return_value=display):
+        run.run(options.parse_args(["--duration", str(DURATION_S), "--out", folder]))
+    display.save(picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""The picture of the README: what the simulated cameras see, and the mesh that the tracker found there.
+
+python -m evaluation.pictures.overview docs/images/overview.png
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from numpy.typing import NDArray
+
+from abs_service import config, wiring
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.estimate import Estimate
+from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.truth import closest_points
+from calib.rig import Rig
+from drivers.simulated import address
+from drivers.simulated.simulation import Simulation
+
+#: Exposure that is shown: the sheet is bent most in the first ten seconds.
+SHOWN = 121
+
+
+def main() -> None:
+    """Tracks the demo rig up to the exposure and draws it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("picture", type=Path)
+    path = parser.parse_args().picture
+    settings = config.load_default()
+    simulation = address.parse(settings.devices["sim"].uri).build()
+    rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
+    tracking = Tracking(rig, wiring.plan(settings, "sheet"))
+    synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 1)
+    estimates = [
+        tracking.track(frame_set, lambda: True)
+        for k in range(SHOWN + 1)
+        for frame in simulation.expose(k)[0]
+        for frame_set in synchroniser.add(frame)
+    ]
+    if tracking.mesh is None:
+        raise RuntimeError("the demo rig sees no object")
+    figure = Figure(figsize=(14, 4.4), layout="constrained")
+    _draw_images(figure, simulation, rig, estimates[-1], tracking.mesh.faces)
+    _draw_mesh(figure, simulation, estimates[-1].vertices.astype(float), tracking.mesh.faces)
+    figure.savefig(path, dpi=90)
+
+
+def _draw_images(
+    figure: Figure, simulation: Simulation, rig: Rig, estimate: Estimate, faces: NDArray[np.int32]
+) -> None:
+    images = {frame.key: frame for frame in simulation.expose(SHOWN)[0]}
+    near = figure.add_subplot(131)
+    distance = images["tof", "depth"].si()
+    middle = float(np.median(np.linalg.norm(estimate.vertices, axis=1)))
+    near.imshow(distance, cmap="viridis", vmin=middle - 0.06, vmax=middle + 0.06, interpolation="nearest")
+    near.set_title("time of flight: distance", fontsize=11)
+    _crop(near, rig, "tof", estimate)
+    seen = figure.add_subplot(132)
+    seen.imshow(images["color", "color"].data, interpolation="nearest")
+    u, v = rig.sensors["color"].camera.project(estimate.vertices).T
+    seen.triplot(u, v, faces, color="white", linewidth=0.6)
+    seen.set_title("colour, with the tracked mesh", fontsize=11)
+    _crop(seen, rig, "color", estimate)
+
+
+def _crop(axes: Axes, rig: Rig, sensor: str, estimate: Estimate) -> None:
+    pixels = rig.sensors[sensor].camera.project(estimate.vertices)
+    low, high = pixels.min(axis=0), pixels.max(axis=0)
+    margin = 0.15 * (high - low).max()
+    axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(high[1] + margin, low[1] - margin))
+    axes.set_axis_off()
+
+
+def _draw_mesh(figure: Figure, simulation: Simulation, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> None:
+    truth = simulation.expose(SHOWN)[1].points_r.astype(float)
+    error_mm = np.linalg.norm(vertices - closest_points(vertices, truth), axis=1) * 1e3
+    points = vertices[:, [0, 2, 1]] * (1, 1, -1)
+    axes = figure.add_subplot(133, projection="3d")
+    surface = Poly3DCollection(points[faces], cmap="magma_r", edgecolor="0.3", linewidth=0.2)
+    surface.set_array(error_mm[faces].mean(axis=1))
+    surface.set_clim(0, 4)
+    low, high = points.min(axis=0), points.max(axis=0)
+    if isinstance(axes, Axes3D):
+        axes.add_collection3d(surface)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        axes.set_box_aspect(high - low, zoom=1)
+        axes.view_init(elev=35, azim=-50)
+    axes.set_axis_off()
+    axes.set_title(f"the mesh in space: {error_mm.mean():.1f} mm from the true surface", fontsize=11)
+    figure.colorbar(surface, ax=axes, label="distance from the truth [mm]", shrink=0.7)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Experiments on the running service and its drivers."""

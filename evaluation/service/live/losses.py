@@ -1,0 +1,63 @@
+"""What was lost of a run: by the numbers of what arrived and of what is recorded, and by what everybody counted."""
+
+from collections import Counter
+from collections.abc import Mapping
+
+from abs_service.bus import keys
+from evaluation.service.live import recording
+from evaluation.service.live.measurement import Watched
+from evaluation.service.live.rig import REFERENCE, STREAMS, TRACKER
+
+#: How the names of counters begin that count something lost.
+_LOST = frozenset({"dropped", "malformed", "missing", "refused", "rejected", "skipped", "unused"})
+
+
+def exposures(seen: Watched, sensor: str) -> range:
+    """The numbers of a sensor's exposures from the first to the last that is in an estimate; empty if none is."""
+    used = [one.sensors[sensor] for one in seen.arrivals if sensor in one.sensors]
+    return range(used[0], used[-1] + 1) if used else range(0)
+
+
+def untracked(seen: Watched) -> int:
+    """Exposures of the reference between the first and the last estimate watched that are in no estimate."""
+    used = {one.sensors[REFERENCE] for one in seen.arrivals if REFERENCE in one.sensors}
+    return len(set(exposures(seen, REFERENCE)) - used)
+
+
+def partial(seen: Watched) -> int:
+    """Estimates that lack a sensor."""
+    return sum(len(one.sensors) < len({sensor for sensor, _ in STREAMS}) for one in seen.arrivals)
+
+
+def not_received(seen: Watched) -> int:
+    """Estimates that were published and did not arrive."""
+    seqs = [one.seq for one in seen.arrivals]
+    return recording.holes(seqs, seqs[0], seqs[-1])
+
+
+def unrecorded(seen: Watched) -> Mapping[str, int]:
+    """Messages between the first and the last estimate watched that are not in the recording, by topic."""
+    first, last = seen.arrivals[0], seen.arrivals[-1]
+    missing = {keys.state(TRACKER): recording.holes(seen.recorded[keys.state(TRACKER)], first.seq, last.seq)}
+    for sensor, stream in STREAMS:
+        topic = keys.image(sensor, stream)
+        missing[topic] = len(set(exposures(seen, sensor)) - seen.recorded[topic])
+    return missing
+
+
+def counted(counts: Mapping[str, Mapping[str, int]]) -> Counter[str]:
+    """What the components say they lost, as `component: what.why`; zeros are left out.
+
+    Args:
+        counts: counters by component and name.
+    """
+    found = Counter(
+        {f"{component}: {name}": number for component, names in counts.items() for name, number in names.items()}
+    )
+    return Counter({name: number for name, number in found.items() if number and _is_loss(name.partition(": ")[2])})
+
+
+def _is_loss(counter: str) -> bool:
+    """Whether this counts something lost; what a device counts is lost unless it is delivered, or nobody wants it."""
+    words = counter.split(".")
+    return words[0] in _LOST or (words[0] == "device" and words[-1] not in {"frames", "unwanted"})

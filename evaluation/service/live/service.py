@@ -1,0 +1,66 @@
+"""The service as a user starts it: a process that starts the others."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Self
+
+from evaluation.service.live import proc
+
+
+class ServiceError(Exception):
+    """The service ended before it was told to; the message is the last that it said."""
+
+
+class Service:
+    """`abs-service run RIG`, from its start to its end; a context manager that ends it.
+
+    Attributes:
+        started_ns: when it was started, CLOCK_MONOTONIC [ns].
+    """
+
+    def __init__(self, rig: Path) -> None:
+        self._output = (rig.parent / "output.jsonl").open("w+", encoding="utf-8")
+        self.started_ns = time.monotonic_ns()
+        # Its output goes where a script's would go, and nobody has to read it for the service to go on.
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "abs_service", "run", str(rig), "--json"],
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+        )
+
+    def processes(self) -> Mapping[str, int]:
+        """Numbers of the processes that run, by the command of each: run, capture, track, record."""
+        return {"run": self._process.pid, **proc.children(self._process.pid)}
+
+    def check(self) -> None:
+        """Does nothing as long as the service runs.
+
+        Raises:
+            ServiceError: it has ended.
+        """
+        code = self._process.poll()
+        if code is not None:
+            self._output.seek(0)
+            last = self._output.read().strip().rpartition("\n")[2]
+            raise ServiceError(f"the service ended by itself with code {code}: {last}")
+
+    def stop(self, timeout_s: float = 15.0) -> int:
+        """Tells it to end as Ctrl-C does, and returns its exit code; negative if it had to be killed."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGINT)
+        try:
+            return self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            return self._process.wait()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+        self._output.close()

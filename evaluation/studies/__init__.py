@@ -1,1 +1,0 @@
-"""Studies behind the defaults and the documentation."""

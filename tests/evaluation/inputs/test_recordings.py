@@ -1,0 +1,93 @@
+"""Real recordings: a toy that a hand squeezes, an O3R's own σ, an Azure Kinect; and what the figures are made of."""
+
+import time
+import tomllib
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calib.camera import Camera
+from evaluation.experiment import Context, UnavailableError
+from evaluation.inputs import recordings
+from evaluation.inputs.recordings import azure, dropouts, sigma_image, sigma_report, toy
+from evaluation.inputs.recordings.agreement import agreement
+
+CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
+
+
+def folder(shared_data: Path, name: str) -> Path:
+    if not (shared_data / name).is_dir():
+        pytest.skip(f"{shared_data / name} is not there")
+    return shared_data / name
+
+
+def test_the_toy_is_tracked_with_the_example_that_users_are_given():
+    example = Path(__file__).parents[3] / "examples" / "image_folder.toml"
+    own = resources.files(recordings).joinpath("toy.toml").read_text(encoding="utf-8")
+    assert tomllib.loads(own) == tomllib.loads(example.read_text(encoding="utf-8"))
+
+
+def test_a_mesh_that_is_half_the_object_and_too_near_agrees_by_as_much():
+    z = np.full((30, 40), 1.0)
+    distance = (z * CAMERA.lookup.ray_length).astype(np.float32)
+    mask = np.zeros((30, 40), bool)
+    mask[5:25, 10:30] = True
+    x, y = np.meshgrid(np.linspace(-0.2, 0.0, 9), np.linspace(-0.2, 0.2, 9))
+    vertices = np.stack([x, y, np.full_like(x, 0.99)], axis=-1).reshape(-1, 3)
+    corners = np.arange(72).reshape(8, 9)[:, :-1].ravel()
+    faces = np.concatenate([np.stack([corners, corners + 9, corners + 1], axis=-1),
+                            np.stack([corners + 1, corners + 9, corners + 10], axis=-1)])  # fmt: skip
+    found = agreement(vertices, faces, distance, mask, CAMERA)
+    assert found.forward_mm == pytest.approx(10, abs=4)  # what half a pixel beside the vertex is farther away, besides
+    assert 0.4 < found.covered < 0.6
+    assert found.inside > 0.8
+    assert 10 < found.backward_mm < 60  # half of the points are beside the mesh
+
+
+def test_a_search_within_the_rate_misses_nothing_and_one_that_is_not_misses_what_it_must():
+    kept = dropouts.pace([900.0, *[30.0] * 20])
+    assert (kept.missed, len(kept.age_ms)) == (0, 20)
+    assert kept.age_ms == pytest.approx(30)
+    slow = dropouts.pace([900.0, *[50.0] * 200])
+    assert slow.missed == pytest.approx(200 / 3, abs=2)  # two frames of three can be tracked
+    assert slow.age_ms.max() < 50 + 1000 / 30
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_real_toy_is_tracked_within_the_goals(shared_data: Path) -> None:
+    sequence = toy.Toy(folder(shared_data, toy.FOLDER), 30)
+    frames = list(sequence.follow(time.process_time_ns, lambda k, frames: None if k in (12, 20, 21) else frames))
+    usual, least = toy.medians(frames), toy.worst(frames)
+    assert [frame.index for frame in frames] == [k for k in range(30) if k not in (12, 20, 21)]
+    assert all(frame.tracking for frame in frames)
+    assert max(usual.forward_mm, usual.backward_mm) < 1.3
+    assert max(least.forward_mm, least.backward_mm) < 2
+    assert usual.covered > 0.85
+    assert least.inside > 0.95
+
+
+@pytest.mark.slow
+def test_factor_and_floor_make_likely_what_the_sensor_s_own_deviations_do_not(shared_data: Path) -> None:
+    found = sigma_report.findings(folder(shared_data, sigma_report.FOLDER), 0, rounds=1)
+    rows = found.values["o3r"]
+    fitted, claimed = rows[sigma_image.FITTED], rows[sigma_image.CLAIMED]
+    assert fitted["log_likelihood"] > claimed["log_likelihood"] + 1
+    assert 0.85 < fitted["within_95"] < 0.99
+    assert claimed["within_95"] < 0.7
+
+
+@pytest.mark.slow
+def test_a_real_frame_s_colours_fit_its_amplitudes(shared_data: Path) -> None:
+    pytest.importorskip("av", reason="PyAV reads the recording")
+    found = azure.findings(folder(shared_data, azure.FOLDER)).values["azure"]
+    assert found["edges"] > 1.3
+    assert found["forward_mm"] < 2
+
+
+def test_without_recordings_the_experiment_says_what_it_needs(tmp_path: Path) -> None:
+    for data in (None, tmp_path):
+        with pytest.raises(UnavailableError, match="sl_rgbd_deform_petit"):
+            recordings.run(recordings.QUICK, Context(0, data))

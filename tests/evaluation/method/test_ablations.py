@@ -1,0 +1,46 @@
+"""The ablations in seconds: more budget, warm starts and a right σ are worth what they should be."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.optimizers import hybrid
+from abs_service.tracker.optimizers.base import Budget, Optimizer
+from evaluation.experiment import Context
+from evaluation.method import ablations
+from evaluation.method.ablations.cold_start import Cold, Forgetful
+from tests.tracker.problems import linear
+
+TARGET = np.array([1.0, -2.0])
+
+
+def starts(optimizer: Optimizer) -> list[float]:
+    """Evaluations that frames need which begin at the target."""
+    problem, needed = linear(TARGET, np.ones(2)), []
+    optimizer.explore(problem, np.zeros(2), Budget(10**6, lambda: True))
+    for _ in range(2):
+        budget = Budget(10**6, lambda: True)
+        found = optimizer.follow(problem, TARGET, budget)
+        np.testing.assert_allclose(found.theta, TARGET, atol=1e-3)
+        needed.append(budget.generations)
+    return needed
+
+
+def test_a_cold_search_begins_where_the_first_frame_began():
+    warm = starts(Forgetful(hybrid.Settings(tolerance=1e-6)).build(2, np.random.default_rng(0)))
+    cold = starts(Cold(hybrid.Settings(tolerance=1e-6)).build(2, np.random.default_rng(0)))
+    assert warm[0] == warm[1] < cold[0] == cold[1]
+
+
+@pytest.mark.slow
+def test_every_part_is_worth_what_it_should_be():
+    values = ablations.run(ablations.QUICK, Context(0)).values
+    generations = values["Generations of CMA-ES, 16 candidates"]
+    assert generations["30"]["vertex_mm"] < generations["3"]["vertex_mm"]
+    warm, *_, cold = values["Warm start of CMA-ES, 20 generations"].values()
+    assert warm["vertex_mm"] < cold["vertex_mm"]
+    variances = [figures["residual_variance"] for figures in values["Noise model of distances"].values()]
+    half, right, double = variances[:3]
+    assert right == pytest.approx(1, abs=0.2)
+    assert half > 2.5
+    assert double < 0.4
+    assert values["Priors, NURBS"]["all"]["vertex_mm"] < 2

@@ -1,0 +1,167 @@
+"""The command `evaluate` and how a goal becomes a verdict, with an experiment of its own."""
+
+import json
+import math
+import sys
+import types
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from abs_service.report.content import Column, Level, Section, Table
+from abs_service.supervision.exit_codes import Exit
+from evaluation import __main__
+from evaluation.experiment import Context, Findings, UnavailableError, at_least, at_most
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Of the experiment under test."""
+
+    frames: int = 500
+
+
+@pytest.fixture
+def experiment(monkeypatch: pytest.MonkeyPatch) -> Callable[..., types.SimpleNamespace]:
+    """Makes experiments `good` and, if told to, others by what they do."""
+    made: dict[str, object] = {}
+
+    def add(name: str, run: Callable[[Settings, Context], Findings]) -> None:
+        made[name] = types.SimpleNamespace(TITLE=f"X: {name}", Settings=Settings, QUICK=Settings(3), run=run)
+
+    monkeypatch.setattr(__main__, "available", lambda: made)
+    return add  # type: ignore[return-value]
+
+
+def found(*values: float, required: bool = False) -> Callable[[Settings, Context], Findings]:
+    """An experiment that measures these, each of which should be at least 2."""
+
+    def run(settings: Settings, context: Context) -> Findings:
+        table = Table("Draws", (Column("frames"), Column("seed")), ((settings.frames, context.seed),))
+        goals = tuple(at_least("Ratio", value, 2.0, required=required) for value in values)
+        return Findings(goals, (Section("Evidence", (table,)),), {"ratios": list(values)})
+
+    return run
+
+
+def unavailable(settings: Settings, context: Context) -> Findings:
+    raise UnavailableError("needs --data DIR")
+
+
+def test_a_report_has_verdicts_numbers_and_how_it_was_made(experiment, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5, 1.5))
+    assert __main__.main(["good", "--out", str(tmp_path), "--quick", "--seed", "7"]) == Exit.OK
+    report = json.loads((tmp_path / "good" / "report.json").read_text(encoding="utf-8"))
+    assert report["values"] | {"commit": "", "seconds": 0} == {
+        "commit": "",
+        "seed": 7,
+        "settings": {"frames": 3},
+        "seconds": 0,
+        "ratios": [2.5, 1.5],
+        "goals": [
+            {"name": "Ratio", "value": 2.5, "relation": "≥", "bound": 2.0, "met": True},
+            {"name": "Ratio", "value": 1.5, "relation": "≥", "bound": 2.0, "met": False},
+        ],
+    }
+    assert report["verdict"] == "missed"
+    assert report["sections"][0]["blocks"][0]["table"]["rows"] == [[3, 7]]
+    page = (tmp_path / "good" / "report.html").read_text(encoding="utf-8")
+    assert "Not all goals are met." in page
+    assert "missed: Ratio: 1.5, goal ≥ 2." in capsys.readouterr().out
+
+
+def test_only_a_required_goal_that_is_missed_changes_the_exit_code(experiment, tmp_path: Path) -> None:
+    experiment("good", found(1.0))
+    experiment("required", found(1.0, required=True))
+    assert __main__.main(["good", "--out", str(tmp_path)]) == Exit.OK
+    assert __main__.main(["all", "--out", str(tmp_path)]) == Exit.FAILED
+    assert (tmp_path / "required" / "report.html").exists()
+
+
+def test_json_is_one_line_for_each_experiment(experiment, tmp_path: Path, capsys) -> None:
+    experiment("a", found(3.0))
+    experiment("b", found(1.0))
+    __main__.main(["all", "--out", str(tmp_path), "--json"])
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [(line["experiment"], line["verdict"]) for line in lines] == [("a", "met"), ("b", "missed")]
+
+
+def test_settings_of_one_experiment_can_be_changed(experiment, tmp_path: Path) -> None:
+    experiment("good", found(2.5))
+    given = ["good", "--out", str(tmp_path), "--quick", "--set", "frames=40"]
+    assert __main__.main(given) == Exit.OK
+    report = json.loads((tmp_path / "good" / "report.json").read_text(encoding="utf-8"))
+    assert report["values"]["settings"] == {"frames": 40}
+    assert "--set frames=40" in report["provenance"]["command"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("frames", "KEY=VALUE"),
+        ("frames=", "KEY=VALUE"),
+        ("shots=3", "there are: frames"),
+        ("frames='x'", "must be int"),
+    ],
+)
+def test_settings_that_cannot_be_are_named(experiment, given: str, said: str, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5))
+    assert __main__.main(["good", "--out", str(tmp_path), "--set", given]) == Exit.USER
+    assert said in capsys.readouterr().err
+
+
+def test_all_have_settings_of_their_own(experiment, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5))
+    assert __main__.main(["all", "--out", str(tmp_path), "--set", "frames=3"]) == Exit.USER
+    assert "--set" in capsys.readouterr().err
+
+
+def test_an_unknown_experiment_is_answered_with_all_there_are(experiment, tmp_path: Path, capsys) -> None:
+    experiment("good", found(2.5))
+    assert __main__.main(["god", "--out", str(tmp_path)]) == Exit.USER
+    said = capsys.readouterr().err
+    assert 'no experiment "god"' in said
+    assert "X: good" in said
+
+
+def test_what_lacks_its_data_is_an_error_alone_and_passed_over_with_others(experiment, tmp_path: Path, capsys) -> None:
+    experiment("bare", unavailable)
+    experiment("good", found(2.5))
+    assert __main__.main(["bare", "--out", str(tmp_path)]) == Exit.USER
+    assert __main__.main(["all", "--out", str(tmp_path)]) == Exit.OK
+    said = capsys.readouterr()
+    assert "bare: skipped: needs --data DIR" in said.err
+    assert "X: good" in said.out
+
+
+@pytest.mark.parametrize("given", [[], ["--out", "x", "--data", "not a folder"], ["--out", "a file"]])
+def test_folders_that_cannot_be_are_named(
+    experiment, given: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    experiment("good", found(2.5))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a file").touch()
+    assert __main__.main(["good", *given]) == Exit.USER
+    assert ("--data" if "--data" in given else "--out") in capsys.readouterr().err
+
+
+def test_every_experiment_of_the_program_is_complete() -> None:
+    for name, one in __main__.available().items():
+        assert isinstance(one.QUICK, one.Settings), name
+        assert one.TITLE, name
+        assert callable(one.run), name
+    assert "evaluation.experiment" in sys.modules
+
+
+def test_a_goal_becomes_a_verdict_with_figure_bound_and_reason() -> None:
+    met, missed = at_most("Error", 1.234, 2.0, "mm").verdict(), at_most("Error", 3.0, 2.0, "mm", "Too dark.").verdict()
+    assert (met.level, met.text, met.advice) == (Level.GOOD, "Error: 1.23 mm, goal ≤ 2 mm.", "")
+    assert (missed.level, missed.advice) == (Level.BAD, "Too dark.")
+
+
+def test_what_could_not_be_measured_meets_no_goal() -> None:
+    for goal in (at_most("Error", math.nan, 2.0), at_least("Ratio", math.nan, 2.0)):
+        assert not goal.met
+        assert "not measured" in goal.verdict().text
