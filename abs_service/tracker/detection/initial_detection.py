@@ -10,7 +10,7 @@ from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.regions.base import Region
 from calib.camera import Camera
-from calib.noise.base import DepthNoise, without_offset
+from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
 
 
@@ -65,6 +65,6 @@ def detect_object(
     if not (isinstance(image, DepthImage) and isinstance(noise, DepthNoise)):
         raise DetectionError(f"no depth image from {reference} yet")
     camera = rig.sensors[reference].camera
-    distance = without_offset(noise, image.distance, image.amplitude)
+    distance = subtract_mean_offset(noise, image.distance, image.amplitude)
     inside = region.select(camera.unproject(distance), distance)
     return InitialDetection(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices, distance)
