@@ -16,7 +16,7 @@ from abs_service.api.arrays import FrameBuilder, object_mask
 from abs_service.api.errors import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
 from abs_service.pairing.observation import ObservationError
-from abs_service.tracker.detection.initial_detection import SightingError
+from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
 from abs_service.tracking.session import Tracking
@@ -131,7 +131,7 @@ class Tracker:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
             self._region = _RegionOrMask(plan.region.build())
-        except (wiring.PlanError, NoiseError, SightingError) as error:
+        except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from error
         if budget_ms is not None and not budget_ms > 0:
             raise ArgumentError(f"budget_ms = {budget_ms}: must be more than 0, or None for no limit")
