@@ -1,4 +1,4 @@
-"""Luxonis OAK cameras, time-of-flight and stereo, through depthai; and what depthai recorded."""
+"""Luxonis OAK cameras, time-of-flight and stereo, through depthai; and depthai's recordings."""
 
 from collections.abc import Callable
 
@@ -15,12 +15,12 @@ open_recording = OakRecording
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
-    """Opens `oak://SERIAL`, or `oak://?recording=FOLDER`, which depthai plays.
+    """Opens `oak://SERIAL`, or `oak://?recording=FOLDER`, played by depthai.
 
     Raises:
-        AddressError: the address is not understood.
+        AddressError: invalid address.
         SdkMissingError: depthai is not installed.
-        DeviceError: there is no such device, or it does not deliver.
+        DeviceError: no such device, or no images from it.
     """
     address = parse(uri)
     connection = live.connect(address) if address.recording is None else playback.connect(address, address.recording)
@@ -28,5 +28,5 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """The OAK devices on USB; on the network only if the environment variable DEPTHAI_PROTOCOL says so."""
+    """OAK devices on USB; on the network only if the environment variable DEPTHAI_PROTOCOL enables it."""
     return live.discover(timeout_s)

@@ -35,22 +35,22 @@ _DEFAULTS = {
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """What an address asks for.
+    """A parsed address.
 
     Attributes:
         uri: the address itself.
         name: serial number or IP address, "" for the only device.
-        mode: `tof`, `stereo`, or `auto`: whichever the device has.
-        range: of a time-of-flight camera: `low` is the least noisy, `high` reaches farthest.
-        sync: part in a group of devices that trigger each other.
-        color: whether colours are wanted.
-        undistort: whether the device takes the lens distortion out of the colours.
-        network: whether devices are also looked for on the network, which sends a broadcast.
+        mode: `tof`, `stereo`, or `auto`: the one that the device has.
+        range: range profile of a time-of-flight camera: `low` has the lowest noise, `high` the longest range.
+        sync: synchronisation role.
+        color: True to stream colour images.
+        undistort: True to undistort colour images on the device.
+        network: True to discover devices on the network, too, by a broadcast.
         fps: exposures per second.
-        dots, flood: brightness of the dot projector and of the infra-red light at first, 0 to 1.
+        dots, flood: initial brightness of the dot projector and of the infra-red flood light, 0 to 1.
         size: width and height of stereo and colour images [px].
-        recording: file or folder to play instead of a device, by depthai itself; None for a device.
-        loop: whether it is played again and again.
+        recording: file or folder that depthai plays instead of a device; None for a device.
+        loop: True to repeat the recording.
     """
 
     uri: str
@@ -70,10 +70,10 @@ class Address:
 
 
 def parse(uri: str) -> Address:
-    """Reads an address.
+    """Parses an address.
 
     Raises:
-        AddressError: an unknown key, or a value that is not allowed; names both and what is allowed.
+        AddressError: unknown key or invalid value; names both and what is allowed.
     """
     parts = urlsplit(uri)
     values = dict(_DEFAULTS)

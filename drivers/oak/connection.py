@@ -1,4 +1,4 @@
-"""What stands behind an OAK device: the real thing, or depthai playing a recording."""
+"""Source of an OAK device's images: an attached device, or depthai playing a recording."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -18,25 +18,25 @@ CLOCK = ClockInfo("oak", 1e9)
 
 
 class HostTimes(Protocol):
-    """From a stream's device times to host times; `drivers.contract.clock.DeviceClock` is one."""
+    """Mapping of a stream's device times to host times, such as `drivers.contract.clock.DeviceClock`."""
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """How well it does."""
+        """Quality of the mapping."""
         ...
 
     def stamp(self, ticks: int, t_arrival_ns: int) -> Stamp:
-        """The host time of an exposure at device time `ticks` [ns] that came at `t_arrival_ns`."""
+        """Host time of an exposure at device time `ticks` [ns] that arrived at `t_arrival_ns`."""
         ...
 
 
 def arrival(picture: Picture, arrival_ns: int) -> int:
-    """When an image came: when we had it. The host times in a recording are of another day."""
+    """Arrival time in this process; for recordings, whose own host times are in the past."""
     return arrival_ns
 
 
 def synchronised(picture: Picture, arrival_ns: int) -> int:
-    """When an image came: depthai's own estimate of its exposure, which the way through the cable does not delay."""
+    """Host time of the exposure as estimated by depthai, without the transfer delay."""
     return min(picture.host_ns, arrival_ns)
 
 
@@ -45,18 +45,18 @@ class Connection:
     """A running pipeline.
 
     Attributes:
-        info: who the device is.
-        queues: images of every stream.
-        poses: where the cameras are.
+        info: identity of the device.
+        queues: image queues of all streams.
+        poses: extrinsics of the cameras.
         rate_hz: exposures per second.
-        close: ends it; called once.
-        host_times: makes what maps a stream's clock, for every stream at every start.
-        ended: what the end of a queue means: why it is no failure, or "" if it is one.
-        filters: what the device does to a stream's images.
-        stamp: from an image and when we had it [ns] to the host time that its device time is compared with [ns].
-        controls: what can be set.
-        sync_roles: parts in a group that the device can take.
-        gauges: what the device measures of itself.
+        close: stops the pipeline; called once.
+        host_times: factory of clock mappings, called for every stream at every start.
+        ended: reason if the end of a queue is a regular end, "" if it is a failure.
+        filters: filters that the device applies, by stream.
+        stamp: maps an image and its arrival [ns] to the host time paired with its device time [ns].
+        controls: controls of the device.
+        sync_roles: supported synchronisation roles.
+        gauges: self-measurements of the device.
     """
 
     info: DeviceInfo

@@ -1,4 +1,4 @@
-"""What can be set on a running OAK."""
+"""Controls of a running OAK."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -8,7 +8,7 @@ from drivers.contract.device import DeviceError
 from drivers.oak.address import Address
 from drivers.oak.pipelines import Outputs
 
-#: Limits of manual exposures that every camera of the family takes [s], and ISO speeds over 100.
+#: Limits of manual exposure supported by every camera of the family: time [s], and ISO speed over 100.
 _EXPOSURE_S = (20e-6, 33e-3)
 _GAIN = (1.0, 16.0)
 
@@ -16,7 +16,7 @@ _GAIN = (1.0, 16.0)
 def make(dai: Any, device: Any, outputs: Outputs, address: Address) -> Controls:
     """The controls: exposure of the cameras, brightness of the projector, range of the time-of-flight camera.
 
-    Controls of the cameras behind depth have no prefix, those of the colour camera begin with `color.`.
+    Controls of the depth cameras have no prefix, those of the colour camera have the prefix `color.`.
     """
     controls: list[Control] = []
     for prefix, inputs in outputs.cameras.items():
@@ -32,7 +32,7 @@ def make(dai: Any, device: Any, outputs: Outputs, address: Address) -> Controls:
 
 
 class _Exposure:
-    """Exposure time and gain, which the cameras take together, and whether they choose both themselves."""
+    """Exposure time and gain, which are sent together, and automatic exposure."""
 
     def __init__(self, dai: Any, queues: list[Any]) -> None:
         self._dai = dai
@@ -84,7 +84,7 @@ def _modulation(dai: Any, queue: Any, first: str) -> Control:
 
 
 def _sync(dai: Any, device: Any, first: str) -> Control:
-    """The part among devices that trigger each other; a device alone that detects it by itself runs free."""
+    """Synchronisation role; `free` is automatic detection, in which a single device runs free."""
     state = {"role": first}
     roles = dai.ExternalFrameSyncRole
     numbers = {"free": roles.AUTO_DETECT, "master": roles.MASTER, "slave": roles.SLAVE}

@@ -1,4 +1,4 @@
-"""An OAK as a device: takes images out of queues, each in a thread of ours, and delivers them."""
+"""An OAK as a device: one thread per stream takes images from its queue and delivers them."""
 
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -15,22 +15,22 @@ from drivers.oak.messages import QueueClosed
 from drivers.oak.picture import Picture, PictureError, frame, pixels
 from drivers.oak.roles import Role
 
-#: How long the first image of a stream may take, exposure settling included [s].
+#: Timeout for the first image of a stream, exposure settling included [s].
 FIRST_S = 10.0
-#: How often a thread looks whether it shall stop [s].
+#: Polling interval of the stop event [s].
 _LOOK_S = 0.1
 
 
 class OakDevice:
-    """Delivers what a pipeline yields, as long as it is started; the pipeline runs from opening to closing.
+    """Delivers the images of a pipeline while started; the pipeline runs from opening to closing.
 
     Args:
-        connection: the running pipeline; closed if this fails.
+        connection: the running pipeline; closed if the constructor fails.
         clock: CLOCK_MONOTONIC [ns].
-        first_s: how long the first image of a stream may take [s].
+        first_s: timeout for the first image of a stream [s].
 
     Raises:
-        DeviceError: a stream delivers nothing, or nothing usable.
+        DeviceError: a stream has no images, or no usable ones.
     """
 
     def __init__(self, connection: Connection, clock: Callable[[], int], first_s: float = FIRST_S) -> None:
@@ -63,12 +63,12 @@ class OakDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and messages that were no image of their stream: `undecodable`."""
+        """`frames` delivered, and `undecodable` messages."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """What the device measures of itself, and how its clock runs, stream by stream."""
+        """Self-measurements of the device, and the clock mapping of each stream."""
         clocks = {
             f"clock.{role.sensor}/{role.stream}.{name}": value
             for role, clock in list(self._clocks.items())
@@ -97,7 +97,7 @@ class OakDevice:
     def stop(self) -> None:
         """See `drivers.contract.device.Device.stop`."""
         self._gate.end("stopped")
-        # From within the sink it would wait for threads that wait for the sink; they end by themselves.
+        # In the sink a join would deadlock; the threads end by themselves.
         if threading.current_thread() not in self._threads:
             _join(self._threads)
 
@@ -120,7 +120,7 @@ class OakDevice:
         return picture
 
     def _pump(self, role: Role, stop: threading.Event, before: Sequence[threading.Thread]) -> None:
-        """Delivers one stream until it is told to stop, or until nothing can come any more."""
+        """Delivers one stream until the stop event is set or the queue is closed."""
         _join(before)
         queue = self._connection.queues[role]
         try:

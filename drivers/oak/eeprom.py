@@ -1,6 +1,6 @@
-"""Where the cameras of an OAK are: its factory calibration as JSON, or what images say of themselves.
+"""Extrinsics of an OAK's cameras: from its factory calibration as JSON, or from image metadata.
 
-The device keeps a pose for each camera that maps its coordinates to those of another one, in centimetres. Source:
+The device stores for each camera a pose that maps its coordinates to those of another one, in centimetres. Source:
 depthai-core 3.12, CalibrationHandler (MIT), against which this is tested.
 """
 
@@ -14,15 +14,15 @@ import numpy as np
 from calib import pose
 from calib.pose import Pose
 
-#: Metres per depthai's numbered length units: metre, centimetre (the usual one), millimetre, inch, foot.
+#: Metres per depthai's numbered length units: metre, centimetre (default), millimetre, inch, foot.
 UNITS_M = (1.0, 0.01, 0.001, 0.0254, 0.3048)
 
-#: The socket that stands for none.
+#: Socket number that means none.
 NO_SOCKET = -1
 
 
 class EepromError(ValueError):
-    """A calibration that cannot be used; says what is wrong."""
+    """An unusable calibration; names the problem."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Poses:
 
     Attributes:
         extrinsics: by socket.
-        rectifications: by socket, the rotation of a stereo camera's coordinates to its rectified ones.
+        rectifications: by socket, the rotation from a stereo camera's coordinates to its rectified ones.
     """
 
     extrinsics: Mapping[int, Extrinsics] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class Poses:
         """The pose that maps coordinates of the camera at `socket` to those of the one at `reference` [m].
 
         Raises:
-            EepromError: nothing connects them.
+            EepromError: their extrinsics are not connected.
         """
         root, T_root_camera = self._to_root(socket)
         root_of_reference, T_root_reference = self._to_root(reference)
@@ -79,10 +79,10 @@ class Poses:
 
 
 def parse(content: str | bytes) -> Poses:
-    """The poses in a calibration, as `CalibrationHandler.eepromToJson` and its file have it.
+    """Poses of a calibration in the JSON format of `CalibrationHandler.eepromToJson`.
 
     Raises:
-        EepromError: it is no such JSON, or its numbers are no poses.
+        EepromError: malformed JSON, or invalid poses.
     """
     try:
         eeprom = json.loads(content)

@@ -1,4 +1,4 @@
-"""The cameras of an OAK by head: what their first pictures say, where the calibration puts them."""
+"""Cameras of an OAK by head: intrinsics from the first images, extrinsics from the calibration."""
 
 from collections.abc import Mapping
 
@@ -11,20 +11,20 @@ from drivers.oak.roles import REFERENCES, Role
 
 
 def cameras(pictures: Mapping[Role, Picture], poses: Poses) -> dict[str, Camera]:
-    """The camera of every head.
+    """Camera of every head.
 
     Args:
-        pictures: the first of every stream.
-        poses: where the cameras are.
+        pictures: first image of every stream.
+        poses: extrinsics of the cameras.
 
     Returns:
-        By head; the rig's frame is that of the first of `REFERENCES` that there is.
+        By head; the rig's frame is that of the first available of `REFERENCES`.
 
     Raises:
-        PictureError: a picture does not say what took it.
-        EepromError: nothing is known of where a camera is.
+        PictureError: an image without camera metadata.
+        EepromError: missing extrinsics of a camera.
     """
-    # Of the streams of one head, the first tells: they have the same geometry, but not all of them say so.
+    # The first stream of each head: all have the same geometry, but not all have the metadata.
     first: dict[str, Picture] = {}
     for role, picture in pictures.items():
         first.setdefault(role.sensor, picture)
@@ -40,5 +40,5 @@ def _between(reference: str, sensor: str, first: Mapping[str, Picture], poses: P
 
 
 def _view(sensor: str, first: Mapping[str, Picture], poses: Poses) -> Pose:
-    """The pose that maps coordinates of a camera to those of its images: stereo images are rectified."""
+    """Pose from a camera's coordinates to those of its images: the rectification of stereo images."""
     return poses.rectified(first[sensor].socket) if sensor in {"depth", "right"} else pose.identity()

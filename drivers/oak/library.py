@@ -1,7 +1,7 @@
-"""depthai itself: loaded late, told to keep quiet on the network, and its errors in our words.
+"""Lazy import of depthai with network access disabled, and translation of its errors.
 
-Until it is told otherwise it looks a server of its maker up when a pipeline starts, and broadcasts on every network
-interface to find devices. It reads what it is told from the environment when it is loaded or when it searches.
+By default depthai contacts a telemetry server when a pipeline starts, and broadcasts on every network interface to
+discover devices. It reads its settings from the environment when it is loaded or when it searches.
 """
 
 import os
@@ -12,7 +12,7 @@ from typing import Any
 from drivers.contract.device import DeviceError, SdkMissingError
 from drivers.contract.discovery import UDEV_REMEDY
 
-#: Time to look for a device [ms]; depthai's own is ten seconds.
+#: Timeout of device discovery [ms]; depthai's default is ten seconds.
 SEARCH_MS = 1500
 
 _ENVIRONMENT = {"DEPTHAI_TELEMETRY": "0", "DEPTHAI_LEVEL": "error"}
@@ -22,8 +22,8 @@ def load(network: bool = False, search_ms: int = SEARCH_MS) -> Any:
     """The module `depthai`.
 
     Args:
-        network: whether devices on the network may be looked for; what the user's environment says goes first.
-        search_ms: time to look for a device [ms].
+        network: True to allow discovery on the network; the user's environment has precedence.
+        search_ms: timeout of device discovery [ms].
 
     Raises:
         SdkMissingError: it is not installed.
@@ -45,10 +45,10 @@ _USERS_PROTOCOL = os.environ.get("DEPTHAI_PROTOCOL")
 
 @contextmanager
 def translated_errors(uri: str) -> Iterator[None]:
-    """Turns what depthai raises, plain `RuntimeError`s mostly, into errors that name the device and what to do.
+    """Translates exceptions of depthai, mostly `RuntimeError`s, into errors that name the device and the remedy.
 
     Raises:
-        DeviceError: whatever depthai said.
+        DeviceError: any exception of depthai.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""An attached OAK: found, opened, and running what an address asks for."""
+"""Attached OAKs: discovery, opening, and start of the pipeline for an address."""
 
 import json
 import time
@@ -18,15 +18,15 @@ from drivers.oak.eeprom import EepromError
 from drivers.oak.messages import OutputQueue
 from drivers.oak.pipelines import build
 
-#: Newest images that wait; the pump takes them at once.
+#: Depth of the image queues; the newest images are kept.
 _QUEUE = 4
-#: How often the temperature is asked for [s].
+#: Polling interval of the temperature [s].
 TEMPERATURE_S = 5.0
 _LINKS = {"SUPER_PLUS": "USB 3, 10 Gbit/s", "SUPER": "USB 3, 5 Gbit/s", "HIGH": "USB 2, 480 Mbit/s"}
 
 
 def discover(timeout_s: float, network: bool = False) -> list[Found]:
-    """What depthai finds, on the network as well if that is wanted; never raises."""
+    """Devices on USB and, if `network`, on the network; never raises."""
     try:
         dai = library.load(network, search_ms=max(round(timeout_s * 1000), 1))
     except SdkMissingError as error:
@@ -42,10 +42,10 @@ def connect(address: Address) -> Connection:
 
     Raises:
         SdkMissingError: depthai is not installed.
-        DeviceError: there is no such device, or it lacks what is asked for.
+        DeviceError: no such device, or it lacks a requested camera.
     """
     dai = library.load(address.network)
-    # Without a name, the only device; with one, depthai finds it by itself, on the network as well.
+    # Without a name, the only device; a named one is found by depthai, on the network as well.
     name = address.name or choose(discover(library.SEARCH_MS / 1000, address.network), "oak", "").info.serial
     with library.translated_errors(address.uri):
         device = dai.Device(dai.DeviceInfo(name))
@@ -58,7 +58,7 @@ def connect(address: Address) -> Connection:
 
 
 def _run(dai: Any, device: Any, address: Address) -> Connection:
-    # A device that went away is opened anew by its keeper; depthai's own attempts would leave the queues silent.
+    # The device supervisor reopens a lost device; depthai's own reconnection would leave the queues silent.
     device.setMaxReconnectionAttempts(0)
     if address.sync != "free":
         done, reason = device.setExternalFrameSyncRole(getattr(dai.ExternalFrameSyncRole, address.sync.upper()))
@@ -99,14 +99,14 @@ def _run(dai: Any, device: Any, address: Address) -> Connection:
 def _info(device: Any, address: Address) -> DeviceInfo:
     serial = device.getDeviceId()
     link = _LINKS.get(device.getUsbSpeed().name, "") if device.getDeviceInfo().protocol.name == "X_LINK_USB_VSC" else ""
-    # On the network the address itself is who it is: without it, nobody would look there again.
+    # A device on the network keeps its address, since discovery does not search the network.
     name = address.name if address.network and address.name else serial
     uri = urlunsplit(("oak", name, "", urlsplit(address.uri).query, ""))
     return DeviceInfo(uri, str(device.getProductName() or device.getDeviceName()), serial, link=link)
 
 
 class Thermometer:
-    """The chip's temperature, asked for once in a while, because every question takes its way through the cable.
+    """The chip's temperature, cached, because every query is a transfer to the device.
 
     Args:
         device: `dai.Device`.
@@ -120,12 +120,12 @@ class Thermometer:
         self._latest: Mapping[str, float] = {}
 
     def __call__(self) -> Mapping[str, float]:
-        """`temperature_c` [°C]; nothing if the device does not tell."""
+        """`temperature_c` [°C]; empty if it cannot be read."""
         if self._clock() >= self._next_s:
             self._next_s = self._clock() + TEMPERATURE_S
             try:
                 self._latest = {"temperature_c": float(self._device.getChipTemperature().average)}
-            except Exception:  # a device that is gone is noticed elsewhere
+            except Exception:  # loss of the device is detected elsewhere
                 self._latest = {}
         return self._latest
 

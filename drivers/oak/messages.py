@@ -1,4 +1,4 @@
-"""Images out of depthai's queues. Our Python stays out of its nodes: an exception there ends the process."""
+"""Images from depthai's queues. No Python code runs in depthai's nodes, where an exception would end the process."""
 
 from datetime import timedelta
 from typing import Any, Protocol
@@ -11,28 +11,28 @@ _NS = timedelta(microseconds=1)
 
 
 class QueueClosed(Exception):  # noqa: N818  an end, not an error
-    """There will be no more images: the pipeline was stopped, the recording has ended, or the device is gone."""
+    """No more images: the pipeline was stopped, the recording has ended, or the device was lost."""
 
 
 class Queue(Protocol):
-    """Images of one stream, the newest few."""
+    """Queue of the newest images of one stream."""
 
     def get(self, timeout_s: float) -> Picture | None:
-        """The next image, None if there is none for so long.
+        """The next image, None after the timeout.
 
         Raises:
-            PictureError: what came is no image.
-            QueueClosed: there will be none.
+            PictureError: the message is no valid image.
+            QueueClosed: no more images.
         """
         ...
 
     def clear(self) -> None:
-        """Drops what waits in it."""
+        """Drops all queued images."""
         ...
 
 
 class OutputQueue:
-    """A queue of depthai, made with `blocking=False`, so that the newest images replace older ones.
+    """A depthai queue with `blocking=False`: new images replace the oldest ones.
 
     Args:
         queue: `dai.MessageQueue`.
@@ -58,14 +58,14 @@ class OutputQueue:
 
 
 def from_img_frame(message: Any) -> Picture:
-    """The picture that a `dai.ImgFrame` is; its pixels stay where they are.
+    """Picture of a `dai.ImgFrame`; pixels are not copied.
 
     Raises:
-        PictureError: it is none.
+        PictureError: malformed message.
     """
     try:
         return _picture(message)
-    except (AttributeError, RuntimeError, TypeError, ValueError) as error:  # all that depthai raises about contents
+    except (AttributeError, RuntimeError, TypeError, ValueError) as error:  # exceptions of depthai for invalid contents
         raise PictureError(f"{type(message).__name__} is no image: {error}") from error
 
 
@@ -91,5 +91,5 @@ def _picture(message: Any) -> Picture:
 
 
 def _ns(time: timedelta) -> int:
-    """Nanoseconds; `total_seconds` would round a long uptime."""
+    """Nanoseconds; `total_seconds` would round long uptimes."""
     return time // _NS * 1000

@@ -1,4 +1,4 @@
-"""depthai's image messages, whoever decoded them, and the frames that they are."""
+"""Images of depthai, from messages or recordings, and their conversion to frames."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -16,12 +16,12 @@ from calib.pose import Pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.oak.roles import Role
 
-#: Lens models of depthai that are understood. The first has up to 14 coefficients in OpenCV's order.
+#: Supported lens models of depthai. The first has up to 14 coefficients in OpenCV's order.
 PERSPECTIVE, FISHEYE = "PERSPECTIVE", "FISHEYE"
 
 
 class PictureError(ValueError):
-    """A message that is no usable image; says what is wrong."""
+    """An unusable image; names the problem."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,15 +31,16 @@ class Picture:
     Attributes:
         type: name of its pixel format.
         width, height: size [px].
-        stride: bytes per row; 0 for without gaps.
+        stride: bytes per row; 0 for no padding.
         data: its bytes.
         seq: sequence number.
-        host_ns, device_ns: end of the exposure, on the host's steady clock as depthai knows it and on the device's.
+        host_ns, device_ns: end of the exposure on the host's steady clock (depthai's estimate) and on the device's
+            clock.
         exposure_s, gain, temperature_c: NaN if unknown; the gain is ISO speed over 100.
         socket: number of the camera socket.
         matrix: camera matrix (3, 3) of this image, crops and scaling included.
         model: name of the lens model.
-        coefficients: of it; none if the device has undistorted the image.
+        coefficients: of the lens model; empty if the device has undistorted the image.
     """
 
     type: str
@@ -60,15 +61,15 @@ class Picture:
 
     @property
     def half_exposure_ns(self) -> int:
-        """Half of the exposure [ns], 0 if unknown: from its end back to its middle."""
+        """Half of the exposure [ns], from its end to its middle; 0 if unknown."""
         return round(0.5e9 * self.exposure_s) if 0 < self.exposure_s < 1 else 0
 
 
 def camera(picture: Picture, T_rs: Pose) -> Camera:
-    """What took a picture.
+    """Camera of an image.
 
     Raises:
-        PictureError: it does not say, or its lens is of another kind.
+        PictureError: missing metadata, or an unsupported lens model.
     """
     values = np.asarray(picture.coefficients, np.float64)
     if picture.matrix.shape != (3, 3) or not np.all(np.isfinite(picture.matrix)):
@@ -90,16 +91,16 @@ def camera(picture: Picture, T_rs: Pose) -> Camera:
 
 
 def frame(picture: Picture, role: Role, calib_id: str, filters: tuple[str, ...]) -> Frame:
-    """The frame that a picture is, on the device's clock; its host time is what depthai believes it to be.
+    """Frame of an image, with device ticks and depthai's host time.
 
     Args:
-        picture: as it came.
-        role: what it is here.
+        picture: the image.
+        role: its stream.
         calib_id: of its camera.
-        filters: what the device has done to it.
+        filters: filters applied by the device.
 
     Raises:
-        PictureError: its format does not fit the role, or there are too few bytes.
+        PictureError: a format that does not fit the stream, or too few bytes.
     """
     encoding, data = pixels(picture, role.kind)
     is_depth = role.kind == Kind.DEPTH
@@ -154,7 +155,7 @@ def pixels(picture: Picture, kind: Kind) -> tuple[str, NDArray[np.generic]]:
 
 
 def _rows(picture: Picture, bytes_per_row: int, rows: int) -> NDArray[np.uint8]:
-    """A copy of the bytes (rows, bytes_per_row) without the gaps behind each row."""
+    """A copy of the bytes (rows, bytes_per_row) without row padding."""
     stride = picture.stride or bytes_per_row
     if rows < 1 or not 0 < bytes_per_row <= stride:
         raise PictureError(
@@ -196,5 +197,5 @@ def _yuv(picture: Picture, kind: Kind) -> tuple[str, NDArray[np.generic]]:
 
 
 def number(value: float, limit: float = math.inf) -> float:
-    """A measured value that depthai gives as 0 or less when it does not know; then NaN."""
+    """A measured value, NaN where depthai gives 0 or less for unknown."""
     return float(value) if 0 < value < limit else math.nan

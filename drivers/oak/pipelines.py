@@ -1,4 +1,4 @@
-"""What runs on the device: nodes of depthai, set so that images are as measured, with as few filters as it allows."""
+"""depthai pipelines, configured for raw images with as few filters as possible."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,13 +11,13 @@ from drivers.oak.roles import ROLES, Role
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """What a pipeline yields.
+    """Outputs and control inputs of a pipeline.
 
     Attributes:
         streams: outputs of nodes.
-        filters: what is done to a stream on the way.
-        cameras: inputs for `dai.CameraControl`, by the prefix of their controls: "" for depth, "color." for colours.
-        tof: input for `dai.ToFConfig`, if there is a time-of-flight camera.
+        filters: filters applied by the device, by stream.
+        cameras: inputs for `dai.CameraControl`, by the prefix of their controls: "" for depth, "color." for colour.
+        tof: input for `dai.ToFConfig`, None without a time-of-flight camera.
     """
 
     streams: Mapping[Role, Any]
@@ -27,10 +27,10 @@ class Outputs:
 
 
 def build(dai: Any, device: Any, pipeline: Any, address: Address) -> Outputs:
-    """Builds what the address asks for.
+    """Builds the pipeline for an address.
 
     Raises:
-        DeviceError: the device does not have it; says what it has.
+        DeviceError: the device lacks a requested camera; names what it has.
     """
     features = device.getConnectedCameraFeatures()
     kinds = dai.CameraSensorType
@@ -58,7 +58,7 @@ def build(dai: Any, device: Any, pipeline: Any, address: Address) -> Outputs:
 
 
 def time_of_flight(dai: Any, device: Any, pipeline: Any, socket: Any, address: Address) -> Outputs:
-    """The time-of-flight camera: depth along z, unfiltered where the chip gives it so, amplitude and the rest."""
+    """Time-of-flight camera: depth along z, unfiltered if available, amplitude, intensity and confidence."""
     profile = getattr(dai.ToFConfig.Profile, f"{address.range.upper()}_RANGE")
     node = pipeline.create(dai.node.ToF).build(socket, profile=profile, fps=address.fps)
     config = node.getInitialConfig()
@@ -67,7 +67,7 @@ def time_of_flight(dai: Any, device: Any, pipeline: Any, socket: Any, address: A
     streams = {ROLES["tof_amplitude"]: node.amplitude, ROLES["tof_intensity"]: node.intensity}
     depth = ROLES["tof_depth"]
     if device.getPlatform() == dai.Platform.RVC2:
-        # `depth` has gone through filters on the host that mix pixels, which no noise model of a pixel stands.
+        # `depth` is filtered on the host across pixels, which violates the per-pixel noise models.
         return Outputs({depth: node.rawDepth, **streams}, {}, {}, node.inputConfig)
     filtered = {depth: ("depthai image filters",)}
     return Outputs(

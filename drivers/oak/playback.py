@@ -1,4 +1,4 @@
-"""A recording played by depthai itself: the same queues and messages as from a device, with none attached."""
+"""Playback of recordings by depthai: same queues and messages as from a device, without one attached."""
 
 import threading
 from collections.abc import Mapping
@@ -14,19 +14,19 @@ from drivers.oak.eeprom import EepromError
 from drivers.oak.messages import OutputQueue
 from drivers.oak.roles import Role
 
-#: Newest images that wait; the pump takes them at once.
+#: Depth of the image queues; the newest images are kept.
 _QUEUE = 4
-#: So many exposures one stream may lag behind another.
+#: Maximum lag between streams [exposures].
 _REMEMBERED = 64
 
 
 def connect(address: Address, path: Path) -> Connection:
-    """Starts to play a recording at its own clock.
+    """Starts playback of a recording in real time.
 
     Raises:
-        AddressError: it cannot be played.
+        AddressError: the recording cannot be played.
         SdkMissingError: depthai is not installed.
-        DeviceError: depthai refuses.
+        DeviceError: an error of depthai.
     """
     try:
         files: Mapping[Path, Role] = recording.files(path)
@@ -49,22 +49,22 @@ def connect(address: Address, path: Path) -> Connection:
 
 
 class PlaybackClock:
-    """Host times of what is played: those of the exposure that was played last, wherever its streams have got to.
+    """Host times of a playback: frames of one exposure get one host time, also if streams lag.
 
-    depthai plays a few per cent too slowly and each stream by itself, which no clock would do.
+    depthai plays a few per cent too slowly and each stream independently, so `DeviceClock` does not apply.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._played: dict[int, int] = {}  # host time of the latest device times
+        self._played: dict[int, int] = {}  # host times of the latest exposures, by device time
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Nothing: this is no clock."""
+        """Empty: there is no device clock."""
         return {}
 
     def stamp(self, ticks: int, t_arrival_ns: int) -> Stamp:
-        """The host time of device time `ticks` [ns]."""
+        """Host time of device time `ticks` [ns]."""
         with self._lock:
             newest = max(self._played, default=ticks)
             if ticks not in self._played:

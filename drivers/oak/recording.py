@@ -1,7 +1,7 @@
-"""Recordings of depthai: one MCAP file per stream, read without depthai by the description that each file contains.
+"""Recordings of depthai: one MCAP file per stream, decoded without depthai by the schema in each file.
 
 A recording is a file or a folder of files; the name of each, without `.mcap`, is one of `drivers.oak.roles.ROLES`.
-Beside them may lie `calibration.json`, which says where the cameras are; else what the images say of that counts.
+The extrinsics are in `calibration.json` beside them, if it exists, else in the images' metadata.
 """
 
 import heapq
@@ -32,7 +32,7 @@ CALIBRATION = "calibration.json"
 
 
 class OakRecording:
-    """What depthai recorded.
+    """A recording of depthai.
 
     Args:
         path: MCAP file, or folder with MCAP files.
@@ -55,7 +55,7 @@ class OakRecording:
             raise ForeignRecordingError(f"{path}: {error}") from error
 
     def frames(self) -> Iterator[Frame]:
-        """Every image by its time on the host's clock, which counts from when that host was started."""
+        """All images in order of host time, which counts from the boot of the recording host."""
         streams = [zip(repeat(role), _messages(file)) for role, file in self._files.items()]
         for role, message in heapq.merge(*streams, key=lambda entry: _ns(entry[1].ts)):
             try:
@@ -65,10 +65,10 @@ class OakRecording:
 
 
 def files(path: Path) -> dict[Path, Role]:
-    """The files of a recording and what they hold.
+    """Files of a recording and their streams.
 
     Raises:
-        ForeignRecordingError: there is none, or its name says nothing.
+        ForeignRecordingError: no file, or a name that is no stream's.
     """
     found = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
     strange = [file for file in found if file.stem not in ROLES]
@@ -79,11 +79,11 @@ def files(path: Path) -> dict[Path, Role]:
 
 
 def poses(path: Path) -> Poses:
-    """Where the cameras are: as the calibration beside the files says, or else the images themselves.
+    """Extrinsics of the cameras, from the calibration file or from the images' metadata.
 
     Raises:
         ForeignRecordingError: a file cannot be read.
-        EepromError: the calibration is not understood.
+        EepromError: malformed calibration.
     """
     file = (path if path.is_dir() else path.parent) / CALIBRATION
     try:
@@ -96,7 +96,7 @@ def poses(path: Path) -> Poses:
 
 
 def rate_hz(path: Path) -> float:
-    """Images per second of a recording's first file, by its first two; 30 if there are not two.
+    """Frame rate of a recording, from the first two images of its first file; 30 with fewer images.
 
     Raises:
         ForeignRecordingError: a file cannot be read.
@@ -106,7 +106,7 @@ def rate_hz(path: Path) -> float:
 
 
 def picture(message: Any) -> Picture:
-    """The picture in a decoded message; never raises, what is wrong shows when it is used."""
+    """Picture of a decoded message; never raises, errors surface when it is converted."""
     specs, settings, transformation = message.fb, message.cam, message.transformation
     source, own = _matrix(transformation.sourceIntrinsicMatrix), _matrix(transformation.transformationMatrix)
     return Picture(
@@ -146,7 +146,7 @@ def _matrix(matrix: Any) -> np.ndarray:
 
 
 def _name(message: Any, field: str) -> str:
-    """Name of an enumeration's value, its number if it has none."""
+    """Name of an enumeration value, its number if unnamed."""
     values = message.DESCRIPTOR.fields_by_name[field].enum_type.values_by_number
     value = getattr(message, field)
     return values[value].name if value in values else str(value)
@@ -170,7 +170,7 @@ def _count(path: Path) -> int:
 
 
 def _messages(path: Path) -> Iterator[Any]:
-    """The images of a file in the order of their times."""
+    """Images of a file in order of time."""
     with _translated_errors(path), path.open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True)
         types: dict[int, Any] = {}
@@ -183,7 +183,7 @@ def _messages(path: Path) -> Iterator[Any]:
 
 
 def _type(descriptors: bytes) -> Any:
-    """The message class that a file describes. A pool of its own, since another version may describe it otherwise."""
+    """Message class of a file's schema; in a separate pool, since versions differ."""
     pool = DescriptorPool()
     for file in FileDescriptorSet.FromString(descriptors).file:
         pool.Add(file)
@@ -196,5 +196,5 @@ def _translated_errors(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # what the readers of MCAP and protobuf raise about damaged bytes may be anything
+    except Exception as error:  # MCAP and protobuf readers raise arbitrary exceptions for corrupt bytes
         raise ForeignRecordingError(f"{path}: this is no recording of depthai, or a damaged one: {error!r}") from error

@@ -1,4 +1,4 @@
-"""What the images of an OAK are here."""
+"""Streams of an OAK, by their names in recordings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from drivers.contract.frame import Kind
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What images are: head, name of the stream, and kind."""
+    """Head, name and kind of a stream."""
 
     sensor: str
     stream: str
@@ -20,8 +20,8 @@ class Role:
         return self.sensor, self.stream
 
 
-#: By the name that they have in recordings. Stereo depth is the left camera's rectified view, and so is that camera's
-#: infra-red image: one head.
+#: By their name in recordings. Stereo depth and the left infra-red image are both in the left camera's rectified view,
+#: so they are one head.
 ROLES: Mapping[str, Role] = {
     "tof_depth": Role("tof", "depth", Kind.DEPTH),
     "tof_amplitude": Role("tof", "amplitude", Kind.AMPLITUDE),
@@ -34,5 +34,5 @@ ROLES: Mapping[str, Role] = {
     "color": Role("color", "color", Kind.COLOR),
 }
 
-#: Heads whose view is the rig's frame, the first that there is.
+#: Candidates for the head that defines the rig's frame, in order of preference.
 REFERENCES = ("tof", "depth", "right", "color")

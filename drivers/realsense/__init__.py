@@ -1,4 +1,4 @@
-"""Intel RealSense: cameras of the D4xx and L5xx kind, and their recordings as ROS 1 bags."""
+"""Intel RealSense: cameras of the D4xx and L5xx series, and their recordings as ROS 1 bags."""
 
 from drivers.realsense.bag import RealsenseBag
 from drivers.realsense.opening import discover, open_device

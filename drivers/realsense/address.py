@@ -13,15 +13,15 @@ _SIZE = re.compile(r"([1-9]\d{1,3})x([1-9]\d{1,3})")
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """What an address asks for.
+    """A parsed address.
 
     Attributes:
         uri: the address itself.
         serial: serial number, "" for the only camera.
-        depth, color: sizes of depth, with infra-red and confidence, and of colours [px]; None for no colours.
+        depth, color: image sizes of depth, infra-red and confidence, and of colour [px]; None for no colour.
         fps: exposures per second.
-        ir: whether infra-red images are wanted.
-        recording: what librealsense's recorder wrote, to play instead of a camera; None for a camera.
+        ir: True to stream infra-red images.
+        recording: file of librealsense's recorder, played instead of a camera; None for a camera.
     """
 
     uri: str
@@ -34,10 +34,10 @@ class Address:
 
 
 def parse(uri: str) -> Address:
-    """Reads an address.
+    """Parses an address.
 
     Raises:
-        AddressError: an unknown key, or a value that is not allowed; names both and what is allowed.
+        AddressError: unknown key or invalid value; names both and what is allowed.
     """
     parts = urlsplit(uri)
     values = dict(_DEFAULTS)

@@ -1,8 +1,8 @@
 """ROS 1 bags of librealsense: images, calibration and settings of their first device.
 
-Topics are `/device_0/sensor_N/<Stream>_<index>/…`: `image/data`, `image/metadata` (as many key-value pairs, with the
-image's time), `info/camera_info` and `tf/0`, which maps points of the reference stream, depth, to the stream. (That
-direction is not documented. The other one puts the edges of a real recording 20 pixels beside those of its colours.)
+Topics are `/device_0/sensor_N/<Stream>_<index>/…`: `image/data`, `image/metadata` (key-value pairs with the image's
+time), `info/camera_info` and `tf/0`, which maps points of the reference stream, depth, to the stream. (The direction is
+undocumented; with the opposite one, depth and colour edges of a real recording are 20 px apart.)
 """
 
 import math
@@ -28,7 +28,7 @@ _DEPTH_UNITS = r"/device_0/sensor_\d+/option/Depth Units/value"
 _INFO_TOPICS = rf"{_STREAM}(?P<what>image/metadata|info/camera_info|tf/0)|{_DEPTH_UNITS}"
 _IMAGES = f"{_STREAM}image/data"
 
-#: Encodings of ROS and ours, by kind.
+#: ROS encodings and the corresponding frame encodings, by kind.
 _ENCODINGS: Mapping[Kind, Mapping[str, str]] = {
     Kind.DEPTH: {"mono16": "16UC1", "16UC1": "16UC1"},
     Kind.IR: {"mono8": "mono8", "mono16": "mono16"},
@@ -39,7 +39,7 @@ _ENCODINGS: Mapping[Kind, Mapping[str, str]] = {
 
 @dataclass
 class _BagInfo:
-    """What the bag says of its images: cameras and poses by topic, and of every image by topic and time."""
+    """Metadata in the bag: cameras and poses by topic, and image metadata by topic and time."""
 
     infos: dict[str, Any] = field(default_factory=dict)
     transforms: dict[str, Any] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class RealsenseBag:
         total: number of images.
 
     Raises:
-        ForeignRecordingError: it cannot be read, `rosbags` is not installed, or its calibration is not understood.
+        ForeignRecordingError: unreadable file, `rosbags` is not installed, or malformed calibration.
     """
 
     def __init__(self, path: Path) -> None:
@@ -80,7 +80,7 @@ class RealsenseBag:
         self.cameras = {self._roles[topic].sensor: camera for topic, camera in cameras.items()}
 
     def frames(self) -> Iterator[Frame]:
-        """Every image. Host times run as the device's clock does, from where the host's was at the first image."""
+        """All images. Host times follow the device's clock, with the host's time at the first image as origin."""
         offsets_ns: dict[str, int] = {}
         for message in self._bag.messages(_IMAGES):
             if message.topic in self._roles:
@@ -150,7 +150,7 @@ def pixels(kind: Kind, image: Any) -> tuple[str, NDArray[np.generic]]:
     """Encoding and array of a sensor_msgs/Image.
 
     Raises:
-        StreamError: an encoding that the kind does not come in, or too few bytes.
+        StreamError: an encoding that is not supported for the kind, or too few bytes.
     """
     allowed = _ENCODINGS[kind]
     if image.encoding not in allowed or image.is_bigendian:
@@ -160,7 +160,7 @@ def pixels(kind: Kind, image: Any) -> tuple[str, NDArray[np.generic]]:
 
 
 def _role(topic: str) -> Role | None:
-    """What the images of a topic are here; None for what is not used, such as a second device."""
+    """Stream of a topic; None for unused topics, such as those of a second device."""
     match = re.fullmatch(_IMAGES, topic)
     return ROLES.get((match["type"].lower(), int(match["index"]))) if match else None
 

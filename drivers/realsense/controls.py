@@ -1,4 +1,4 @@
-"""What can be set on a RealSense, by its options."""
+"""Controls of a RealSense, from librealsense's options."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -7,17 +7,17 @@ from drivers.contract.controls import Control, ControlInfo, ControlKind, Control
 from drivers.realsense.library import translated_errors
 from drivers.realsense.streams import Role
 
-#: Words of the option that ties several cameras together, by its numbers.
+#: Values of librealsense's inter-camera synchronisation mode, by role.
 _SYNC: Mapping[str, int] = {"free": 0, "master": 1, "slave": 2}
 
 
 def make(rs: Any, uri: str, sensors: Mapping[int, tuple[Any, Role]]) -> Controls:
-    """The controls of the sensors that are used; those of the colour sensor begin with `color.`.
+    """Controls of the used sensors; those of the colour sensor have the prefix `color.`.
 
     Args:
         rs: pyrealsense2.
         uri: of the camera, for messages.
-        sensors: by number, each with the role of its first stream.
+        sensors: by index, each with the role of its first stream.
     """
     controls: list[Control] = []
     for sensor, role in sensors.values():
@@ -27,7 +27,7 @@ def make(rs: Any, uri: str, sensors: Mapping[int, tuple[Any, Role]]) -> Controls
 
 
 def can_sync(rs: Any, sensors: Mapping[int, tuple[Any, Role]]) -> bool:
-    """Whether the camera can be tied to others by wire."""
+    """True if the camera supports hardware synchronisation with others."""
     return any(sensor.supports(rs.option.inter_cam_sync_mode) for sensor, _ in sensors.values())
 
 
@@ -53,7 +53,7 @@ def _settable(sensor: Any, key: Any) -> bool:
 
 
 def _number(uri: str, sensor: Any, key: Any, name: str, unit: str, scale: float | None) -> Control:
-    """An option as a number in SI units; without a scale as the share of its greatest value."""
+    """An option as a number in SI units; without a scale, as fraction of its maximum."""
     limits = sensor.get_option_range(key)
     factor = scale if scale is not None else 1 / max(limits.max, 1e-9)
 

@@ -1,7 +1,7 @@
 """A RealSense as a device, on librealsense's sensors and callbacks.
 
-librealsense calls back from threads of its own. The callbacks only put frames into an queue and take no other lock: a
-Python exception must not reach the SDK, and whoever stops a sensor waits for its callbacks.
+librealsense calls back from its own threads. The callbacks only put frames into a queue and take no other lock: a
+Python exception must not reach the SDK, and stopping a sensor waits for its callbacks.
 """
 
 import logging
@@ -25,9 +25,9 @@ from drivers.realsense.streams import Role
 
 _log = logging.getLogger(__name__)
 
-#: How often the thread looks whether it shall stop [s].
+#: Polling interval of the stop event [s].
 _LOOK_S = 0.1
-#: When nothing has come for so long, it asks whether the camera is still there [s].
+#: Time without images after which the connection is checked [s].
 _SILENT_S = 1.0
 _NO_METADATA = (
     "images are stamped by {}, not by the camera, because the kernel withholds their metadata; librealsense's "
@@ -37,24 +37,24 @@ _NO_METADATA = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UsedSensor:
-    """A sensor of the camera, and its streams that are used."""
+    """A sensor of the camera, and its streams in use."""
 
     sensor: Any
     streams: Sequence[Stream]
 
 
 class RealsenseDevice:
-    """Delivers the streams of a camera, of a recording, or of a software device.
+    """Delivers the streams of a camera, a recording, or a software device.
 
     Args:
         rs: pyrealsense2.
-        camera: `rs.device`; playing recordings and software devices are such.
-        info: who it is.
-        used: its sensors with the streams that are used.
+        camera: `rs.device`, also of a playback or a software device.
+        info: its identity.
+        used: its sensors with the streams in use.
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        DeviceError: its calibration is not understood.
+        DeviceError: invalid calibration.
     """
 
     def __init__(
@@ -91,12 +91,12 @@ class RealsenseDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered; `overrun`: newer ones came before they were taken; `undecodable` ones."""
+        """`frames` delivered; `overrun`: dropped from a full queue; `undecodable`."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """How the camera's clock runs, stream by stream."""
+        """Clock mapping of each stream."""
         return {
             f"clock.{role.sensor}/{role.stream}.{name}": value
             for role, clock in list(self._clocks.items())
@@ -109,7 +109,7 @@ class RealsenseDevice:
             stop = self._gate.begin(sink, "opening the camera's sensors")
             if stop is None:
                 return
-            self._halt()  # what ended by itself still holds its sensors
+            self._halt()  # a stream that ended by itself still holds its sensors
             self._queue = FrameQueue(4 * sum(len(one.streams) for one in self._used))
             self._clocks = {stream.role: DeviceClock(CLOCK) for one in self._used for stream in one.streams}
             try:
@@ -138,7 +138,7 @@ class RealsenseDevice:
         self.stop()
 
     def end(self, reason: str) -> None:
-        """Says that nothing will come any more; made for callbacks."""
+        """Marks the end of the stream; called by callbacks."""
         self._queue.end(reason)
 
     def _open_sensors(self, queue: FrameQueue[tuple[Role, Any, int]]) -> None:
@@ -155,19 +155,19 @@ class RealsenseDevice:
                 if role is not None:
                     image.keep()
                     queue.put((role, image, self._clock()))
-            except Exception:  # whatever it is, it must not reach the SDK
+            except Exception:  # no exception may reach the SDK
                 _log.exception("%s: a frame was lost", self.info.uri)
 
         return take
 
     def _halt(self) -> None:
-        """Stops and closes the sensors that run."""
+        """Stops and closes the running sensors."""
         while self._running:
             sensor = self._running.pop()
             for action in (sensor.stop, sensor.close):
                 try:
                     action()
-                except RuntimeError:  # a sensor that was not started, or a camera that is gone
+                except RuntimeError:  # a sensor that was not started, or a lost camera
                     continue
 
     def _pump(self, stop: threading.Event, queue: FrameQueue[tuple[Role, Any, int]]) -> None:
@@ -195,7 +195,7 @@ class RealsenseDevice:
         try:
             picture: Picture = from_frame(self._rs, image)
             made = frame(picture, role, self.cameras[role.sensor].calib_id)
-        except (ValueError, RuntimeError):  # what librealsense raises about frames, and ours
+        except (ValueError, RuntimeError):  # librealsense's exceptions for frames, and ours
             self._gate.drop("undecodable")
             return
         if picture.domain != HARDWARE and not self._warned:

@@ -1,4 +1,4 @@
-"""What lies between librealsense's threads and ours: they put, and wait for nobody; we take."""
+"""Nonblocking bounded queue between librealsense's threads and ours."""
 
 import threading
 from collections import deque
@@ -8,10 +8,10 @@ Item = TypeVar("Item")
 
 
 class FrameQueue(Generic[Item]):
-    """The newest few items; the oldest one is dropped rather than let anybody wait.
+    """A queue of the newest items; when full, the oldest one is dropped.
 
     Args:
-        depth: how many.
+        depth: maximum number of items.
     """
 
     def __init__(self, depth: int = 4) -> None:
@@ -31,23 +31,23 @@ class FrameQueue(Generic[Item]):
             self._changed.notify()
 
     def end(self, reason: str) -> None:
-        """Says that nothing will come after what is in it."""
+        """Marks the end: no items follow those in the queue."""
         with self._changed:
             self._end = reason
 
     def take(self, timeout_s: float) -> Item | None:
-        """The oldest item, None if none comes for so long. What was said to be the end may have overtaken the last."""
+        """The oldest item, None after the timeout. Items may still follow the end mark."""
         with self._changed:
             self._changed.wait_for(lambda: self._items, timeout_s)
             return self._items.popleft() if self._items else None
 
     def ended(self) -> str:
-        """Why nothing will come any more; "" while something may."""
+        """Reason of the end once the queue is empty; "" before."""
         with self._changed:
             return "" if self._items else self._end
 
     def dropped(self) -> int:
-        """How many items were dropped since this was asked last."""
+        """Number of items dropped since the last call."""
         with self._changed:
             dropped, self._dropped = self._dropped, 0
             return dropped

@@ -1,4 +1,4 @@
-"""pyrealsense2 itself: loaded late, and its errors in our words."""
+"""Lazy import of pyrealsense2, and translation of its errors."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,10 +22,10 @@ def load() -> Any:
 
 @contextmanager
 def translated_errors(uri: str) -> Iterator[None]:
-    """Turns what librealsense raises, plain `RuntimeError`s, into errors that name the device and what to do.
+    """Translates exceptions of librealsense, plain `RuntimeError`s, into errors that name the device and the remedy.
 
     Raises:
-        DeviceError: whatever librealsense said.
+        DeviceError: any exception of librealsense.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""From an address to a device: attached cameras, and recordings that librealsense plays."""
+"""Discovers and opens attached cameras and recordings played by librealsense."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,7 +14,7 @@ from drivers.realsense.profiles import of_sensor, wanted
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """The attached cameras; never raises."""
+    """Attached cameras; never raises."""
     try:
         rs = library.load()
     except SdkMissingError as error:
@@ -28,12 +28,12 @@ def discover(timeout_s: float) -> list[Found]:
 
 
 def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
-    """Opens `realsense://SERIAL`, or `realsense://?recording=FILE.db3`, which librealsense plays.
+    """Opens `realsense://SERIAL`, or `realsense://?recording=FILE.db3`, played by librealsense.
 
     Raises:
-        AddressError: the address is not understood, or the file cannot be played.
+        AddressError: invalid address, or the file cannot be played.
         SdkMissingError: pyrealsense2 is not installed.
-        DeviceError: there is no such camera, or it lacks what is asked for.
+        DeviceError: no such camera, or it lacks a requested stream.
     """
     address = parse(uri)
     rs = library.load()
@@ -43,7 +43,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
     with library.translated_errors(uri):
         camera = next(one for one in rs.context().query_devices() if _text(rs, one, "serial_number") == serial)
         for sensor in camera.query_sensors():
-            # Otherwise librealsense makes host times itself, by a fit that nobody can see.
+            # Otherwise librealsense maps timestamps to host time itself, by an unobservable fit.
             if sensor.supports(rs.option.global_time_enabled):
                 sensor.set_option(rs.option.global_time_enabled, 0.0)
         offers = [(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
@@ -55,10 +55,10 @@ def open_device(uri: str, clock: Callable[[], int]) -> RealsenseDevice:
 
 
 def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) -> RealsenseDevice:
-    """A device of an `rs.device` that offers exactly what it shall deliver: a software device, or one that plays.
+    """Device of an `rs.device` with all its streams: a software device or a playback.
 
     Raises:
-        DeviceError: it offers nothing that is understood.
+        DeviceError: no supported stream.
     """
     with library.translated_errors(info.uri):
         used = [UsedSensor(sensor, of_sensor(sensor)) for sensor in camera.query_sensors()]
@@ -66,7 +66,7 @@ def of_device(rs: Any, camera: Any, info: DeviceInfo, clock: Callable[[], int]) 
 
 
 def device_info(rs: Any, camera: Any) -> DeviceInfo:
-    """Who a camera is."""
+    """Identity of a camera."""
     serial = _text(rs, camera, "serial_number")
     usb = _text(rs, camera, "usb_type_descriptor")
     link = f"USB {usb}" if usb else ""

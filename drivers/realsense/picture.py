@@ -1,4 +1,4 @@
-"""librealsense's video frames, and the frames that they are."""
+"""Video frames of librealsense, and their conversion to frames."""
 
 import math
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from drivers.contract.capabilities import ClockInfo
 from drivers.contract.frame import ENCODINGS, Frame, Kind, Reference
 from drivers.realsense.streams import Role, StreamError
 
-#: Our encodings by pixel format, for the kinds that come in it.
+#: Frame encodings by kind and pixel format.
 FORMATS: Mapping[Kind, Mapping[str, str]] = {
     Kind.DEPTH: {"z16": "16UC1"},
     Kind.IR: {"y8": "mono8", "y16": "mono16"},
     Kind.CONFIDENCE: {"raw8": "mono8", "y8": "mono8"},
     Kind.COLOR: {"rgb8": "rgb8", "bgr8": "bgr8", "y8": "mono8", "y16": "mono16"},
 }
-#: librealsense gives milliseconds with three digits behind the point, of a counter of microseconds with 32 bits. Stamps
-#: that have more, of the host's clock, come through the unwrapping unchanged.
+#: librealsense gives milliseconds with three decimals, from a 32-bit counter of microseconds. Larger timestamps, from
+#: the host's clock, are not changed by the unwrapping.
 CLOCK = ClockInfo("realsense", 1e6, 32)
-#: The domain that stamps come in unless the kernel withholds the images' metadata.
+#: Domain of timestamps, unless the kernel withholds the images' metadata.
 HARDWARE = "hardware clock"
 
 
@@ -35,10 +35,10 @@ class Picture:
         width, height, stride: size [px] and bytes per row.
         data: its bytes.
         number: of the frame.
-        time_ms: on the clock of `domain`.
+        time_ms: timestamp on the clock of `domain`.
         domain: name of the clock: `hardware clock`, `system time` or `global time`.
         depth_unit_m: length of one digit of depth [m].
-        exposure, gain: as the metadata has them; NaN without.
+        exposure, gain: from the metadata; NaN without.
     """
 
     format: str
@@ -55,12 +55,12 @@ class Picture:
 
     @property
     def ticks(self) -> int:
-        """Its time in ticks of `CLOCK`; 0 if it has none."""
+        """Timestamp in ticks of `CLOCK`; 0 if invalid."""
         return round(self.time_ms * 1000) if math.isfinite(self.time_ms) else 0
 
 
 def from_frame(rs: Any, frame: Any) -> Picture:
-    """The picture that an `rs.video_frame` is; its pixels stay where they are."""
+    """Picture of an `rs.video_frame`; pixels are not copied."""
     video = frame.as_video_frame()
     depth = frame.as_depth_frame()
     metadata = rs.frame_metadata_value
@@ -80,10 +80,10 @@ def from_frame(rs: Any, frame: Any) -> Picture:
 
 
 def frame(picture: Picture, role: Role, calib_id: str) -> Frame:
-    """The frame that a picture is, on the camera's clock; host times are still to be set.
+    """Frame of a picture, with device ticks; host times are set by the caller.
 
     Raises:
-        StreamError: its format does not fit the role, or there are too few bytes.
+        StreamError: a format that does not fit the stream, or too few bytes.
     """
     is_depth = role.kind == Kind.DEPTH
     if is_depth and not 0 < picture.depth_unit_m < math.inf:
@@ -124,10 +124,10 @@ def pixels(picture: Picture, kind: Kind) -> tuple[str, NDArray[np.generic]]:
 
 
 def unpadded(data: NDArray[np.uint8], encoding: str, width: int, height: int, stride: int) -> NDArray[np.generic]:
-    """A copy of an image (height, width) or (height, width, 3) out of its bytes, without the gaps behind its rows.
+    """A copy of an image (height, width) or (height, width, 3) from its bytes, without row padding.
 
     Raises:
-        StreamError: the bytes are too few for it.
+        StreamError: too few bytes.
     """
     dtype, channels = ENCODINGS[encoding]
     row = width * channels * dtype.itemsize

@@ -1,4 +1,4 @@
-"""Which of a camera's many stream profiles are used, and the cameras behind them."""
+"""Selection of stream profiles, and their cameras."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from drivers.realsense.streams import ROLES, Role, camera
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
-    """One stream that is used: what it is here, its `rs.video_stream_profile`, and encoding."""
+    """A stream in use: its role, its `rs.video_stream_profile`, and encoding."""
 
     role: Role
     profile: Any
@@ -25,11 +25,11 @@ class Stream:
 
 
 def of_sensor(sensor: Any) -> list[Stream]:
-    """Everything a sensor offers that has a role here."""
+    """All supported stream profiles of a sensor."""
     found = []
     for profile in sensor.get_stream_profiles():
         kind = profile.stream_type().name
-        # Cameras with one colour or depth stream call it 0; a software device may leave the index of infra-red 0.
+        # A single colour or depth stream has index 0; infra-red of a software device may have index 0.
         role = ROLES.get((kind, profile.stream_index()))
         if role is not None and profile.is_video_stream_profile() and profile.format().name in FORMATS[role.kind]:
             encoding = FORMATS[role.kind][profile.format().name]
@@ -38,10 +38,10 @@ def of_sensor(sensor: Any) -> list[Stream]:
 
 
 def wanted(offers: Sequence[Stream], address: Address) -> list[Stream]:
-    """Of what all sensors offer, what an address asks for: each stream once, formats in the order of `FORMATS`.
+    """Profiles requested by an address: each stream once, formats in the order of preference of `FORMATS`.
 
     Raises:
-        DeviceError: a wanted size or rate is not offered; names those that are.
+        DeviceError: an unsupported size or rate; names the supported ones.
     """
     chosen = []
     for role in dict.fromkeys(offer.role for offer in offers):
@@ -60,10 +60,10 @@ def wanted(offers: Sequence[Stream], address: Address) -> list[Stream]:
 
 
 def cameras(streams: Iterable[Stream]) -> Mapping[str, Camera]:
-    """The cameras by head; the rig's frame is that of depth, or of the first stream if there is no depth.
+    """Cameras by head; the rig's frame is that of depth, or of the first stream without depth.
 
     Raises:
-        StreamError: one is not understood.
+        StreamError: an invalid camera.
     """
     first: dict[str, Any] = {}
     for stream in streams:
@@ -78,7 +78,7 @@ def _camera(sensor: str, profile: Any, reference: Any) -> Camera:
     T_rs = pose.identity()
     if sensor != "depth" and profile is not reference:
         extrinsics = profile.get_extrinsics_to(reference)
-        # Rotations are stored column by column.
+        # Rotations are stored in column-major order.
         T_rs = pose.from_rotation(np.reshape(extrinsics.rotation, (3, 3)).T, extrinsics.translation)
     return camera(sensor, size, matrix, intrinsics.model.name.replace("_", " "), intrinsics.coeffs, T_rs)
 

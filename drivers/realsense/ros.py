@@ -1,4 +1,4 @@
-"""Messages out of a ROS 1 bag, read by `rosbags`, which needs no ROS."""
+"""Reads messages of ROS 1 bags by `rosbags`, without ROS."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -12,7 +12,7 @@ from drivers.encoding.foreign_recording import ForeignRecordingError
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One message: its topic, the time since the recording began [ns], and what it holds, by ROS's names."""
+    """One message: topic, time since the start of the recording [ns], and content with ROS's field names."""
 
     topic: str
     time_ns: int
@@ -42,10 +42,10 @@ class Bag:
                 return {connection.topic: connection.msgcount for connection in reader.connections}
 
     def messages(self, topics: str) -> Iterator[Message]:
-        """The messages of the topics that a regular expression matches wholly, in the order of their times.
+        """Messages of topics that fully match a regular expression, in order of time.
 
         Raises:
-            ForeignRecordingError: as `counts`, and if a message is damaged.
+            ForeignRecordingError: as `counts`, and for a corrupt message.
         """
         with _translated_errors(self._path):
             from rosbags.rosbag1 import Reader  # noqa: PLC0415  an extra
@@ -54,7 +54,7 @@ class Bag:
             types = get_typestore(Stores.ROS1_NOETIC)
             with Reader(self._path) as reader:
                 wanted = [connection for connection in reader.connections if re.fullmatch(topics, connection.topic)]
-                # No connection at all would mean every connection.
+                # An empty list would select all connections.
                 for connection, time_ns, data in reader.messages(wanted) if wanted else ():
                     content = types.deserialize_ros1(data, connection.msgtype)
                     yield Message(connection.topic, time_ns, content)
@@ -62,7 +62,7 @@ class Bag:
 
 @contextmanager
 def _translated_errors(path: Path) -> Iterator[None]:
-    """Says which file it was, and what to do about it."""
+    """Translates exceptions into errors that name the file and the remedy."""
     try:
         yield
     except ImportError as error:
@@ -71,5 +71,5 @@ def _translated_errors(path: Path) -> Iterator[None]:
         ) from error
     except OSError as error:
         raise ForeignRecordingError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except Exception as error:  # what a parser raises about damaged bytes may be anything
+    except Exception as error:  # the parser raises arbitrary exceptions for corrupt bytes
         raise ForeignRecordingError(f"{path}: this is no ROS 1 bag, or a damaged one: {error!r}") from error

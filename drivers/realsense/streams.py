@@ -1,4 +1,4 @@
-"""What librealsense calls its streams, and what they are here."""
+"""Streams and cameras of librealsense."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,25 +11,25 @@ from calib.lens import Lens
 from calib.pose import Pose
 from drivers.contract.frame import Geometry, Kind
 
-#: Distortion models that OpenCV's k1 k2 p1 p2 k3 stand for. librealsense projects with all of them forwards; "modified"
-#: and "inverse" apply p1 and p2 to the point that k1…k3 moved already, which is a few thousandths of a pixel.
+#: Distortion models equivalent to OpenCV's k1 k2 p1 p2 k3. librealsense uses all of them for forward projection;
+#: "modified" and "inverse" apply p1 and p2 after the radial part, a difference of a few thousandths of a pixel.
 BROWN_CONRADY = ("brown conrady", "modified brown conrady", "inverse brown conrady")
 
 
 class StreamError(ValueError):
-    """A stream that cannot be used; names it and what is wrong."""
+    """An unusable stream; names it and the problem."""
 
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a stream of the camera is here.
+    """Head, name and properties of a stream.
 
     Attributes:
         sensor: the head.
         stream: its name.
-        kind: what it holds.
-        geometry: of depth, which length.
-        exposure_unit_s: length of one unit of its exposure times [s].
+        kind: kind of image.
+        geometry: type of distance of depth.
+        exposure_unit_s: unit of its exposure times [s].
     """
 
     sensor: str
@@ -47,7 +47,7 @@ ROLES: Mapping[tuple[str, int], Role] = {
     ("confidence", 0): Role("depth", "confidence", Kind.CONFIDENCE),
     ("infrared", 1): Role("left", "ir", Kind.IR),
     ("infrared", 2): Role("right", "ir", Kind.IR),
-    ("color", 0): Role("color", "color", Kind.COLOR, exposure_unit_s=1e-4),  # as USB video devices count
+    ("color", 0): Role("color", "color", Kind.COLOR, exposure_unit_s=1e-4),  # unit of USB video devices
 }
 
 
@@ -59,7 +59,7 @@ def camera(
     coefficients: ArrayLike,
     T_rs: Pose,
 ) -> Camera:
-    """The camera that librealsense describes; both count pixels from the centre of the first.
+    """Camera from librealsense's parameters; both have the origin at the centre of the first pixel.
 
     Args:
         name: of the stream, for messages.
@@ -70,7 +70,7 @@ def camera(
         T_rs: pose that maps sensor coordinates to those of the depth head [m].
 
     Raises:
-        StreamError: another distortion model, or numbers that are no camera.
+        StreamError: unsupported distortion model, or invalid parameters.
     """
     try:
         lens = Lens(np.asarray(coefficients, float))

@@ -52,7 +52,7 @@ class Oscillation:
     Attributes:
         seed: random seed of phases and frequencies.
         speed: factor on all frequencies; with 0 the signals stay 0.
-            hold_s, ramp_s: duration of the rest and of the ramp [s].
+        hold_s, ramp_s: duration of the rest and of the ramp [s].
     """
 
     seed: int
@@ -89,7 +89,7 @@ class Motion:
         width, height: of the sheet [m].
         turn: maximum change of the bending direction [rad].
         shift: maximum distance of the contact line from the centre [m].
-            speed: factor on all frequencies; with 0 the surface is static.
+        speed: factor on all frequencies; with 0 the surface is static.
     """
 
     seed: int

@@ -20,7 +20,7 @@ class Moment:
 
     Attributes:
         surfaces: the tracked surfaces.
-            occluders: bodies in front of them.
+        occluders: bodies in front of them.
     """
 
     surfaces: tuple[SurfaceBody, ...]

@@ -45,10 +45,10 @@ def smooth_pattern(
 
     Args:
         seed: random seed.
-            width, height: of the rectangle [m].
-            scales: σ of the smoothing Gaussians [m]; each has half the weight of the previous one.
+        width, height: of the rectangle [m].
+        scales: σ of the smoothing Gaussians [m]; each has half the weight of the previous one.
         density: texels per metre.
-        color, infrared: lowest and highest reflectivity of red, green and blue, and of infra-red.
+        color, infrared: minimum and maximum reflectivity of red, green and blue, and of infra-red.
     """
     shape = (round(height * density) + 1, round(width * density) + 1)
     generator = np.random.default_rng([seed, 3])
@@ -74,9 +74,9 @@ def fine_pattern(
 
     Args:
         seed: random seed.
-            width, height: of the rectangle [m].
-            color, infrared: minimum and maximum reflectivity of red, green and blue, and of infra-red.
-            density: texels per metre.
+        width, height: of the rectangle [m].
+        color, infrared: minimum and maximum reflectivity of red, green and blue, and of infra-red.
+        density: texels per metre.
     """
     shape = (round(height * density) + 1, round(width * density) + 1)
     generator = np.random.default_rng([seed, 3])

@@ -30,7 +30,7 @@ class Picture:
 
     Args:
         camera: the camera.
-            scene: the scene.
+        scene: the scene.
         samples: rays per pixel and axis (supersampling); one, through the centre, is enough
             unless the texture has details of the size of a pixel.
     """

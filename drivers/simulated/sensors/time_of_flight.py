@@ -40,8 +40,8 @@ class TimeOfFlightNoise:
         mu_amplitude: mean offset times amplitude [m].
         pattern: standard deviation of the constant per-pixel offsets [m] (fixed pattern noise).
         sigma_offset: σ of the brightest, closest return [m].
-            sigma_distance: growth of σ with the distance.
-            sigma_amplitude: σ times amplitude [m].
+        sigma_distance: growth of σ with the distance.
+        sigma_amplitude: σ times amplitude [m].
         amplitude: standard deviation of the measured amplitude.
         least_amplitude: minimum amplitude; weaker returns are invalid.
     """

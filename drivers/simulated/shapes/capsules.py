@@ -74,8 +74,7 @@ def cast_capsules(
 
     Returns:
         (share, radial distance [m], cosine of incidence, index of the capsule), each (height, width); 0, NaN, NaN and
-        -1
-            for a miss. If only the centre misses, the distance is that of the closest approach.
+        -1 for a miss. If only the centre misses, the distance is that of the closest approach.
     """
     height, width = rays.shape[:2]
     share = np.zeros((height, width), np.float32)

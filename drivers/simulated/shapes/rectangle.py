@@ -35,7 +35,7 @@ class Rectangle:
         width, height: of the flat rectangle [m].
         motion: placement over time.
         texture: its texture.
-            excursion: displacement in addition to the motion.
+        excursion: displacement in addition to the motion.
     """
 
     width: float
@@ -57,7 +57,7 @@ class PlacedRectangle:
 
     Attributes:
         width, height, texture: as in `Rectangle`.
-            placement: pose and bend.
+        placement: pose and bend.
     """
 
     width: float

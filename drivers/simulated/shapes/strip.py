@@ -73,7 +73,7 @@ class PlacedStrip:
     Attributes:
         width: of the strip [m].
         texture: its texture.
-            T_rp: pose of the profile: origin in the middle of the clamp, x horizontally away from it, y down, z across.
+        T_rp: pose of the profile: origin in the middle of the clamp, x horizontally away from it, y down, z across.
         profile: the shape.
     """
 
