@@ -1,4 +1,4 @@
-"""Recordings of the Azure Kinect, as `k4arecorder` writes them."""
+"""Recordings of the Azure Kinect, written by `k4arecorder`."""
 
 from drivers.azure.mkv import AzureRecording
 

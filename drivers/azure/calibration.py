@@ -1,7 +1,7 @@
 """The factory calibration of an Azure Kinect: JSON inside each of its recordings.
 
-Source: Azure Kinect Sensor SDK, src/transformation (MIT). Camera matrices are in units of the whole sensor's width and
-height, counted from the corner of the first pixel; a mode takes the sensor binned, and of that a part.
+Source: Azure Kinect Sensor SDK, src/transformation (MIT). Camera matrices are in units of the full sensor's width and
+height, with the origin at the corner of the first pixel; a mode is a crop of the binned sensor.
 """
 
 import json
@@ -17,16 +17,16 @@ from calib.lens import Lens
 
 
 class CalibrationError(ValueError):
-    """A calibration that is not understood."""
+    """A malformed or unsupported calibration."""
 
 
 @dataclass(frozen=True, slots=True)
 class Mode:
-    """What part of the sensor an image shows.
+    """Region of the sensor that an image covers.
 
     Attributes:
-        binned: the sensor's width and height when its pixels are binned as in this mode [px].
-        offset: of the image's first pixel in it [px].
+        binned: width and height of the binned sensor [px].
+        offset: of the image's first pixel in the binned sensor [px].
         size: of the image [px].
     """
 
@@ -54,19 +54,19 @@ _COLOR: Mapping[str, Mode] = {
 _MODES = {"depth": _DEPTH, "color": _COLOR}
 _LOCATIONS = {"depth": "D0", "color": "PV0"}
 
-#: The only lens model the factory uses: OpenCV's rational one. In Rational6KT, p1 and p2 mean half of that.
+#: The only lens model in factory calibrations: OpenCV's rational model. Rational6KT has half of its p1 and p2.
 _MODEL = "CALIBRATION_LensDistortionModelBrownConrady"
 
 
 def cameras(content: bytes, modes: Mapping[str, str]) -> dict[str, Camera]:
-    """The cameras `depth`, which is the rig's frame, and `color`, as far as their modes are given.
+    """Cameras `depth`, which is the rig's frame, and `color`, for the given modes.
 
     Args:
         content: the JSON.
-        modes: by camera, without the encoding of the colours: `720P`, say.
+        modes: by camera; without the encoding for colour, such as `720P`.
 
     Raises:
-        CalibrationError: it is no such JSON, or a mode is unknown.
+        CalibrationError: malformed JSON, or an unknown mode.
     """
     try:
         listed = json.loads(content.rstrip(b"\0"))["CalibrationInformation"]["Cameras"]
@@ -92,7 +92,7 @@ def _camera(sensor: str, name: str, entry: Mapping[str, Any]) -> Camera:
     if (u, v) != (0, 0):
         raise CalibrationError(f"{sensor}: the centre of distortion {u, v} must be that of the image")
     (width, height), (left, top) = mode.binned, mode.offset
-    # The pose that the file holds maps depth coordinates to the camera's.
+    # The pose in the file maps depth coordinates to the camera's.
     T_rs = pose.inverse(pose.from_rotation(extrinsics["Rotation"], extrinsics["Translation"]))
     return Camera(
         *mode.size,

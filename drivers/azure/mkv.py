@@ -1,4 +1,4 @@
-"""MKV files of the Azure Kinect: depth, infra-red and colour. PyAV takes the container apart and decodes nothing."""
+"""MKV files of the Azure Kinect: depth, infra-red and colour. PyAV demuxes only."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -26,17 +26,17 @@ _TRACKS: Mapping[str, tuple[str, str, Kind]] = {
 
 
 class AzureRecording:
-    """The images of one recording; depth in millimetres along z.
+    """Images of one recording; depth in millimetres along z.
 
     Args:
         path: of the file.
 
     Attributes:
-        cameras: `depth` and `color`, as far as there are images of them; depth is the rig's frame.
-        total: None: only reading tells how many images there are.
+        cameras: `depth` and `color`, as recorded; depth is the rig's frame.
+        total: None: the number of images is unknown before reading.
 
     Raises:
-        ForeignRecordingError: it cannot be read, has no or a strange calibration, or PyAV is not installed.
+        ForeignRecordingError: unreadable file, missing or unsupported calibration, or PyAV is not installed.
     """
 
     def __init__(self, path: Path) -> None:
@@ -63,7 +63,7 @@ class AzureRecording:
             raise ForeignRecordingError(f"{path}: {error}") from error
 
     def frames(self) -> Iterator[Frame]:
-        """Every image, numbered by its time: those of one capture have one number, and what was lost has one, too."""
+        """All images, with sequence numbers from their times: images of one capture share a number, losses are gaps."""
         with _container(self._path) as file:
             for packet in file.demux():
                 track = _TRACKS.get(packet.stream.metadata.get("title", ""))
@@ -102,10 +102,10 @@ class AzureRecording:
 
 
 def words(content: bytes, camera: Camera) -> NDArray[np.generic]:
-    """Depth or infra-red: 16 bits per pixel, the higher byte first.
+    """Depth or infra-red: 16 bits per pixel, big-endian.
 
     Raises:
-        ValueError: not as many pixels as the camera has.
+        ValueError: another number of pixels than the camera's.
     """
     if len(content) != 2 * camera.width * camera.height:
         raise ValueError(f"{camera.width} × {camera.height} pixels need two bytes each, there are {len(content)}")
@@ -113,10 +113,10 @@ def words(content: bytes, camera: Camera) -> NDArray[np.generic]:
 
 
 def color(encoding: str, content: bytes, camera: Camera) -> NDArray[np.generic]:
-    """Colours (height, width, 3), blue first.
+    """Colour image (height, width, 3), BGR.
 
     Raises:
-        ValueError: they are not encoded so, or have another size than the camera's images.
+        ValueError: another encoding, or another size than the camera's.
     """
     decoders: Mapping[str, Callable[[bytes, Camera], Any]] = {"MJPG": _jpeg, "NV12": _nv12, "YUY2": _yuy2}
     if encoding not in decoders:
@@ -145,7 +145,7 @@ def _yuy2(content: bytes, camera: Camera) -> Any:
 
 
 def _wall_ns(text: str) -> int:
-    """When the recording began [ns since the Unix epoch]; 0 if it does not tell."""
+    """Start of the recording [ns since the Unix epoch]; 0 if unknown."""
     try:
         began = datetime.fromisoformat(text)
     except ValueError:
@@ -156,7 +156,7 @@ def _wall_ns(text: str) -> int:
 
 @contextmanager
 def _container(path: Path) -> Iterator[Any]:
-    """The open file; says which it was if something is wrong with it, and what to do."""
+    """The open file; translates exceptions into errors that name the file and the remedy."""
     try:
         import av  # noqa: PLC0415  an extra
         import av.error  # noqa: PLC0415

@@ -1,7 +1,7 @@
-"""The Xbox 360 Kinect and the Kinect for Windows, first generation, over USB without an SDK.
+"""Kinect for Xbox 360 and first-generation Kinect for Windows, over USB without an SDK.
 
 Codec: `packets`, `assembly`, `unpacking`, `reference_plane`. Protocol: `commands`, `camera`. Transport: `attached`,
-`port`, `ring`. pyusb is imported only when a camera is looked for.
+`port`, `ring`. pyusb is imported lazily.
 """
 
 from collections.abc import Callable
@@ -15,9 +15,9 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.
 
     Raises:
-        AddressError: the address is not understood.
+        AddressError: invalid address.
         SdkMissingError: pyusb is not installed.
-        DeviceError: the camera cannot be opened; says what to do.
+        DeviceError: the camera cannot be opened; names the remedy.
     """
     address = parse(uri)
     try:
@@ -28,7 +28,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
 
 
 def discover(timeout_s: float) -> list[Found]:
-    """The cameras that are attached, and why one cannot be opened. Never raises."""
+    """Attached cameras, and obstacles to opening them. Never raises."""
     try:
         from drivers.kinect1 import opening  # noqa: PLC0415
     except ImportError:

@@ -1,4 +1,4 @@
-"""What an address `kinect1://serial?streams=depth,color` asks for."""
+"""Addresses `kinect1://serial?streams=depth,color`."""
 
 from dataclasses import dataclass
 from urllib.parse import parse_qsl, urlsplit
@@ -9,11 +9,11 @@ from drivers.kinect1.camera import Stream
 
 @dataclass(frozen=True)
 class Address:
-    """A camera, and what it shall deliver.
+    """A parsed address.
 
     Attributes:
-        serial: of the camera; "" for the only one that is attached.
-        streams: of it; colour and infra-red images share a pipe, so at most one of these.
+        serial: serial number, "" for the only attached camera.
+        streams: requested streams; colour and infra-red share an endpoint, so at most one of them.
     """
 
     serial: str = ""
@@ -21,16 +21,16 @@ class Address:
 
     @property
     def uri(self) -> str:
-        """The address as text; what is as usual is left out."""
+        """The address as text, defaults omitted."""
         query = "" if self.streams == Address.streams else f"?streams={','.join(self.streams)}"
         return f"kinect1://{self.serial}{query}"
 
 
 def parse(uri: str) -> Address:
-    """Reads an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.
+    """Parses an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.
 
     Raises:
-        AddressError: an unknown key, or a value that is not allowed; says what is.
+        AddressError: unknown key or invalid value; names what is allowed.
     """
     try:
         parts = urlsplit(uri)

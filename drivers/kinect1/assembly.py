@@ -1,4 +1,4 @@
-"""Packets become images, or are dropped and counted: an image of which anything is missing is never delivered."""
+"""Assembly of images from packets; incomplete images are dropped and counted, never delivered."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,32 +9,32 @@ from numpy.typing import NDArray
 from calib.jit import kernel
 from drivers.kinect1.transport.packets import HEADER_BYTES, PacketFormat
 
-#: Why an image was dropped: packets that never came; a packet that is none of this stream; one that is too short, or
-#: too many or too few of them; an image that began before the one before it had ended.
+#: Causes of dropped images: lost packets; a malformed or foreign packet header; a wrong packet size or number of
+#: packets; a new image that began before the end of the previous one.
 CAUSES = ("lost_packets", "bad_header", "wrong_size", "resynchronised")
 LOST, HEADER, SIZE, RESYNC = range(4)
 
-# The assembler's state, an array that the kernel changes. PLACE is the number of the packet within the image that is
-# expected next, -1 while the beginning of an image is awaited; the causes count images, MISSING counts packets.
+# State of the assembler, an array modified by the kernel. PLACE is the index in the image of the next expected packet,
+# -1 while waiting for the start of an image; the causes count images, MISSING counts packets.
 PLACE, SEQ, TICKS, BEGAN, COMPLETE, MISSING, FIRST_CAUSE = range(7)
 STATE_SIZE = FIRST_CAUSE + len(CAUSES)
 
 
 @kernel
 def assemble(packets, lengths, begin, state, image, base, payload):
-    """Copies payload into `image` until it is complete or the packets are at an end.
+    """Copies payload into `image` until it is complete or all packets are consumed.
 
     Args:
         packets: (n, at least 12 + payload) uint8, one packet a row.
-        lengths: (n,) how many bytes of each row came; 0 in a microframe without a packet.
-        begin: the first row to read.
-        state: (STATE_SIZE,) int64, see above; BEGAN is the row of the image's first packet, negative if that was in an
+        lengths: (n,) number of valid bytes per row; 0 for a microframe without a packet.
+        begin: first row.
+        state: (STATE_SIZE,) int64, see above; BEGAN is the row of the image's first packet, negative for an
             earlier call.
         image: (bytes of an image,) uint8.
         base, payload: see `PacketFormat`.
 
     Returns:
-        The row to go on with; COMPLETE of the state is 1 if an image is complete.
+        The next row; COMPLETE of the state is 1 if an image is complete.
     """
     count = (image.size + payload - 1) // payload
     state[COMPLETE] = 0
@@ -48,7 +48,7 @@ def assemble(packets, lengths, begin, state, image, base, payload):
             if place >= 0:
                 state[FIRST_CAUSE + HEADER] += 1
             state[PLACE] = -1
-            state[SEQ] = -1  # what follows this one is not known
+            state[SEQ] = -1  # the next sequence number is unknown
             continue
         seq = np.int64(packets[row, 5])
         if state[SEQ] >= 0 and seq != state[SEQ]:
@@ -87,13 +87,13 @@ def assemble(packets, lengths, begin, state, image, base, payload):
 
 @dataclass(frozen=True, eq=False)
 class RawImage:
-    """One complete image as it came.
+    """One complete raw image.
 
     Attributes:
         data: (bytes of an image,) uint8, packed; valid until the assembler is fed again.
         ticks: the device's counter in the first packet.
-        row: where its first packet was in the packets last fed; negative if that many packets before them.
-        seq: number of the image; what is missing before it was dropped.
+        row: row of its first packet in the packets fed last; negative for earlier ones.
+        seq: sequence number; gaps are dropped images.
     """
 
     data: NDArray[np.uint8]
@@ -103,12 +103,12 @@ class RawImage:
 
 
 class Assembler:
-    """Makes images of the packets of one stream.
+    """Assembles images from the packets of one stream.
 
-    A packet may be longer than needed (what is beyond is ignored), but not shorter.
+    Packets may be longer than needed (excess bytes are ignored), but not shorter.
 
     Args:
-        form: what the packets are like.
+        form: packet format.
     """
 
     def __init__(self, form: PacketFormat) -> None:
@@ -119,25 +119,25 @@ class Assembler:
         self._dropped = dict.fromkeys(CAUSES, 0)
         self._seq = -1
         self._last_ticks = 0
-        self._known = 0  # dropped images that were counted before the last complete one
+        self._known = 0  # drops counted before the last complete image
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Images that were dropped, by `CAUSES`."""
+        """Dropped images, by `CAUSES`."""
         counted = self._state[FIRST_CAUSE:]
         return {cause: extra + int(counted[i]) for i, (cause, extra) in enumerate(self._dropped.items())}
 
     @property
     def missing(self) -> int:
-        """Packets that never came; of 256 lost in a row nothing is noticed here, but the image is."""
+        """Number of lost packets; a loss of exactly 256 in a row is not detected here, but the lost image is."""
         return int(self._state[MISSING])
 
     def feed(self, packets: NDArray[np.uint8], lengths: NDArray[np.integer]) -> Iterator[RawImage]:
-        """The images that the packets complete, one after the other.
+        """Images that the packets complete, in order.
 
         Args:
             packets: (n, drivers.kinect1.transport.packets.PACKET_BYTES), one packet a row.
-            lengths: (n,) how many bytes of each row came.
+            lengths: (n,) number of valid bytes per row.
         """
         row = 0
         while row < len(packets):
@@ -151,7 +151,7 @@ class Assembler:
         if self._seq < 0:
             self._seq = 0
         else:
-            # The counter tells of images of which not a single packet came, too.
+            # The timestamps also reveal images of which all packets were lost.
             passed = max(1, round(((ticks - self._last_ticks) & 0xFFFFFFFF) / self._form.period_ticks))
             self._dropped["lost_packets"] += max(0, passed - 1 - (known - self._known))
             self._seq += max(passed, 1 + known - self._known)

@@ -1,4 +1,4 @@
-"""An opened Kinect as a device: one thread reads its streams and delivers them."""
+"""An opened Kinect as a device: one thread reads and delivers its streams."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -16,22 +16,22 @@ from drivers.kinect1.transport.commands import Commands
 from drivers.kinect1.transport.loss_monitor import LossMonitor
 from drivers.kinect1.transport.port import Port
 
-#: The longest that the thread waits for packets before it looks whether it shall stop [s].
+#: Read timeout, and so the polling interval of the stop event [s].
 _READ_TIMEOUT_S = 0.1
 
 
 class Kinect1Device:
-    """Delivers `depth/depth` (z), and `color/bayer` as the sensor measured it or `ir/ir`.
+    """Delivers `depth/depth` (z), and raw `color/bayer` or `ir/ir`.
 
     Args:
-        info: who it is.
-        streams: what to deliver.
-        port: of the camera; is closed with the device.
+        info: its identity.
+        streams: streams to deliver.
+        port: of the camera; closed with the device.
         clock: CLOCK_MONOTONIC [ns].
-        sleep: waits so many seconds.
+        sleep: waits [s].
 
     Raises:
-        DeviceError: the camera does not answer, or tells no calibration.
+        DeviceError: the camera does not answer, or its calibration is invalid.
     """
 
     def __init__(
@@ -67,16 +67,16 @@ class Kinect1Device:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and images of all streams that were dropped, by `CAUSES`."""
+        """`frames` delivered, and dropped images of all streams by `CAUSES`."""
         return self._gate.counters
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """How the clocks of the streams fit, and how many of their packets never came since the last start."""
+        """Clock mappings of the streams, and numbers of lost packets since the last start."""
         return {name: value for decoder in self._decoders.values() for name, value in decoder.gauges.items()}
 
     def start(self, sink: Sink) -> None:
-        """Begins to deliver in a new epoch; a device that is running goes on as it is.
+        """Starts delivery in a new epoch; no effect while it is running.
 
         Raises:
             DeviceError: the device was closed.
@@ -87,20 +87,20 @@ class Kinect1Device:
             self._thread.start()
 
     def stop(self) -> None:
-        """Ends delivery; after it returns the sink is not called again."""
+        """Stops delivery; the sink is not called after it returns."""
         self._gate.end("stopped")
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
-        """Stops and lets go of the camera."""
+        """Stops and releases the camera."""
         self._gate.release()
         self.stop()
         self._port.close()
 
     def _run(self, stop: threading.Event, before: threading.Thread) -> None:
         if before.is_alive():
-            before.join()  # stopped from within its own sink
+            before.join()  # stopped in its own sink
         try:
             self._stream(stop)
         except DeviceError as error:

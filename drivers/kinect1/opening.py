@@ -1,4 +1,4 @@
-"""From an address to an opened camera."""
+"""Discovers and opens cameras."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from drivers.kinect1.transport.ring import IsochronousRing
 
 
 def find(backends: BackendFactory = fresh_backend) -> list[Found]:
-    """All cameras that are attached."""
+    """All attached cameras."""
     return [one.found for one in list_attached(backends())]
 
 
@@ -25,16 +25,16 @@ def open_camera(
     backends: BackendFactory = fresh_backend,
     streaming: ReaderFactory = IsochronousRing,
 ) -> Kinect1Device:
-    """Opens the camera that an address means.
+    """Opens the camera of an address.
 
     Args:
-        address: which, and what it shall deliver.
+        address: serial number and streams.
         clock: CLOCK_MONOTONIC [ns].
-        backends: makes what pyusb looks at the bus with.
-        streaming: makes readers of isochronous pipes.
+        backends: factory of pyusb backends.
+        streaming: factory of isochronous readers.
 
     Raises:
-        DeviceError: none is attached, or it cannot be opened; says what to do.
+        DeviceError: not attached, or it cannot be opened; names the remedy.
     """
     backend = backends()
     there_are = list_attached(backend)
@@ -42,7 +42,7 @@ def open_camera(
     (device,) = [one.device for one in there_are if one.found is chosen]
     port = Port(device, backend, streaming, clock)
     try:
-        # The same streams when it is opened again after a loss, and the same camera.
+        # The URI reopens the same camera with the same streams.
         info = replace(chosen.info, uri=replace(address, serial=chosen.info.serial).uri)
         return Kinect1Device(info, address.streams, port, clock, time.sleep)
     except DeviceError:

@@ -1,4 +1,4 @@
-"""The device's own calibration: a plane whose pattern it knows, against which every disparity is measured."""
+"""Factory calibration of depth: the reference plane of the projected pattern."""
 
 import math
 import struct
@@ -14,30 +14,30 @@ from drivers.contract.device import DeviceError
 #: The raw value that means no return; raw values are numbers of 11 bits.
 NO_RETURN, RAW_VALUES = 2047, 2048
 
-#: Length of one step of a depth image [m]. Neighbouring raw values are at least 0.29 mm apart, so each keeps a number
-#: of its own: nothing is lost. 16 bits reach 13.1 m; the device is specified for 0.8 to 4 m.
+#: Quantisation step of a depth image [m]. Neighbouring raw values are at least 0.29 mm apart, so the conversion is
+#: lossless. 16 bits reach 13.1 m; the device is specified for 0.8 to 4 m.
 DEPTH_SCALE = 0.0002
 
-#: Focal length of the colour camera per image width: 525 px of 640 is what its field of view of 62.7° says.
+#: Focal length of the colour camera per image width: 525 px of 640, for its field of view of 62.7°.
 COLOR_FOCAL_RATIO = 525 / 640
 
 _PLANE_OFFSET = 94  # of four floats in the answer to the command for fixed parameters
 
 
 class CalibrationError(DeviceError):
-    """The device's calibration is none."""
+    """An invalid calibration of the device."""
 
 
 @dataclass(frozen=True)
 class ReferencePlane:
-    """What turns raw values into distances.
+    """Parameters of the conversion from raw disparity to depth.
 
     Attributes:
         baseline: from the infra-red camera to the projector [m].
         color_baseline: from the infra-red camera to the colour camera, in the same direction [m].
         distance: of the plane [m].
-        pixel: size of a disparity's unit on the plane's image: twice a pixel of 640 across the image [m].
-        shift: raw value of the plane, in quarters.
+        pixel: unit of disparity in the image of the plane: twice a pixel of an image of 640 px [m].
+        shift: raw value of the plane, divided by 4.
     """
 
     baseline: float = 0.075
@@ -47,7 +47,7 @@ class ReferencePlane:
     shift: int = 200
 
     def z(self) -> NDArray[np.float64]:
-        """Distance along the optical axis of every raw value (2048,) [m]; NaN without return or behind infinity.
+        """Distance along the optical axis of every raw value (2048,) [m]; NaN for no return or beyond infinity.
 
         With the disparity on the plane m = ((raw − 4 shift) / 4 − 3/8) · pixel, it is distance · baseline /
         (baseline − m).
@@ -60,29 +60,29 @@ class ReferencePlane:
         return z
 
     def table(self) -> NDArray[np.uint16]:
-        """Number in a depth image of every raw value (2048,), in units of `DEPTH_SCALE`; 0 without return."""
+        """Depth of every raw value (2048,) in units of `DEPTH_SCALE`; 0 for no return."""
         steps = np.rint(self.z() / DEPTH_SCALE)
         return np.where((steps >= 1) & (steps <= 65535), steps, 0).astype("<u2")
 
     @property
     def step(self) -> float:
-        """How much 1/z differs from one raw value to the next [1/m]; the `step` of the noise model."""
+        """Quantisation step of 1/z [1/m]; the `step` of the noise model."""
         return self.pixel / (4 * self.distance * self.baseline)
 
     def depth_camera(self, height: int = 480) -> Camera:
-        """The infra-red camera, which is the depth camera, nominal but for its focal length."""
+        """The infra-red camera, which is the depth camera; nominal except for its focal length."""
         focal = self.distance / (2 * self.pixel)
         return Camera(640, height, focal, focal, 319.5, (height - 1) / 2)
 
     def color_camera(self) -> Camera:
-        """The colour camera, nominal; its pose is that between the lenses as the device reports it."""
+        """The colour camera, nominal; its pose is the lens distance that the device reports."""
         focal = COLOR_FOCAL_RATIO * 640
         T_rs = pose.from_rotation_vector((0, 0, 0), (self.color_baseline, 0, 0))
         return Camera(640, 480, focal, focal, 319.5, 239.5, T_rs=T_rs)
 
 
 def parse(fixed: bytes, shift: bytes) -> ReferencePlane:
-    """Reads the answers to the commands for fixed parameters and for the constant shift.
+    """Parses the answers to the commands for fixed parameters and for the constant shift.
 
     Raises:
         CalibrationError: too short, or numbers that stream_info no plane.

@@ -1,4 +1,4 @@
-"""One stream from its packets to frames."""
+"""Decodes the packets of one stream into frames."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,32 +25,32 @@ _STREAMS = {
 
 
 def stream_info(stream: Stream, serial: str) -> StreamInfo:
-    """What a stream is to the service; all of a camera are stamped by its one counter."""
+    """Properties of a stream; all streams of a camera share one clock."""
     clock = ClockInfo(f"kinect1 {serial}", TICK_HZ, bits=32)
     return StreamInfo(*_STREAMS[stream], stream.form.width, stream.form.height, stream.form.rate_hz, clock)
 
 
 def camera_of(stream: Stream, plane: ReferencePlane) -> Camera:
-    """The camera of a stream. The rig's frame is that of the depth camera.
+    """Camera model of a stream. The rig's frame is that of the depth camera.
 
-    Depth is made of infra-red images of 488 rows and has 480, so it counts as another camera.
+    Depth has 480 rows and is computed from infra-red images of 488, so they have different camera models.
     """
     return plane.color_camera() if stream == Stream.COLOR else plane.depth_camera(stream.form.height)
 
 
 @dataclass(frozen=True, eq=False)
 class StampedFrame:
-    """A frame without its epoch, and whether the device's clock has jumped before it."""
+    """A frame, and True if a step of the device's clock preceded it."""
 
     frame: Frame
     stepped: bool
 
 
 class StreamDecoder:
-    """Makes frames of one stream in one epoch.
+    """Decoder of one stream.
 
     Args:
-        stream: which.
+        stream: the stream.
         serial: of the camera.
         plane: its calibration.
     """
@@ -70,16 +70,16 @@ class StreamDecoder:
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """How the clock fits, and packets that never came."""
+        """Clock mapping and number of lost packets."""
         return {
             **{f"clock.{'/'.join(self.info.key)}.{name}": value for name, value in self._clock.gauges.items()},
             f"{self.info.stream}.missing_packets": float(self._assembler.missing),
         }
 
     def decode(self, transfer: Transfer, epoch: int) -> Iterator[StampedFrame]:
-        """The frames that a transfer completes."""
+        """Frames that a transfer completes."""
         for image in self._assembler.feed(transfer.packets, transfer.lengths):
-            # What tells the time is the first packet; the last one comes a whole period later.
+            # The timestamp is that of the first packet; the last one arrives a period later.
             stamp = self._clock.stamp(image.ticks, transfer.arrival_ns(image.row))
             is_depth = self._stream == Stream.DEPTH
             yield StampedFrame(

@@ -1,32 +1,32 @@
-"""Who may open the camera: on Linux udev decides, by a rule that the administrator installs once."""
+"""Permissions: udev rules that let users open the camera, installed once by the administrator."""
 
-#: The vendor's number, and those of the cameras: Xbox 360, and Kinect for Windows.
+#: USB vendor id, and product ids of the cameras.
 VENDOR = 0x045E
 CAMERAS = {0x02AE: "Kinect for Xbox 360", 0x02BF: "Kinect for Windows"}
 
-#: The audio parts beside the cameras, which know the serial number where the camera does not.
+#: Audio devices in the same housing; they have a serial number where the camera has none.
 AUDIO = frozenset({0x02AD, 0x02BB, 0x02BE, 0x02C3})
 
-#: The motor of the foot, which this driver leaves alone, but whoever may look may also turn the head.
+#: The tilt motor; unused by this driver, but the rules cover it, too.
 MOTOR = 0x02B0
 
-#: Where the rules belong.
+#: Path of the rules file.
 PATH = "/etc/udev/rules.d/60-abs-service.rules"
 
-#: Lets users at the machine open them.
+#: Rules that let local users open the devices.
 RULES = "\n".join(
     f'SUBSYSTEM=="usb", ATTR{{idVendor}}=="{VENDOR:04x}", ATTR{{idProduct}}=="{product:04x}", MODE="0660", '
     'GROUP="plugdev", TAG+="uaccess"'
     for product in sorted({*CAMERAS, *AUDIO, MOTOR})
 )
 
-#: What to do when the camera must not be opened.
+#: Remedy for missing permission.
 PERMISSION_REMEDY = (
     f"abs-service devices --udev | sudo tee {PATH}, then sudo udevadm control --reload, and plug the camera in again. "
     f"The rules for it are:\n{RULES}"
 )
 
-#: What to do when the kernel's own driver does not let go of the camera.
+#: Remedy for a kernel driver that does not release the camera.
 KERNEL_REMEDY = (
     "sudo modprobe -r gspca_kinect; to keep it away: "
     "echo 'blacklist gspca_kinect' | sudo tee /etc/modprobe.d/abs-service.conf"

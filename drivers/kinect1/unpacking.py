@@ -1,4 +1,4 @@
-"""Packed pixels become numbers."""
+"""Unpacking of bit-packed pixels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from calib.jit import kernel
 
 @kernel
 def look_up_11(packed, table, result):
-    """Writes `table[v]` for each 11-bit number v; eight of them are in eleven bytes, most significant bit first.
+    """Unpacks 11-bit numbers v (eight in eleven bytes, most significant bit first) and writes `table[v]`.
 
     Args:
         packed: (11 n,) uint8.
@@ -16,7 +16,7 @@ def look_up_11(packed, table, result):
         result: (8 n,) uint16.
     """
     for i in range(min(packed.size // 11, result.size // 8)):
-        # Eleven bytes as two words that overlap: 88 bits do not fit into one.
+        # Eleven bytes as two overlapping words, since 88 bits do not fit into one.
         high = np.uint64(0)
         for k in range(8):
             high = (high << np.uint64(8)) | np.uint64(packed[11 * i + k])
@@ -31,7 +31,7 @@ def look_up_11(packed, table, result):
 
 @kernel
 def unpack_10(packed, result):
-    """Writes the 10-bit numbers; four of them are in five bytes, most significant bit first.
+    """Unpacks 10-bit numbers, four in five bytes, most significant bit first.
 
     Args:
         packed: (5 n,) uint8.

@@ -1,4 +1,4 @@
-"""Frames out of a file of PCIC messages, as ifm3d's frame grabber and its tests write them."""
+"""Frames from files of PCIC messages, written by ifm3d's frame grabber and its tests."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -15,7 +15,7 @@ from drivers.o3r.tof_info import TofInfo
 #: Name of the only sensor.
 SENSOR = "depth"
 
-#: The other images by stream name: what they hold and which chunk they are in.
+#: Kind and chunk of the other images, by stream name.
 _STREAMS: Mapping[str, tuple[Kind, ChunkType]] = {
     "deviation": (Kind.DEVIATION, ChunkType.DISTANCE_NOISE),
     "amplitude": (Kind.AMPLITUDE, ChunkType.NORMALIZED_AMPLITUDE),
@@ -36,7 +36,7 @@ class O3rBuffers:
         total: number of frames.
 
     Raises:
-        ForeignRecordingError: it cannot be read, is no such file, or a message lacks distances or calibration.
+        ForeignRecordingError: unreadable or malformed file, or a message without distances or calibration.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,7 +58,7 @@ class O3rBuffers:
         self.total = sum(len(images & chunks.keys()) for chunks in self._exposures)
 
     def frames(self) -> Iterator[Frame]:
-        """Every image; those of one exposure have one number and one time."""
+        """All images; those of one exposure share sequence number and time."""
         try:
             for chunks in self._exposures:
                 yield from exposure(chunks, self.cameras[SENSOR].calib_id)
@@ -67,10 +67,10 @@ class O3rBuffers:
 
 
 def exposure(chunks: Mapping[int, Chunk], calib_id: str) -> Iterator[Frame]:
-    """The frames of one message with distances and TOF_INFO.
+    """Frames of one message with distances and TOF_INFO.
 
     Raises:
-        ChunkError: a chunk is damaged.
+        ChunkError: a malformed chunk.
     """
     info = _info(chunks)
     yield _frame(chunks[ChunkType.DISTANCE], "depth", Kind.DEPTH, info, calib_id)

@@ -1,6 +1,6 @@
-"""The bytes of a PCIC message: image chunks between `star` and `stop`.
+"""Parser of PCIC messages: image chunks between `star` and `stop`.
 
-Source: ifm3d, modules/framegrabber (Apache-2.0), and a buffer that it tests itself with. Numbers are little-endian.
+Source: ifm3d, modules/framegrabber (Apache-2.0), and the buffer in its tests. Numbers are little-endian.
 """
 
 import re
@@ -12,7 +12,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-#: `0000` and, on the wire, `L000309119\r\n0000`: the ticket, and the length of what follows it.
+#: `0000` and, on the wire, `L000309119\r\n0000`: the ticket, and the length of the remainder.
 _START = re.compile(rb"(?P<ticket>\d{4})(?:L\d{9}\r\n(?P=ticket))?star")
 _STOP = b"stop\r\n"
 
@@ -21,16 +21,16 @@ _STOP = b"stop\r\n"
 _HEADER = struct.Struct("<9I")
 _HEADER_2 = struct.Struct("<12I")
 
-#: dtype of the pixel formats that images come in; the others hold three values per pixel.
+#: dtype by pixel format; other formats have three values per pixel.
 _DTYPES = {0: "u1", 1: "i1", 2: "<u2", 3: "<i2", 4: "<u4", 5: "<i4", 6: "<f4"}
 
 
 class ChunkError(ValueError):
-    """Bytes that are no PCIC message."""
+    """Malformed bytes of a PCIC message."""
 
 
 class ChunkType(IntEnum):
-    """The chunks that are used here."""
+    """The supported chunks."""
 
     DISTANCE = 100
     NORMALIZED_AMPLITUDE = 101
@@ -44,13 +44,13 @@ class Chunk:
     """One chunk.
 
     Attributes:
-        type: what it holds, a `ChunkType` or any other number.
+        type: a `ChunkType` or any other number.
         frame: number of the exposure.
-        time_ns: of the exposure [ns], the camera's clock.
+        time_ns: time of the exposure on the camera's clock [ns].
         width, height: of the image [px].
         pixel_format: number of the format of its pixels.
-        text: JSON that follows the header, "" if there is none.
-        content: what follows, without padding removed.
+        text: JSON after the header, "" if there is none.
+        content: payload, padding included.
     """
 
     type: int
@@ -66,7 +66,7 @@ class Chunk:
         """The image (height, width).
 
         Raises:
-            ChunkError: its pixels are no single numbers, or there are fewer than its size needs.
+            ChunkError: a multi-channel pixel format, or too few bytes.
         """
         if self.pixel_format not in _DTYPES:
             raise ChunkError(f"chunk {self.type}: pixel format {self.pixel_format} is none of {sorted(_DTYPES)}")
@@ -79,10 +79,10 @@ class Chunk:
 
 
 def messages(data: bytes) -> Iterator[dict[int, Chunk]]:
-    """The chunks, by type, of every message.
+    """Chunks of every message, by type.
 
     Raises:
-        ChunkError: something is no message, or is cut off; names the byte.
+        ChunkError: malformed or truncated message; names the byte offset.
     """
     view, position = memoryview(data), 0
     while position < len(data):
@@ -100,7 +100,7 @@ def messages(data: bytes) -> Iterator[dict[int, Chunk]]:
 
 
 def _chunk(data: memoryview, position: int) -> tuple[Chunk, int]:
-    """The chunk at a byte, and the byte behind it."""
+    """The chunk at an offset, and the offset after it."""
     rest = data[position:]
     if len(rest) < _HEADER.size:
         raise ChunkError(f"byte {position}: the message is cut off before its `stop`")

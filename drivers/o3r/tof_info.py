@@ -1,4 +1,4 @@
-"""The chunk TOF_INFO: what the camera says about itself. Source: ifm3d, modules/deserialize (Apache-2.0)."""
+"""Parser of the chunk TOF_INFO: camera calibration and settings. Source: ifm3d, modules/deserialize (Apache-2.0)."""
 
 import math
 import struct
@@ -12,27 +12,28 @@ from calib.lens import Lens, LensError
 from drivers.o3r.chunks import ChunkError
 
 #: Version, metres and amplitude per digit, normalisation of three amplitudes, pose of the optics in the user's
-#: coordinates, then twice a model with 32 numbers: from pixels to directions and, the one that is used, from
+#: coordinates, then two models with 32 numbers: from pixels to directions and, the one used here, from
 #: directions to pixels.
 _INFO = struct.Struct("<I2f3f6f I32f I32f")
-#: What versions 3 and 4 add: times of three exposures [ns], their durations [s], temperature of the light source [°C].
+#: Fields added in versions 3 and 4: times of three exposures [ns], their durations [s], temperature of the light source
+#: [°C].
 _MORE = struct.Struct("<3Q3ff")
-#: Lens models from directions to pixels: Bouguet's, of heads with a narrow view, and the fisheye's. The latter's fifth
-#: number is the angle beyond which its polynomial stands still, outside of the image.
+#: Lens models from directions to pixels: Bouguet's for heads with a narrow view, and fisheye. The latter's fifth
+#: number is the angle beyond which its polynomial is constant, outside of the image.
 _BROWN_CONRADY, _KANNALA_BRANDT = 1, 3
 
 
 @dataclass(frozen=True, slots=True)
 class TofInfo:
-    """What the camera says about itself.
+    """Calibration and settings of the camera.
 
     Attributes:
-        distance_m: length of one digit of a distance [m].
-        amplitude: value of one digit of an amplitude.
+        distance_m: quantisation step of distances [m].
+        amplitude: quantisation step of amplitudes.
         model: number of the lens model.
         parameters: of the lens model: fx, fy, mx, my, skew, then distortion.
-        exposure_s: the longest of the exposures [s], NaN if it is not told.
-        temperature_c: of the light source [°C], NaN if it is not told.
+        exposure_s: the longest of the exposures [s], NaN if unknown.
+        temperature_c: of the light source [°C], NaN if unknown.
     """
 
     distance_m: float
@@ -43,10 +44,10 @@ class TofInfo:
     temperature_c: float
 
     def camera(self, width: int, height: int) -> Camera:
-        """The camera of images of a size. ifm counts pixels from their corners, we from their centres.
+        """Camera for an image size. ifm's pixel origin is the corner, ours the centre of the first pixel.
 
         Raises:
-            ChunkError: a lens model that is not understood.
+            ChunkError: unsupported lens model.
         """
         fx, fy, mx, my, skew = self.parameters[:5]
         if self.model not in {_BROWN_CONRADY, _KANNALA_BRANDT} or skew != 0:
@@ -63,10 +64,10 @@ class TofInfo:
 
 
 def parse(content: bytes) -> TofInfo:
-    """Reads the chunk's content.
+    """Parses the chunk's content.
 
     Raises:
-        ChunkError: it is too short, or its units are no positive numbers.
+        ChunkError: too few bytes, or nonpositive units.
     """
     if len(content) < _INFO.size:
         raise ChunkError(f"TOF_INFO needs {_INFO.size} bytes, has {len(content)}")

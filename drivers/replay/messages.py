@@ -1,4 +1,4 @@
-"""The messages of an MCAP file in the order of their times."""
+"""Messages of an MCAP file in order of time."""
 
 import heapq
 from collections.abc import Iterator, Set
@@ -11,18 +11,18 @@ from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, rea
 
 
 def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tuple[Topic, Message]]:
-    """Messages of the given schemas by log time; those of one time in the order they were written.
+    """Messages of the given schemas by log time; ties in the order in which they were written.
 
     Args:
         path: of the file.
-        contents: its survey.
+        contents: its index.
         schemas: full names of protobuf messages.
 
     Raises:
-        RecordingError: a damaged chunk.
+        RecordingError: a corrupt chunk.
     """
     wanted = {channel for channel, topic in contents.topics.items() if topic.schema in schemas}
-    # A message may go out as soon as no chunk that is still to be read begins earlier.
+    # A message can be yielded as soon as no unread chunk starts earlier.
     starts = np.array([*(chunk.start_ns for chunk in contents.chunks), np.iinfo(np.int64).max], np.int64)
     earliest = np.minimum.accumulate(starts[::-1])[::-1]
     held: list[tuple[int, int, int, Message]] = []

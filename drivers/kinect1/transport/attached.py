@@ -1,4 +1,4 @@
-"""Which cameras are attached, who they are, and whether they can be opened."""
+"""Discovery of attached cameras: identity and availability."""
 
 import errno
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ from drivers.contract.device import DeviceInfo
 from drivers.contract.discovery import Availability, Found
 from drivers.kinect1 import udev
 
-#: Makes a pyusb backend.
+#: Factory of pyusb backends.
 BackendFactory = Callable[[], Any]
 
 _INTERFACE = 0
@@ -27,7 +27,7 @@ _HIGH_SPEED = 3
 
 @dataclass(frozen=True, eq=False)
 class AttachedCamera:
-    """A camera that is attached: what is known of it, and how pyusb calls it."""
+    """An attached camera: discovery result and pyusb device."""
 
     found: Found
     device: usb.core.Device
@@ -37,7 +37,7 @@ _LibUSB: Any = libusb._LibUSB  # noqa: SLF001
 
 
 class _Libusb(_LibUSB):
-    """A libusb that outlives the devices which it has found, for they are released into it."""
+    """A libusb backend that outlives its devices, which are released into it."""
 
     def enumerate_devices(self) -> Iterator[Any]:
         for device in super().enumerate_devices():
@@ -46,10 +46,10 @@ class _Libusb(_LibUSB):
 
 
 def fresh_backend() -> Any:
-    """A libusb of its own for each caller: it looks at the bus anew, even where no hot-plug events arrive (containers).
+    """A new libusb backend, which enumerates the bus even where no hot-plug events arrive (containers).
 
     Raises:
-        RuntimeError: there is no libusb.
+        RuntimeError: libusb cannot be loaded.
     """
     if libusb.get_backend(find_library=libusb_package.find_library) is None:
         raise RuntimeError("no libusb-1.0 can be loaded")
@@ -57,7 +57,7 @@ def fresh_backend() -> Any:
 
 
 def list_attached(backend: Any) -> list[AttachedCamera]:
-    """All cameras on the bus; leaves none of them open. Never raises."""
+    """All cameras on the bus; none is left open. Never raises."""
     devices: list[Any] = list(usb.core.find(find_all=True, idVendor=udev.VENDOR, backend=backend) or ())
     result = []
     for device in devices:
@@ -90,7 +90,7 @@ def _probe(device: Any, neighbours: list[Any]) -> Found:
 
 
 def _serial(device: Any, neighbours: list[Any]) -> str:
-    """The camera's serial number, or that of the audio part beside it where the camera's is all zeros ("" if none)."""
+    """Serial number of the camera or, if it is all zeros, of the audio device in the same housing; "" if none."""
     serial = _read_serial(device)
     if serial.strip("0"):
         return serial
@@ -107,13 +107,13 @@ def _read_serial(device: Any) -> str:
         return ""
     try:
         text = usb.util.get_string(device, device.iSerialNumber, _ENGLISH) or ""
-    except (ValueError, IndexError):  # no text at all
+    except (ValueError, IndexError):  # no string descriptor
         return ""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
 
 
 def _public_serial(device: Any) -> str:
-    """The serial number that the kernel tells everybody, also those who may not open the camera; "" without one."""
+    """Serial number from sysfs, readable without permission to open the camera; "" if none."""
     ports = ".".join(map(str, device.port_numbers or ()))
     try:
         serial = Path(f"/sys/bus/usb/devices/{device.bus}-{ports}/serial").read_text(encoding="utf-8").strip()
@@ -123,12 +123,12 @@ def _public_serial(device: Any) -> str:
 
 
 def _hub(device: Any) -> tuple[Any, ...]:
-    """Where the device is attached, without its own port: camera and audio part share a hub inside the housing."""
+    """Location of the device's hub: camera and audio device share a hub in the housing."""
     return (device.bus, *(device.port_numbers or (device.address,))[:-1])
 
 
 def _try_to_claim(device: Any) -> None:
-    """Tells by an error whether another program has it; the kernel's own driver is no obstacle, it gives way."""
+    """Raises if another program has claimed it; the kernel driver can be detached and is no obstacle."""
     with suppress(NotImplementedError):
         if device.is_kernel_driver_active(_INTERFACE):
             return

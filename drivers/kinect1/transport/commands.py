@@ -1,4 +1,4 @@
-"""Commands to the camera over its control pipe: numbered requests, each with an answer that has to be asked for."""
+"""Command protocol of the control endpoint: tagged requests with polled answers."""
 
 import struct
 import threading
@@ -8,22 +8,22 @@ from typing import Protocol
 
 from drivers.contract.device import DeviceError
 
-#: What requests and answers begin with; then length in words, opcode and tag, 16 bits each, little-endian.
+#: Magic numbers of requests and answers; then length in words, opcode and tag, 16 bits each, little-endian.
 _REQUEST, _ANSWER = b"GM", b"RB"
 _HEADER = struct.Struct("<HHH")
 
-#: Added to the number of a register of the colour camera's chip to write it.
+#: Write flag in register numbers of the colour sensor.
 _WRITE = 0x8000
 
-#: Size that answers are asked for; one of this size, or of none, is not the answer yet.
+#: Size of answer requests; a result of this size, or an empty one, means that the answer is not ready.
 ANSWER_BYTES = 512
 
-#: How long an answer may take, and the pause between two questions for it [s].
+#: Timeout of an answer, and polling interval [s].
 TIMEOUT_S, PAUSE_S = 1.0, 0.002
 
 
 class Opcode(IntEnum):
-    """The commands that this driver needs."""
+    """The commands used by this driver."""
 
     READ_REGISTER = 0x02
     WRITE_REGISTER = 0x03
@@ -33,32 +33,32 @@ class Opcode(IntEnum):
 
 
 class ProtocolError(DeviceError):
-    """The camera answers something else than it was asked, or nothing."""
+    """An invalid answer, or none."""
 
 
 class Control(Protocol):
-    """A device's control pipe."""
+    """Control endpoint of a device."""
 
     def write(self, data: bytes) -> None:
         """Sends a request.
 
         Raises:
-            DeviceError: the device is gone or refuses.
+            DeviceError: the device is lost or refuses.
         """
         ...
 
     def read(self, size: int) -> bytes:
-        """Asks for up to `size` bytes of an answer; empty if there is none yet. Raises as `write`."""
+        """Reads up to `size` bytes of an answer; empty if it is not ready. Raises as `write`."""
         ...
 
 
 class Commands:
-    """Speaks with one camera; threads take turns.
+    """Sends commands to one camera. Thread-safe.
 
     Args:
-        control: its control pipe.
+        control: its control endpoint.
         clock: CLOCK_MONOTONIC [ns].
-        sleep: waits so many seconds.
+        sleep: waits [s].
     """
 
     def __init__(self, control: Control, clock: Callable[[], int], sleep: Callable[[float], object]) -> None:
@@ -69,11 +69,11 @@ class Commands:
         self._lock = threading.Lock()
 
     def send(self, opcode: Opcode, *words: int) -> bytes:
-        """Sends a command of 16-bit words; returns what the answer holds behind its header.
+        """Sends a command of 16-bit words; returns the payload of the answer.
 
         Raises:
-            ProtocolError: no answer in time, or not one to this command.
-            DeviceError: the device is gone.
+            ProtocolError: timeout, or an answer to another command.
+            DeviceError: the device is lost.
         """
         with self._lock:
             tag, self._tag = self._tag, (self._tag + 1) & 0xFFFF
@@ -97,19 +97,19 @@ class Commands:
         return answer[8:]
 
     def read_register(self, register: int) -> int:
-        """The value of a register. Raises as `send`."""
+        """Value of a register. Raises as `send`."""
         return _word(self.send(Opcode.READ_REGISTER, register), 1)
 
     def write_register(self, register: int, value: int) -> None:
-        """Sets a register; the status in the answer says nothing, other drivers ignore it, too. Raises as `send`."""
+        """Sets a register; the status in the answer is meaningless (other drivers ignore it, too). Raises as `send`."""
         self.send(Opcode.WRITE_REGISTER, register, value)
 
     def read_color_sensor(self, register: int) -> int:
-        """The value of a register of the colour camera's own chip. Raises as `send`."""
+        """Value of a register of the colour sensor. Raises as `send`."""
         return _word(self.send(Opcode.COLOR_SENSOR, 1, register, 0), 2)
 
     def write_color_sensor(self, register: int, value: int) -> None:
-        """Sets a register of the colour camera's own chip. Raises as `send`."""
+        """Sets a register of the colour sensor. Raises as `send`."""
         self.send(Opcode.COLOR_SENSOR, 1, register | _WRITE, value)
 
     def _wait(self, opcode: Opcode) -> bytes:

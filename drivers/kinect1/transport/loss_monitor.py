@@ -1,17 +1,17 @@
-"""Tells people when so many images are lost that something has to be done about it."""
+"""Warns when too many images are lost."""
 
 from collections.abc import Callable
 
-#: How long images are counted before they are judged [ns], and the share of them that may be lost.
+#: Length of the window [ns], and tolerated fraction of lost images.
 WINDOW_NS, TOLERATED = 10_000_000_000, 0.05
 
-#: Name of the condition, and what to do.
+#: Name of the condition, and its remedy.
 CONDITION = "lost images"
 _REMEDY = "attach the Kinect to a USB controller of its own, without hubs, and check its cable"
 
 
 class LossMonitor:
-    """Warns when more than `TOLERATED` of the images of a window were dropped, and takes it back when they are not.
+    """Warns when more than `TOLERATED` of a window's images were dropped; clears the warning when not.
 
     Args:
         clock: CLOCK_MONOTONIC [ns].
@@ -26,7 +26,7 @@ class LossMonitor:
         self._warned = False
 
     def update(self, delivered: int, dropped: int) -> None:
-        """Takes how many images were delivered and dropped so far."""
+        """Updates the total numbers of delivered and dropped images."""
         if self._clock() - self._begin_ns < WINDOW_NS:
             return
         came, lost = delivered - self._before[0], dropped - self._before[1]

@@ -1,4 +1,4 @@
-"""What the camera sends over USB: packets with a header, of which a fixed number is one image.
+"""USB packet format: packets with a header; a fixed number of packets is one image.
 
 A packet is `R B 0 flag ? seq ? ? ticks`, the last being 32 bits, and then payload. `flag` is the stream's base with 1
 in an image's first packet, 5 in its last and 2 between; `seq` counts the packets of the stream. All numbers are
@@ -7,7 +7,7 @@ little-endian.
 
 from dataclasses import dataclass
 
-#: Bytes of a packet's header, and the most that a packet has with it: two transactions of a microframe.
+#: Size of the header, and maximum size of a packet with header: two transactions of a microframe [bytes].
 HEADER_BYTES, PACKET_BYTES = 12, 1920
 
 #: Rate of the counter in the headers [1/s]. Its 32 bits wrap every 71.58 s.
@@ -16,11 +16,11 @@ TICK_HZ = 60e6
 
 @dataclass(frozen=True)
 class PacketFormat:
-    """How the images of one kind are cut into packets.
+    """Division of a stream's images into packets.
 
     Attributes:
-        endpoint: address of the isochronous pipe.
-        base: what all its flags have in common.
+        endpoint: address of the isochronous endpoint.
+        base: common base of its flags.
         payload: bytes of an image in each packet but the last.
         width, height: of an image [px].
         bits: of a pixel; packed, most significant first.
@@ -51,7 +51,7 @@ class PacketFormat:
         return round(TICK_HZ / self.rate_hz)
 
 
-#: Depth takes 7260 of the 8000 microframes in a second. Colour and infra-red images share a pipe.
+#: Depth takes 7260 of the 8000 microframes per second. Colour and infra-red images share an endpoint.
 DEPTH = PacketFormat(0x82, 0x70, 1748, 640, 480, 11)
 COLOR = PacketFormat(0x81, 0x80, 1908, 640, 480, 8)
 INFRARED = PacketFormat(0x81, 0x80, 1908, 640, 488, 10)

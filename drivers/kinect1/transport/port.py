@@ -1,4 +1,4 @@
-"""One camera on the USB: opening it against the kernel's resistance, its control pipe, its streams."""
+"""One camera on USB: detaching the kernel driver, opening, control transfers and streams."""
 
 import errno
 import threading
@@ -13,14 +13,14 @@ from drivers.contract.device import DeviceError
 from drivers.kinect1 import udev
 from drivers.kinect1.transport.transfer import DisconnectedError, Reader
 
-#: Makes the reader of a device's streams.
+#: Factory of readers of a device's streams.
 ReaderFactory = Callable[[usb.core.Device, Sequence[int], Callable[[], int]], Reader]
 
 _OUT, _IN = 0x40, 0xC0
 _CONTROL_MS = 1000
 _INTERFACE = 0
 
-#: What a camera carries; the alternate setting of its interface that has these is the one to use.
+#: Endpoints of the streams; they select the alternate setting of the interface.
 _PIPES = frozenset({0x81, 0x82})
 
 
@@ -28,13 +28,13 @@ class Port:
     """An opened camera.
 
     Args:
-        device: as pyusb found it.
-        backend: what found it; must outlive it.
-        streaming: makes readers of its streams.
+        device: the pyusb device.
+        backend: its backend; must outlive it.
+        streaming: factory of readers of its streams.
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        DeviceError: it cannot be opened; says what to do.
+        DeviceError: it cannot be opened; names the remedy.
     """
 
     def __init__(
@@ -65,10 +65,10 @@ class Port:
 
     @contextmanager
     def reading(self, endpoints: Sequence[int]) -> Iterator[Reader]:
-        """A reader of pipes.
+        """A reader of isochronous endpoints.
 
         Raises:
-            DeviceError: the host cannot carry them, or the port was closed.
+            DeviceError: insufficient USB bandwidth, or the port was closed.
         """
         with self._opened():
             self._refuse_if(self._closing)
@@ -83,7 +83,7 @@ class Port:
                 self._dispose()
 
     def close(self) -> None:
-        """Lets go of the camera, as soon as nobody reads any more; may be called again."""
+        """Releases the camera after the last reader is closed; idempotent."""
         with self._lock:
             self._closing = True
             self._dispose()
@@ -113,7 +113,7 @@ class Port:
                 self._device.set_interface_altsetting(_INTERFACE, setting)
 
     def _is_configured(self) -> bool:
-        """Usually the kernel has configured it; to do so again would reset it, which late models do not survive."""
+        """True if the kernel has configured it; configuring again would reset it, which late models do not survive."""
         try:
             self._device.get_active_configuration()
         except usb.core.USBError as error:
@@ -127,7 +127,7 @@ class Port:
             if self._device.is_kernel_driver_active(_INTERFACE):
                 self._device.detach_kernel_driver(_INTERFACE)
         except NotImplementedError:
-            return  # only Linux has drivers that hold a camera
+            return  # only on Linux a kernel driver holds the camera
         except usb.core.USBError as error:
             if error.errno in {errno.ENODEV, errno.EACCES}:
                 raise
@@ -137,7 +137,7 @@ class Port:
             ) from error
 
     def _setting(self) -> int:
-        """The alternate setting with both pipes, the widest of them."""
+        """The alternate setting with both endpoints and the largest packets."""
         fitting: list[tuple[int, int]] = []
         configuration: Any = self._device.get_active_configuration()
         for interface in configuration:
@@ -151,7 +151,7 @@ class Port:
 
 @contextmanager
 def translated_errors() -> Iterator[None]:
-    """Turns pyusb's errors into `DeviceError`s that say what to do."""
+    """Translates pyusb's errors into `DeviceError`s that name the remedy."""
     try:
         yield
     except usb.core.USBError as error:
@@ -159,7 +159,7 @@ def translated_errors() -> Iterator[None]:
 
 
 def translate(error: usb.core.USBError) -> DeviceError:
-    """A pyusb error in plain words."""
+    """The `DeviceError` of a pyusb error."""
     match error.errno:
         case errno.ENODEV | errno.ENOENT | errno.ESHUTDOWN:
             return DisconnectedError("the camera was unplugged")

@@ -1,7 +1,7 @@
 """Isochronous transfers in flight on the libusb handle of a pyusb device.
 
-pyusb itself has one transfer in flight and loses a third of the packets between two of them. Of its insides this uses
-the library and the handle, so its version is pinned.
+pyusb itself has one transfer in flight and loses a third of the packets between transfers. This module uses pyusb's
+private library and handle, so its version is pinned.
 """
 
 import ctypes
@@ -19,20 +19,20 @@ from drivers.contract.device import DeviceError
 from drivers.kinect1.transport.packets import PACKET_BYTES
 from drivers.kinect1.transport.transfer import DisconnectedError, Transfer
 
-#: Transfers in flight per pipe, and microframes in each: 128 ms in which the host may be busy with something else. Both
-#: pipes take 4 MB of the 16 MB that Linux grants to usbfs by default.
+#: Transfers in flight per endpoint, and microframes in each: they buffer 128 ms. Both endpoints take 4 MB of the 16 MB
+#: that Linux grants to usbfs by default.
 TRANSFERS, MICROFRAMES = 16, 64
 
-#: Transfers in a row that the host may report as failed before it is given up: a second of them.
+#: Maximum number of consecutive failed transfers: one second of them.
 MAX_FAILURES = 125
 
 _COMPLETED, _NO_DEVICE = 0, 5
 _ERROR_NO_DEVICE = -4
 
-#: How long transfers may take to be cancelled [s].
+#: Timeout of cancellation [s].
 _CANCEL_S = 2.0
 
-#: Rings whose transfers never came back: the kernel may still write into their memory, so it is kept.
+#: Rings with transfers that were not returned: the kernel may still write into their memory, so it is kept.
 _leaked: list["IsochronousRing"] = []
 
 
@@ -42,7 +42,7 @@ class _Time(ctypes.Structure):
 
 @dataclass(frozen=True, eq=False)
 class _Slot:
-    """One transfer: libusb's description, its memory, and length, actual length and status of each of its packets."""
+    """One transfer: libusb's structure, its buffer, and length, actual length and status of each packet."""
 
     endpoint: int
     transfer: Any
@@ -53,16 +53,16 @@ class _Slot:
 class IsochronousRing:
     """A `Reader` of a pyusb device on libusb.
 
-    A completed transfer goes back to the kernel as soon as it was looked at. Completion may be noticed by any thread
-    that speaks with the same libusb, so all it does is to put the transfer into a queue.
+    A completed transfer is resubmitted as soon as it was read. The completion callback may run in any thread that uses
+    the same libusb context, so it only puts the transfer into a queue.
 
     Args:
-        device: opened, its interface claimed.
-        endpoints: addresses of the pipes.
+        device: opened, with its interface claimed.
+        endpoints: endpoint addresses.
         clock: CLOCK_MONOTONIC [ns].
 
     Raises:
-        DeviceError: the host cannot carry the streams.
+        DeviceError: insufficient USB bandwidth.
     """
 
     def __init__(self, device: usb.core.Device, endpoints: Sequence[int], clock: Callable[[], int]) -> None:
@@ -70,7 +70,7 @@ class IsochronousRing:
         self._library, self._context = context.backend.lib, context.backend.ctx
         self._declare()
         self._clock = clock
-        self._completed: deque[tuple[int, int]] = deque()  # address of the transfer, when
+        self._completed: deque[tuple[int, int]] = deque()  # address of the transfer, time
         self._callback = libusb._libusb_transfer_cb_fn_p(self._complete)  # noqa: SLF001
         self._failures = 0
         slots = [self._slot(context.handle.handle, endpoint) for endpoint in endpoints for _ in range(TRANSFERS)]
@@ -103,7 +103,7 @@ class IsochronousRing:
             self._submit(address)
 
     def close(self) -> None:
-        """Cancels what is in flight, waits for it and frees it."""
+        """Cancels the transfers in flight, waits for them and frees them."""
         for address in self._flying:
             self._library.libusb_cancel_transfer(self._slots[address].transfer)
         deadline_ns = self._clock() + round(_CANCEL_S * 1e9)
@@ -117,7 +117,7 @@ class IsochronousRing:
         for slot in self._slots.values():
             self._library.libusb_free_transfer(slot.transfer)
         self._slots = {}
-        self._callback = None  # it refers to this object, which would never be freed
+        self._callback = None  # break the reference cycle
 
     def _slot(self, handle: Any, endpoint: int) -> _Slot:
         packets = np.zeros((MICROFRAMES, PACKET_BYTES), np.uint8)

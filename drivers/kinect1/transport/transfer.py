@@ -1,4 +1,4 @@
-"""What comes in over the isochronous pipes, whoever carries it: libusb, or a test."""
+"""Interface of isochronous transfers, implemented by libusb and by tests."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ from numpy.typing import NDArray
 
 from drivers.contract.device import DeviceError
 
-#: A microframe of high-speed USB, in which each pipe carries up to one packet [ns].
+#: Microframe of high-speed USB, with up to one packet per endpoint [ns].
 MICROFRAME_NS = 125_000
 
 
 class DisconnectedError(DeviceError):
-    """The device was unplugged, or lost its power."""
+    """The device was unplugged or lost power."""
 
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """A run of microframes of one pipe.
+    """Consecutive microframes of one endpoint.
 
     Attributes:
-        endpoint: address of the pipe.
-        packets: (n, PACKET_BYTES) uint8, one microframe a row; valid until the next one is asked for.
-        lengths: (n,) how many bytes of each row came.
-        t_ns: when the last of them was there, CLOCK_MONOTONIC [ns].
+        endpoint: endpoint address.
+        packets: (n, PACKET_BYTES) uint8, one microframe per row; valid until the next transfer is read.
+        lengths: (n,) number of valid bytes per row.
+        t_ns: arrival of the last packet, CLOCK_MONOTONIC [ns].
     """
 
     endpoint: int
@@ -34,25 +34,25 @@ class Transfer:
     t_ns: int
 
     def arrival_ns(self, row: int) -> int:
-        """When the packet of a row was there; rows before the first (negative ones) were in earlier transfers [ns]."""
+        """Arrival time of a row's packet [ns]; negative rows are in earlier transfers."""
         return self.t_ns - (len(self.packets) - 1 - row) * MICROFRAME_NS
 
 
 class Reader(Protocol):
-    """Streams of a device. One thread uses it."""
+    """Reader of a device's streams, for one thread."""
 
     def read(self, timeout_s: float) -> Iterator[Transfer]:
-        """Waits for transfers; those of a pipe come in their order.
+        """Waits for transfers; those of one endpoint are in order.
 
         Args:
-            timeout_s: the longest to wait for the first one [s].
+            timeout_s: timeout for the first one [s].
 
         Raises:
-            DisconnectedError: there will be no more.
-            DeviceError: the host does not go on.
+            DisconnectedError: no more transfers.
+            DeviceError: the host reports failures.
         """
         ...
 
     def close(self) -> None:
-        """Ends all transfers; may be called again."""
+        """Cancels all transfers; idempotent."""
         ...
