@@ -64,7 +64,7 @@ class View(Protocol):
         """Synthesises a population of deformed meshes."""
         ...
 
-    def detect_object(self) -> Sight | None:
+    def sight(self) -> Sight | None:
         """The same for one candidate of a chain; none unless the samples are the vertices."""
         ...
 

@@ -117,7 +117,7 @@ class DenseView:
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
-    def detect_object(self) -> None:
+    def sight(self) -> None:
         """None: which samples there are depends on the candidate."""
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:

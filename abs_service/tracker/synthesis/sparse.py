@@ -106,7 +106,7 @@ class SparseView:
         rendered = self.render(predicted)
         inside = seen.pixel[0] > 0
         front = np.where(inside, rendered[(row - 1) * inside, (column - 1) * inside], np.float32(np.inf))
-        facing = np.einsum("in,in->n", predicted.normals[0], self._detect(predicted)) < 0
+        facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
         self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
 
     def synthesize(self, surface: Surface) -> Synthesis:
@@ -117,7 +117,7 @@ class SparseView:
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
         return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
 
-    def detect_object(self) -> Sight:
+    def sight(self) -> Sight:
         """What one candidate of a chain shows."""
         seeing = Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
         return Sight(seeing, self._slopes.step(self._attributes))
@@ -153,6 +153,6 @@ class SparseView:
             self._rendered = (surface, image)
         return image
 
-    def _detect(self, surface: Surface) -> NDArray[np.float64]:
+    def _sight(self, surface: Surface) -> NDArray[np.float64]:
         """Lines of sight (3, n) from the camera to the vertices of a population of one [m]."""
         return surface.vertices[0] - self.camera.center[:, None]

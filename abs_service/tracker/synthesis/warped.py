@@ -153,7 +153,7 @@ class _SharedView:
         common = self._projection.synthesize(surface)
         return Synthesis(common.pixel, common.distance, self._attributes)
 
-    def detect_object(self) -> None:
+    def sight(self) -> None:
         """None: one synthesis serves all sensors, and in a chain each would make its own."""
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
