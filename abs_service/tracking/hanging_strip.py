@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observer
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.elastica import heavy_elastica
-from abs_service.tracker.detection.initial_detection import detect_object
+from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.session import Plan, Tracking

@@ -9,8 +9,9 @@ import numpy as np
 from abs_service.pairing.image_decoders import kinds
 from abs_service.pairing.observation import Observation, Observer
 from abs_service.tracker import status
-from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, detect_object
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError

@@ -1,4 +1,4 @@
-"""Detection of the object in the first depth image, from which mesh and model are made."""
+"""The segmented first depth image of the object, from which mesh and model are made."""
 
 from dataclasses import dataclass, field
 
@@ -6,12 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
-from abs_service.pairing.observation import Observation
-from abs_service.tracker.detection.regions.base import Region
 from calib.camera import Camera
-from calib.noise.base import DepthNoise, subtract_mean_offset
-from calib.rig import Rig
 
 
 class DetectionError(ValueError):
@@ -51,20 +46,3 @@ class InitialDetection:
         near = cv2.dilate(inside, np.ones((2 * reach_px + 1, 2 * reach_px + 1))) > inside
         points = self.camera.unproject(np.where(near, self.surroundings, np.nan).astype(np.float32)).reshape(-1, 3)
         return points[np.isfinite(points[:, 0])]
-
-
-def detect_object(
-    observation: Observation, rig: Rig, reference: str, region: Region, vertices: int
-) -> InitialDetection:
-    """Segments the reference sensor's depth image with a region, for a mesh of about `vertices` vertices.
-
-    Raises:
-        DetectionError: there is no depth image, or no object in it.
-    """
-    image, noise = observation.images.get(reference), rig.sensors[reference].noise
-    if not (isinstance(image, DepthImage) and isinstance(noise, DepthNoise)):
-        raise DetectionError(f"no depth image from {reference} yet")
-    camera = rig.sensors[reference].camera
-    distance = subtract_mean_offset(noise, image.distance, image.amplitude)
-    inside = region.select(camera.unproject(distance), distance)
-    return InitialDetection(np.where(inside, distance, np.nan).astype(np.float32), camera, vertices, distance)

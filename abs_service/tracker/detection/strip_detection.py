@@ -165,7 +165,7 @@ def _check(size: tuple[float, float], length: float, share: float) -> None:
     """Whether what is seen can be the strip.
 
     Raises:
-        DetectionError: it is wider than long, of another length than the given one [m] (0: not given), or no such curve.
+        DetectionError: it is wider than long, not of the given length [m] (0: not given), or not such a curve.
     """
     if share < LEAST_SHARE:
         raise DetectionError(
