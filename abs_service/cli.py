@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit code; see `Exit`."""
     for variable in THREADS:
         os.environ.setdefault(variable, "1")
-    parent_watchdog.hold()
+    parent_watchdog.start()
     name, commands, given = "", COMMANDS, list(sys.argv[1:] if argv is None else argv)
     module = import_module("abs_service.commands")
     while commands:

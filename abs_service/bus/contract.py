@@ -81,15 +81,15 @@ class Bus(Protocol):
         """Declares that this process sends messages of type `message` on `topic`."""
         ...
 
-    def announce(self, topic: str, message: str) -> Publisher:
+    def latched_publisher(self, topic: str, message: str) -> Publisher:
         """Like `publisher`, for what changes seldom: the last message also answers whoever asks for the topic."""
         ...
 
-    def answer(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
+    def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
         """Answers queries for `topic`; `payload` is called for each, from a thread of the transport."""
         ...
 
-    def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
+    def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         """All answers to a query for the topics that match; empty, at once, if nobody answers."""
         ...
 
@@ -97,11 +97,11 @@ class Bus(Protocol):
         """Calls `on_sample`, from a thread of the transport, for each message on matching topics; it must be quick."""
         ...
 
-    def show_alive(self, component: str) -> Subscription:
+    def declare_liveliness(self, component: str) -> Subscription:
         """Lets others see that this component runs, until its process ends, cleanly or not."""
         ...
 
-    def watch_alive(self, on_change: Callable[[str, bool], None]) -> Subscription:
+    def watch_liveliness(self, on_change: Callable[[str, bool], None]) -> Subscription:
         """Calls `on_change(component, alive)` for every component there is and whenever one comes or goes."""
         ...
 

@@ -8,7 +8,7 @@ from typing import Self
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
 from abs_service.bus.queues import LatestQueue
-from abs_service.bus.stamps import Speaker
+from abs_service.bus.stamps import HeaderFactory
 from drivers.contract.device import DeviceState, Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
@@ -24,13 +24,13 @@ class FramePublisher:
 
     Args:
         bus: where to publish.
-        speaker: writes the headers.
+        headers: writes the headers.
         device: name of the device in the configuration; its truth is published under it.
     """
 
-    def __init__(self, bus: Bus, speaker: Speaker, device: str) -> None:
+    def __init__(self, bus: Bus, headers: HeaderFactory, device: str) -> None:
         self._bus = bus
-        self._speaker = speaker
+        self._headers = headers
         self._device = device
         self._publishers: dict[str, Publisher] = {}
         self._published: Counter[str] = Counter()
@@ -83,12 +83,12 @@ class FramePublisher:
             self._published[topic] += 1
 
     def _publish_frame(self, topic: str, frame: Frame) -> None:
-        header = self._speaker.header(frame.t_host_ns, frame.seq, frame.sensor)
-        image = codec.encode_image(frame, self._speaker.clock.wall(frame.t_host_ns))
+        header = self._headers.at(frame.t_host_ns, frame.seq, frame.sensor)
+        image = codec.encode_image(frame, self._headers.clock.wall(frame.t_host_ns))
         self._publisher(topic, codec.IMAGE_SCHEMA).put(image, codec.encode_info(frame, header))
 
     def _publish_truth(self, topic: str, truth: Truth) -> None:
-        header = self._speaker.header(truth.t_host_ns, truth.seq)
+        header = self._headers.at(truth.t_host_ns, truth.seq)
         self._publisher(topic, codec.TRUTH_SCHEMA).put(codec.encode_truth(truth, header))
 
     def _publisher(self, topic: str, message: str) -> Publisher:

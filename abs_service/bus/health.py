@@ -9,7 +9,7 @@ from absmsg.v1 import health_pb2
 
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Bus
-from abs_service.bus.stamps import Speaker
+from abs_service.bus.stamps import HeaderFactory
 
 PERIOD_NS = 1_000_000_000
 
@@ -38,19 +38,19 @@ class Health:
     Args:
         bus: where to publish.
         component: capture, record, run or track/<tracker>.
-        speaker: writes the headers; its clock decides when a second is over.
+        headers: writes the headers; its clock decides when a second is over.
     """
 
-    def __init__(self, bus: Bus, component: str, speaker: Speaker) -> None:
+    def __init__(self, bus: Bus, component: str, headers: HeaderFactory) -> None:
         self._publisher = bus.publisher(keys.health(component), health_pb2.Health.DESCRIPTOR.full_name, EVENTS)
         self._component = component
-        self._speaker = speaker
+        self._headers = headers
         self._counters: Counter[str] = Counter()
         self._gauges: dict[str, float] = {}
         self._labels: dict[str, str] = {}
         self._conditions: dict[str, tuple[Level, str]] = {}
         self._seq = 0
-        self._next_ns = speaker.clock.monotonic()
+        self._next_ns = headers.clock.monotonic()
         self._rated: dict[str, tuple[int, int]] = {}
         # Reentrant because a change of level publishes while it is held: two threads may not overtake each other.
         self._lock = threading.RLock()
@@ -73,7 +73,7 @@ class Health:
 
     def rate(self, name: str, total: int) -> None:
         """Sets the gauge `name` to the rate [Hz] at which `total` grew since the last call."""
-        now_ns = self._speaker.clock.monotonic()
+        now_ns = self._headers.clock.monotonic()
         with self._lock:
             then_ns, before = self._rated.get(name, (now_ns, total))
             self._rated[name] = (now_ns, total)
@@ -100,13 +100,13 @@ class Health:
 
     def due(self) -> bool:
         """Whether a second is over since `tick` last published: the moment to enter gauges."""
-        return self._speaker.clock.monotonic() >= self._next_ns
+        return self._headers.clock.monotonic() >= self._next_ns
 
     def tick(self) -> None:
         """Publishes if a second is over."""
         if self.due():
             # From second to second, not from call to call, unless whole seconds were missed.
-            self._next_ns = max(self._next_ns + PERIOD_NS, self._speaker.clock.monotonic())
+            self._next_ns = max(self._next_ns + PERIOD_NS, self._headers.clock.monotonic())
             self.publish()
 
     def publish(self) -> None:
@@ -114,7 +114,7 @@ class Health:
         with self._lock:
             level = self.level
             message = health_pb2.Health(
-                header=self._speaker.now(self._seq),
+                header=self._headers.now(self._seq),
                 component=self._component,
                 level=_WIRE[level],
                 message="; ".join(text for rank, text in self._conditions.values() if rank == level and text),

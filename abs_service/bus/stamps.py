@@ -50,13 +50,13 @@ class WallClock:
         return offset_ns
 
 
-class Speaker:
+class HeaderFactory:
     """Writes the header of every message that one process sends.
 
     Args:
         rig: name of the rig.
         clock: gives the stamps.
-        boot_id: tells this process from its predecessor; new with each `Speaker` unless given.
+        boot_id: tells this process from its predecessor; new with each `HeaderFactory` unless given.
     """
 
     def __init__(self, rig: str, clock: WallClock, boot_id: str | None = None) -> None:
@@ -64,7 +64,7 @@ class Speaker:
         self.clock = clock
         self.boot_id = boot_id or uuid.uuid4().hex
 
-    def header(self, t_host_ns: int, seq: int, frame_id: str = "") -> common_pb2.Header:
+    def at(self, t_host_ns: int, seq: int, frame_id: str = "") -> common_pb2.Header:
         """The header of a message about the moment `t_host_ns` (CLOCK_MONOTONIC) [ns]."""
         header = common_pb2.Header(t_host_ns=t_host_ns, seq=seq, rig=self.rig, frame_id=frame_id, boot_id=self.boot_id)
         header.stamp.FromNanoseconds(self.clock.wall(t_host_ns))
@@ -72,4 +72,4 @@ class Speaker:
 
     def now(self, seq: int, frame_id: str = "") -> common_pb2.Header:
         """The header of a message about this very moment."""
-        return self.header(self.clock.monotonic(), seq, frame_id)
+        return self.at(self.clock.monotonic(), seq, frame_id)

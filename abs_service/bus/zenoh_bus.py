@@ -67,12 +67,12 @@ class ZenohBus:
             )
         )
 
-    def announce(self, topic: str, message: str) -> Publisher:
-        """See `contract.Bus.announce`."""
-        return _Announcement(self.publisher(topic, message, EVENTS), self._session, self._key(topic), message)
+    def latched_publisher(self, topic: str, message: str) -> Publisher:
+        """See `contract.Bus.latched_publisher`."""
+        return _LatchedPublisher(self.publisher(topic, message, EVENTS), self._session, self._key(topic), message)
 
-    def answer(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
-        """See `contract.Bus.answer`."""
+    def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
+        """See `contract.Bus.answer_queries`."""
         key = self._key(topic)
 
         def on_query(query: zenoh.Query) -> None:
@@ -80,8 +80,8 @@ class ZenohBus:
 
         return self._keep(from_non_daemon_thread(lambda: self._session.declare_queryable(key, on_query)))
 
-    def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
-        """See `contract.Bus.ask`."""
+    def query(self, pattern: str, timeout_s: float) -> list[Sample]:
+        """See `contract.Bus.query`."""
         replies = self._session.get(self._key(pattern), target=zenoh.QueryTarget.ALL, timeout=timeout_s)
         return [self._sample(reply.ok) for reply in replies if reply.ok is not None]
 
@@ -95,12 +95,12 @@ class ZenohBus:
         key = self._key(pattern)
         return self._keep(from_non_daemon_thread(lambda: self._session.declare_subscriber(key, on_zenoh_sample)))
 
-    def show_alive(self, component: str) -> Subscription:
-        """See `contract.Bus.show_alive`."""
+    def declare_liveliness(self, component: str) -> Subscription:
+        """See `contract.Bus.declare_liveliness`."""
         return self._keep(self._session.liveliness().declare_token(self._key(keys.live(component))))
 
-    def watch_alive(self, on_change: Callable[[str, bool], None]) -> Subscription:
-        """See `contract.Bus.watch_alive`."""
+    def watch_liveliness(self, on_change: Callable[[str, bool], None]) -> Subscription:
+        """See `contract.Bus.watch_liveliness`."""
         prefix = keys.live("")
 
         def on_token(sample: zenoh.Sample) -> None:
@@ -154,7 +154,7 @@ class _Publisher:
         self._publisher.put(payload, attachment=attachment or None)
 
 
-class _Announcement:
+class _LatchedPublisher:
     """A publisher whose last message answers queries; it answers nothing before the first."""
 
     def __init__(self, publisher: Publisher, session: zenoh.Session, key: str, message: str) -> None:

@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 
 from abs_service.bus.health import Health, Level
-from abs_service.capture.stall_detector import Watch
+from abs_service.capture.stall_detector import StallDetector
 from drivers.contract.device import Device, DeviceError, DeviceState, FinalError, Sink
 
 _log = logging.getLogger(__name__)
 
 #: Pause before a failed device is opened again: doubles with each failure in a row, up to the longest [s].
-FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.5, 10.0
+FIRST_BACKOFF_S, LONGEST_BACKOFF_S = 0.5, 10.0
 
 _LEVELS = {
     DeviceState.CLOSED: Level.OK,
@@ -27,7 +27,7 @@ _LEVELS = {
 }
 
 
-class DeviceKeeper:
+class DeviceSupervisor:
     """Looks after one device from a thread of its own, because opening may take long.
 
     Args:
@@ -35,7 +35,7 @@ class DeviceKeeper:
         uri: its address. Once it was open, only the device of the same serial number will do.
         open_device: opens the device at an address.
         on_open: told of each opened device before it starts. A `DeviceError` that is not final is a failure like any
-            other; everything else that it raises becomes `refusal` and ends the keeper.
+            other; everything else that it raises becomes `fatal_error` and ends the supervisor.
         sink: where the frames go, under the names of the rig.
         heads: names in the rig of the device's heads; frames of others are not wanted.
         health: of the component.
@@ -43,7 +43,7 @@ class DeviceKeeper:
 
     Attributes:
         finished: the device has come to its end by itself, as a recording does.
-        refusal: why the device cannot be used at all; None if it can.
+        fatal_error: why the device cannot be used at all; None if it can.
     """
 
     def __init__(
@@ -68,9 +68,9 @@ class DeviceKeeper:
         self._clock = clock
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
-        self._earlier: Counter[str] = Counter()  # what earlier openings of the device counted
+        self._previous: Counter[str] = Counter()  # what earlier openings of the device counted
         self.finished = False
-        self.refusal: Exception | None = None
+        self.fatal_error: Exception | None = None
 
     def start(self) -> None:
         """Begins."""
@@ -82,12 +82,12 @@ class DeviceKeeper:
         self._thread.join(timeout_s)
 
     def _run(self) -> None:
-        pause_s = FIRST_PAUSE_S
+        backoff_s = FIRST_BACKOFF_S
         while not self._stop.is_set():
             try:
-                delivered, reason = self._serve_once()
+                delivered, reason = self._run_once()
             except FinalError as error:
-                self.refusal = error
+                self.fatal_error = error
                 delivered, reason = False, str(error)
             except DeviceError as error:
                 delivered, reason = False, str(error)
@@ -95,40 +95,42 @@ class DeviceKeeper:
                 # A driver's mistake must not take the other devices down.
                 _log.exception("device %s", self._name)
                 delivered, reason = False, repr(error)
-            if self._stop.is_set() or self.finished or self.refusal:
-                self._say(DeviceState.CLOSED, reason)
+            if self._stop.is_set() or self.finished or self.fatal_error:
+                self._report_state(DeviceState.CLOSED, reason)
                 return
-            pause_s = FIRST_PAUSE_S if delivered else min(2 * pause_s, LONGEST_PAUSE_S)
-            self._say(DeviceState.RECONNECTING, f"{reason}; trying again in {pause_s:g} s")
+            backoff_s = FIRST_BACKOFF_S if delivered else min(2 * backoff_s, LONGEST_BACKOFF_S)
+            self._report_state(DeviceState.RECONNECTING, f"{reason}; trying again in {backoff_s:g} s")
             self._health.count(f"device.{self._name}.reconnects")
-            self._stop.wait(pause_s)
+            self._stop.wait(backoff_s)
 
-    def _serve_once(self) -> tuple[bool, str]:
+    def _run_once(self) -> tuple[bool, str]:
         """Serves the device until it fails or shall stop; returns whether it delivered anything, and why it ended."""
-        self._say(DeviceState.OPENING, "")
+        self._report_state(DeviceState.OPENING, "")
         device = self._open_device(self._uri)
         streams = device.capabilities.streams if device.capabilities.regular else ()
         # Grows with every opening, also across restarts of this process, and leaves the device ten epochs a second.
-        watch = Watch(self._sink, self._heads, streams, self._clock, first_epoch=self._clock() // 100_000_000)
+        stall_detector = StallDetector(
+            self._sink, self._heads, streams, self._clock, first_epoch=self._clock() // 100_000_000
+        )
         try:
-            self._recognise(device)
+            self._check_serial(device)
             try:
                 self._on_open(device)
             except DeviceError:
                 raise
             except Exception as error:
-                self.refusal = error
+                self.fatal_error = error
                 return False, str(error)
-            device.start(watch)
-            reason = self._watch(device, watch)
+            device.start(stall_detector)
+            reason = self._watch(device, stall_detector)
         finally:
             device.close()
-            self._earlier.update(device.counters)
-            self._earlier["unwanted"] += watch.unwanted
-            self._health.count_up_to(self._earlier, f"device.{self._name}.")
-        return watch.delivered, reason
+            self._previous.update(device.counters)
+            self._previous["unwanted"] += stall_detector.unwanted
+            self._health.count_up_to(self._previous, f"device.{self._name}.")
+        return stall_detector.delivered, reason
 
-    def _recognise(self, device: Device) -> None:
+    def _check_serial(self, device: Device) -> None:
         """Remembers who the device is: from now on no other will do, whatever the configuration leaves open."""
         info = device.info
         if self._serial not in {"", info.serial}:
@@ -136,16 +138,16 @@ class DeviceKeeper:
         if info.serial:
             self._uri, self._serial = info.uri, info.serial
 
-    def _watch(self, device: Device, watch: Watch) -> str:
+    def _watch(self, device: Device, stall_detector: StallDetector) -> str:
         shown = (DeviceState.OPENING, "")
         while not self._stop.wait(0.1):
-            self._measure(device, watch)
-            state, reason = watch.silence()
+            self._measure(device, stall_detector)
+            state, reason = stall_detector.check()
             if state != shown[0]:
                 self._health.count(f"device.{self._name}.stalls", int(state == DeviceState.STALLED))
             if (state, reason) != shown:
                 shown = (state, reason)
-                self._say(state, reason)
+                self._report_state(state, reason)
             if state == DeviceState.FAILED:
                 return reason
             if state == DeviceState.CLOSED:
@@ -153,17 +155,17 @@ class DeviceKeeper:
                 return reason
         return "stopped"
 
-    def _measure(self, device: Device, watch: Watch) -> None:
-        counters = Counter({"unwanted": watch.unwanted, **device.counters})
-        counters.update(self._earlier)
+    def _measure(self, device: Device, stall_detector: StallDetector) -> None:
+        counters = Counter({"unwanted": stall_detector.unwanted, **device.counters})
+        counters.update(self._previous)
         self._health.count_up_to(counters, f"device.{self._name}.")
         for name, value in device.gauges.items():
             self._health.gauge(f"device.{self._name}.{name}", value)
-        for condition, message in watch.take_warnings().items():
+        for condition, message in stall_detector.take_warnings().items():
             text = f"{self._name}: {message}" if message else ""
             self._health.report(f"device {self._name} {condition}", Level.WARNING if message else Level.OK, text)
 
-    def _say(self, state: DeviceState, reason: str) -> None:
+    def _report_state(self, state: DeviceState, reason: str) -> None:
         self._health.label(f"device.{self._name}", state.value)
         level = _LEVELS[state]
         self._health.report(f"device {self._name}", level, f"{self._name}: {reason}" if level > Level.OK else "")

@@ -11,12 +11,12 @@ from drivers.contract.frame import Frame
 #: After so many of its periods without a frame, and not sooner than the time beside [ns], a stream is stalled.
 STALL_PERIODS, STALL_NS = 5, 1_000_000_000
 #: Likewise, after which its device is opened again.
-SILENCE_PERIODS, SILENCE_NS = 10, 5_000_000_000
+REOPEN_PERIODS, REOPEN_NS = 10, 5_000_000_000
 #: What a device may need from the state STREAMING to the first frame of a stream [ns].
 WARM_UP_NS = 10_000_000_000
 
 
-class Watch:
+class StallDetector:
     """A sink that speaks the names of the rig and notes when what came last.
 
     Args:
@@ -86,7 +86,7 @@ class Watch:
             warnings, self._warnings = self._warnings, {}
         return warnings
 
-    def silence(self) -> tuple[DeviceState, str]:
+    def check(self) -> tuple[DeviceState, str]:
         """STREAMING if all streams keep coming; STALLED or FAILED if one does not, by how long, and why in words."""
         if self.state[0] != DeviceState.STREAMING:
             return self.state
@@ -95,12 +95,12 @@ class Watch:
         for key, stream in self._streams.items():
             silent_ns = now_ns - self._latest_ns.get(key, now_ns)
             reason = f"{key[0]}/{key[1]} delivers nothing for {silent_ns / 1e9:.0f} s"
-            if _too_long(silent_ns, stream, SILENCE_PERIODS, SILENCE_NS):
+            if _too_long(silent_ns, stream, REOPEN_PERIODS, REOPEN_NS):
                 return DeviceState.FAILED, reason
             if _too_long(silent_ns, stream, STALL_PERIODS, STALL_NS):
                 verdict = DeviceState.STALLED, reason
         return verdict
 
 
-def _too_long(silent_ns: int, stream: StreamInfo, periods: int, least_ns: int) -> bool:
-    return silent_ns > max(periods * 1e9 / stream.rate_hz, least_ns)
+def _too_long(silent_ns: int, stream: StreamInfo, periods: int, minimum_ns: int) -> bool:
+    return silent_ns > max(periods * 1e9 / stream.rate_hz, minimum_ns)

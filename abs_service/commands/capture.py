@@ -16,9 +16,9 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
-from abs_service.capture.device_supervisor import DeviceKeeper
+from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.commands import rig_devices, rig_process
 from abs_service.config import plugins
 from abs_service.supervision import gc_tuning
@@ -42,39 +42,44 @@ def run(arguments: argparse.Namespace) -> int:
     rig = rig_process.load_config(arguments)
     stop = rig_process.stop_on_signals()
     clock = WallClock()
-    speaker = Speaker(rig.name, clock)
+    headers = HeaderFactory(rig.name, clock)
     with rig_process.open_bus(rig, arguments) as bus:
-        health = Health(bus, "capture", speaker)
-        bus.show_alive("capture")
-        bus.answer(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
-        crier = Crier(bus, speaker, rig)
-        publishers = {name: FramePublisher(bus, speaker, name) for name in rig.devices}
+        health = Health(bus, "capture", headers)
+        bus.declare_liveliness("capture")
+        bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
+        metadata = MetadataPublisher(bus, headers, rig)
+        publishers = {name: FramePublisher(bus, headers, name) for name in rig.devices}
         source = str(arguments.config or "demo.toml")
-        keepers = [_keeper(name, rig, source, crier, publishers[name], health) for name in rig.devices]
-        for keeper in keepers:
-            keeper.start()
-        _watch(stop, keepers, lambda: _tick(crier, publishers, health, clock))
-        for keeper in keepers:
-            keeper.close(CLOSE_S)
+        supervisors = [_supervisor(name, rig, source, metadata, publishers[name], health) for name in rig.devices]
+        for supervisor in supervisors:
+            supervisor.start()
+        _watch(stop, supervisors, lambda: _tick(metadata, publishers, health, clock))
+        for supervisor in supervisors:
+            supervisor.close(CLOSE_S)
         for publisher in publishers.values():
             publisher.close()
         _count(publishers, health)
         health.publish()
-    for keeper in keepers:
-        if keeper.refusal:
-            raise keeper.refusal
+    for supervisor in supervisors:
+        if supervisor.fatal_error:
+            raise supervisor.fatal_error
     return Exit.OK
 
 
-def _keeper(
-    name: str, rig: config.ServiceConfig, source: str, crier: "Crier", publisher: FramePublisher, health: Health
-) -> DeviceKeeper:
+def _supervisor(
+    name: str,
+    rig: config.ServiceConfig,
+    source: str,
+    metadata: "MetadataPublisher",
+    publisher: FramePublisher,
+    health: Health,
+) -> DeviceSupervisor:
     def on_open(device: Device) -> None:
         rig_devices.set_controls(device, rig.devices[name].controls, f"{source}: devices.{name}.controls")
-        crier.add_device(name, device)
-        gc_tuning.keep_what_is_loaded()
+        metadata.add_device(name, device)
+        gc_tuning.freeze_loaded_objects()
 
-    return DeviceKeeper(
+    return DeviceSupervisor(
         name,
         rig.devices[name].uri,
         lambda uri: open_device(uri, time.monotonic_ns),
@@ -86,14 +91,18 @@ def _keeper(
     )
 
 
-def _watch(stop: threading.Event, keepers: list[DeviceKeeper], tick: Callable[[], None]) -> None:
+def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], tick: Callable[[], None]) -> None:
     while not stop.wait(0.1):
         tick()
-        if any(keeper.refusal for keeper in keepers) or all(keeper.finished for keeper in keepers):
+        if any(supervisor.fatal_error for supervisor in supervisors) or all(
+            supervisor.finished for supervisor in supervisors
+        ):
             return
 
 
-def _tick(crier: "Crier", publishers: Mapping[str, FramePublisher], health: Health, clock: WallClock) -> None:
+def _tick(
+    metadata: "MetadataPublisher", publishers: Mapping[str, FramePublisher], health: Health, clock: WallClock
+) -> None:
     if not health.due():
         return
     steps = clock.steps
@@ -104,7 +113,7 @@ def _tick(crier: "Crier", publishers: Mapping[str, FramePublisher], health: Heal
     else:
         health.report("clock", Level.OK)
     _count(publishers, health)
-    crier.cry()
+    metadata.publish()
     health.tick()
 
 
@@ -116,18 +125,18 @@ def _count(publishers: Mapping[str, FramePublisher], health: Health) -> None:
             health.rate(f"rate_hz.{topic}", number)
 
 
-class Crier:
+class MetadataPublisher:
     """Announces the configuration, and calibration, noise and pose of every sensor as soon as its device is open.
 
     Args:
         bus: where.
-        speaker: writes the headers.
+        headers: writes the headers.
         rig: the configuration.
     """
 
-    def __init__(self, bus: Bus, speaker: Speaker, rig: config.ServiceConfig) -> None:
+    def __init__(self, bus: Bus, headers: HeaderFactory, rig: config.ServiceConfig) -> None:
         self._bus = bus
-        self._speaker = speaker
+        self._headers = headers
         self._rig = rig
         self._toml = config.to_toml(rig)
         self._cameras: dict[str, Camera] = {}
@@ -144,12 +153,12 @@ class Crier:
         cameras = rig_devices.cameras(self._rig, name, device)
         with self._lock:
             self._cameras |= cameras
-        self.cry()
+        self.publish()
 
-    def cry(self) -> None:
+    def publish(self) -> None:
         """Announces everything that is known, stamped now."""
         with self._lock:
-            header = self._speaker.now(self._seq)
+            header = self._headers.now(self._seq)
             self._seq += 1
             wall_ns = header.stamp.ToNanoseconds()
             self._put(keys.CONFIG, CONFIG, sensor_metadata.config(header, self._toml).SerializeToString())
@@ -167,5 +176,5 @@ class Crier:
 
     def _put(self, topic: str, message: str, payload: bytes) -> None:
         if topic not in self._publishers:
-            self._publishers[topic] = self._bus.announce(topic, message)
+            self._publishers[topic] = self._bus.latched_publisher(topic, message)
         self._publishers[topic].put(payload)

@@ -18,7 +18,7 @@ from abs_service import config, wiring
 from abs_service.bus import keys
 from abs_service.commands import rig_process
 from abs_service.config import plugins
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from abs_service.pairing.image_decoders import kinds
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from calib.rig import Noise
@@ -124,7 +124,7 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
     uri = rig.devices[name].uri
     scheme = uri.partition(":")[0]
     if scheme not in opening.available():
-        raise CheckError(f'"{uri}": no such driver, {none_of(scheme, opening.available())}')
+        raise CheckError(f'"{uri}": no such driver, {allowed_instead(scheme, opening.available())}')
     if scheme not in HARMLESS:
         return {}
     device = opening.open_device(uri, time.monotonic_ns)
@@ -134,7 +134,7 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
         streams = [stream for stream in device.capabilities.streams if stream.sensor == head]
         if not streams:
             heads = {stream.sensor for stream in device.capabilities.streams}
-            raise CheckError(f'sensor "{sensor}": no head "{head}", {none_of(head, heads)}')
+            raise CheckError(f'sensor "{sensor}": no head "{head}", {allowed_instead(head, heads)}')
         found[sensor] = [f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams]
     return found
 
@@ -149,7 +149,7 @@ def _check_controls(rig: config.ServiceConfig, name: str) -> None:
     infos = {info.name: info for info in device.controls.infos}
     for control, value in device_table.controls.items():
         if control not in infos:
-            raise CheckError(f"{control}: no such control, {none_of(control, infos)}")
+            raise CheckError(f"{control}: no such control, {allowed_instead(control, infos)}")
         infos[control].checked(value)
 
 
@@ -160,7 +160,9 @@ def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]
         there = {stream.partition(" ")[0] for stream in streams.get(head, [])}
         missing = [kind.value for kind in kinds(noise) if kind not in there]
         if there and missing:
-            raise CheckError(f"{name}: its noise model needs the stream {missing[0]}, {none_of(missing[0], there)}")
+            raise CheckError(
+                f"{name}: its noise model needs the stream {missing[0]}, {allowed_instead(missing[0], there)}"
+            )
 
 
 def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import threading
 
 from abs_service import config
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import rig_process
 from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
@@ -45,16 +45,16 @@ def run(arguments: argparse.Namespace) -> int:
     settings = _settings(rig)
     stop = rig_process.stop_on_signals()
     clock = WallClock()
-    speaker = Speaker(rig.name, clock)
+    headers = HeaderFactory(rig.name, clock)
     with rig_process.open_bus(rig, arguments) as bus:
-        health = Health(bus, "record", speaker)
-        bus.show_alive("record")
+        health = Health(bus, "record", headers)
+        bus.declare_liveliness("record")
         # Beside the recording, which must not wait for what may take minutes.
         threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         recorder.start()
-        gc_tuning.keep_what_is_loaded()
+        gc_tuning.freeze_loaded_objects()
         while not stop.wait(0.2):
             if health.due():
                 clock.measure()

@@ -14,12 +14,12 @@ from absmsg.v1 import common_pb2, deformation_state_pb2
 from abs_service import wiring
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Bus, Sample
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import rig_process
 from abs_service.supervision.exit_codes import Exit
 
 #: How long the tracker may take to find an object [s].
-PATIENCE_S = 10.0
+TIMEOUT_S = 10.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,29 +34,29 @@ def run(arguments: argparse.Namespace) -> int:
     name = arguments.tracker or next(iter(settings.trackers), "")
     wiring.plan(settings, name)
     with rig_process.open_bus(settings, arguments) as bus:
-        return _reinitialize(bus, name, Speaker(settings.name, WallClock()))
+        return _reinitialize(bus, name, HeaderFactory(settings.name, WallClock()))
 
 
-def _reinitialize(bus: Bus, tracker: str, speaker: Speaker) -> int:
+def _reinitialize(bus: Bus, tracker: str, headers: HeaderFactory) -> int:
     """Sends the command once the tracker's first state shows that it runs, and waits for another mesh version."""
     versions: list[int] = []
-    heard, renewed = threading.Event(), threading.Event()
+    received, renewed = threading.Event(), threading.Event()
 
     def on_state(sample: Sample) -> None:
         state = deformation_state_pb2.DeformationState.FromString(sample.payload)
         versions.append(state.mesh_version)
-        heard.set()
+        received.set()
         if state.mesh_version != versions[0]:
             renewed.set()
 
     bus.subscribe(keys.state(tracker), on_state)
     command = bus.publisher(keys.reinitialize(tracker), common_pb2.Header.DESCRIPTOR.full_name, EVENTS)
-    if not heard.wait(PATIENCE_S):
+    if not received.wait(TIMEOUT_S):
         print(f'tracker "{tracker}" says nothing: does it run, and do its sensors deliver?')
         return Exit.FAILED
-    command.put(speaker.now(0).SerializeToString())
-    if not renewed.wait(PATIENCE_S):
-        print(f'tracker "{tracker}" found no object within {PATIENCE_S:.0f} s; it goes on as it was')
+    command.put(headers.now(0).SerializeToString())
+    if not renewed.wait(TIMEOUT_S):
+        print(f'tracker "{tracker}" found no object within {TIMEOUT_S:.0f} s; it goes on as it was')
         return Exit.FAILED
     print(f'tracker "{tracker}" has a new mesh, version {versions[-1]}')
     return Exit.OK

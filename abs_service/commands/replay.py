@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from abs_service import config, wiring
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
@@ -128,7 +128,7 @@ def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, fi
         synchroniser,
         wiring.model_name(settings, name),
         rig.calib_id,
-        Speaker(settings.name, clock, boot_id="replay"),
+        HeaderFactory(settings.name, clock, boot_id="replay"),
         file,
         time.monotonic_ns,
     )

@@ -43,7 +43,7 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> ZenohB
     Raises:
         BusError: it cannot be opened.
     """
-    gc_tuning.take_short_turns()
+    gc_tuning.shorten_switch_interval()
     role = Role.ROUTER if arguments.listen else Role.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
     return ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory)

@@ -33,7 +33,7 @@ from abs_service.supervision import gc_tuning
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
-from abs_service.supervision.run_session import Session
+from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
 
 
@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until told to stop, until its devices are at their end, or until nothing can go on."""
     rig = effective(rig_process.load_config(arguments), arguments)
     stop = rig_process.stop_on_signals()
-    gc_tuning.take_short_turns()  # what the router passes on may have to wait for the threads of this process
+    gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
     with (
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,
@@ -66,18 +66,18 @@ def run(arguments: argparse.Namespace) -> int:
         spawn = partial(_spawn, display, path, config.to_toml(rig))
         supervisor = Supervisor(children(rig, path), spawn, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
-        session = Session(bus, *about, rig.trackers, supervisor, display, WallClock())
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
         try:
-            session.go_on_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
+            session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:
             session.stop()
         display.close(session.view())
-    refused = supervisor.refused()
+    refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a file of ours that nobody else knows.
         reason = refused.reason.rpartition("abs-service: error: ")[2]
         raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
-    return supervisor.verdict() or Exit.OK
+    return supervisor.exit_code() or Exit.OK
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:

@@ -18,12 +18,12 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import rig_process
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
-from abs_service.tracking.live_tracker import EstimatePublisher, LiveTracker, WaitingSets
-from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
+from abs_service.tracking.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import Plan, Tracking, streams
 from abs_service.tracking.warmup import warm_up
 from calib.camera import Camera
@@ -31,7 +31,7 @@ from calib.rig import Noise, Rig
 from drivers.encoding.sensor_model import decode_camera
 
 #: How long one question for calibrations waits for answers [s].
-ASK_S = 0.5
+QUERY_S = 0.5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,10 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
     plan = wiring.plan(settings, name)
     stop = rig_process.stop_on_signals()
     clock = WallClock()
-    speaker = Speaker(settings.name, clock)
+    headers = HeaderFactory(settings.name, clock)
     with rig_process.open_bus(settings, arguments) as bus:
-        health = Health(bus, f"track/{name}", speaker)
-        bus.show_alive(f"track/{name}")
+        health = Health(bus, f"track/{name}", headers)
+        bus.declare_liveliness(f"track/{name}")
         # At once, because it takes longer than the devices take to open, and neither needs the other.
         noises = wiring.noises(settings, name)
         preparing = threading.Thread(target=_prepare, args=(noises, plan, health), daemon=True)
@@ -62,13 +62,13 @@ def run(arguments: argparse.Namespace) -> int:
         health.publish()
         if stop.is_set():
             return Exit.OK
-        gc_tuning.keep_what_is_loaded()
+        gc_tuning.freeze_loaded_objects()
         rig = wiring.rig(settings, name, cameras)
         tracking = Tracking(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
-        live = _live(bus, settings, name, rig, tracking, speaker, health)
+        live = _live(bus, settings, name, rig, tracking, headers, health)
         while not stop.is_set():
-            live.turn()
+            live.process_next()
             if health.due():
                 clock.measure()
                 live.report()
@@ -84,17 +84,17 @@ def _live(
     name: str,
     rig: Rig,
     tracking: Tracking,
-    speaker: Speaker,
+    headers: HeaderFactory,
     health: Health,
 ) -> LiveTracker:
     frames = FrameSubscriber(bus, streams(rig.sensors.values()))
     synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,
-        WaitingSets(frames, synchroniser, time.monotonic_ns),
-        EstimatePublisher(bus, speaker, name, wiring.model_name(settings, name), rig.calib_id),
+        FrameSetQueue(frames, synchroniser, time.monotonic_ns),
+        EstimatePublisher(bus, headers, name, wiring.model_name(settings, name), rig.calib_id),
         health,
-        ResidualWatch(health),
+        NoiseMonitor(health),
         time.monotonic_ns,
         settings.trackers[name].budget_ms,
     )
@@ -105,7 +105,7 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     cameras: dict[str, Camera] = {}
     while not stop.is_set():
         for sensor in set(sensors) - set(cameras):
-            for sample in bus.ask(keys.model(sensor), ASK_S):
+            for sample in bus.query(keys.model(sensor), QUERY_S):
                 cameras[sensor] = decode_camera(SensorModel.FromString(sample.payload))
         missing = [sensor for sensor in sensors if sensor not in cameras]
         if not missing:

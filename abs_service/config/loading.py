@@ -11,8 +11,8 @@ import tomli_w
 from pydantic import ValidationError
 
 from abs_service.config import references
+from abs_service.config.errors import ConfigError, allowed_at, error_of
 from abs_service.config.merging import merge
-from abs_service.config.mistakes import ConfigError, allowed_at, error_of
 from abs_service.config.problems import from_pydantic
 from abs_service.config.tables import ServiceConfig
 

@@ -11,8 +11,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from abs_service.config.calibration import SHARED, CalibratedSensor, CalibrationFile, CalibrationOrigin, SensorOrigin
-from abs_service.config.mistakes import ConfigError, allowed_at, error_of
-from abs_service.config.problems import Key, Problem, dotted, from_pydantic, none_of
+from abs_service.config.errors import ConfigError, allowed_at, error_of
+from abs_service.config.problems import Key, Problem, allowed_instead, dotted, from_pydantic
 
 
 def load_calibration(path: Path) -> CalibrationFile:
@@ -43,7 +43,7 @@ def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
     file = _parse(path, content)
     sensors = rig["sensors"] if isinstance(rig.get("sensors"), dict) else {}
     unknown = [
-        Problem(("sensors", name), f"no such sensor in {source}, {none_of(name, sensors)}")
+        Problem(("sensors", name), f"no such sensor in {source}, {allowed_instead(name, sensors)}")
         for name in file.sensors
         if name not in sensors
     ]

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from abs_service.config.problems import Problem, ProblemsError, from_pydantic, none_of, unknown_key
+from abs_service.config.problems import Problem, ProblemsError, allowed_instead, from_pydantic, unknown_key
 
 
 def available(package: str) -> list[str]:
@@ -35,7 +35,7 @@ def load(package: str, table: Any, base: Path) -> Any:
         )
     name = table["type"]
     if name not in _modules(package) or not _is_part(package, name):
-        raise ProblemsError([Problem(("type",), f"no such type, {none_of(name, available(package))}", name)])
+        raise ProblemsError([Problem(("type",), f"no such type, {allowed_instead(name, available(package))}", name)])
     return settings(f"{package}.{name}", {key: value for key, value in table.items() if key != "type"}, base)
 
 

@@ -51,7 +51,7 @@ def dotted(key: Key) -> str:
     return text.removeprefix(".") or "(file)"
 
 
-def none_of(name: str, allowed: Collection[str]) -> str:
+def allowed_instead(name: str, allowed: Collection[str]) -> str:
     """What to use instead of an unknown name: the closest allowed one and the list of all."""
     close = difflib.get_close_matches(name, allowed, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
@@ -60,7 +60,7 @@ def none_of(name: str, allowed: Collection[str]) -> str:
 
 def unknown_key(key: Key, allowed: Collection[str]) -> Problem:
     """The problem of a key that means nothing where it stands."""
-    return Problem(key, f"unknown key, {none_of(str(key[-1]), allowed)}")
+    return Problem(key, f"unknown key, {allowed_instead(str(key[-1]), allowed)}")
 
 
 def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection[str]]) -> list[Problem]:

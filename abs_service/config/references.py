@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from abs_service.config.problems import Problem, none_of
+from abs_service.config.problems import Problem, allowed_instead
 
 
 def check(file: dict[str, Any]) -> list[Problem]:
@@ -26,7 +26,7 @@ def _sensors(file: dict[str, Any]) -> Iterator[Problem]:
         if not isinstance(device, str):
             continue
         if device not in devices:
-            yield Problem(("sensors", name, "device"), f"no such device, {none_of(device, devices)}", device)
+            yield Problem(("sensors", name, "device"), f"no such device, {allowed_instead(device, devices)}", device)
         elif (owner := owners.setdefault((device, head), name)) != name:
             yield Problem(("sensors", name), f'sensor "{owner}" is head "{head}" of device "{device}" already')
 
@@ -38,7 +38,7 @@ def _references(file: dict[str, Any]) -> Iterator[Problem]:
         reference = table.get("reference", "") if isinstance(table, dict) else ""
         sensor, slash, _ = reference.partition("/") if isinstance(reference, str) else ("", "", "")
         if slash and sensor not in sensors:
-            yield Problem((*place, "reference"), f"no such sensor, {none_of(sensor, sensors)}", reference)
+            yield Problem((*place, "reference"), f"no such sensor, {allowed_instead(sensor, sensors)}", reference)
 
 
 def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
@@ -52,7 +52,7 @@ def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
         for index, sensor in enumerate(used):
             if sensor not in sensors:
                 yield Problem(
-                    ("trackers", name, "sensors", index), f"no such sensor, {none_of(sensor, sensors)}", sensor
+                    ("trackers", name, "sensors", index), f"no such sensor, {allowed_instead(sensor, sensors)}", sensor
                 )
             elif "noise" not in sensors[sensor]:
                 yield Problem(

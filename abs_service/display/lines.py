@@ -3,8 +3,8 @@
 import json
 from typing import Self, TextIO
 
-from abs_service.supervision.rig_view import View, size
-from abs_service.tracking.tracker_log import Report
+from abs_service.supervision.rig_view import RigView, size
+from abs_service.tracking.tracker_log import EstimateReport
 
 PERIOD_NS = 1_000_000_000
 
@@ -28,21 +28,21 @@ class PlainDisplay:
     def __exit__(self, *error: object) -> None:
         """Nothing to restore."""
 
-    def update(self, view: View) -> None:
+    def update(self, view: RigView) -> None:
         """See `Display`."""
         if view.now_ns < self._next_ns:
             return
         self._next_ns = view.now_ns + PERIOD_NS
         print(line(view), file=self._out, flush=True)
 
-    def estimate(self, report: Report) -> None:
+    def estimate(self, report: EstimateReport) -> None:
         """Lines tell of the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""
         print(text, file=self._notes, flush=True)
 
-    def close(self, view: View) -> None:
+    def close(self, view: RigView) -> None:
         """See `Display`."""
         print(*view.summary(), sep="\n", file=self._out, flush=True)
 
@@ -65,10 +65,10 @@ class JsonDisplay:
     def __exit__(self, *error: object) -> None:
         """Nothing to restore."""
 
-    def update(self, view: View) -> None:
+    def update(self, view: RigView) -> None:
         """Scripts read estimates, not how things are."""
 
-    def estimate(self, report: Report) -> None:
+    def estimate(self, report: EstimateReport) -> None:
         """See `Display`."""
         print(json.dumps(report.as_dict(), ensure_ascii=False), file=self._out, flush=True)
 
@@ -76,12 +76,12 @@ class JsonDisplay:
         """See `Display`."""
         print(text, file=self._notes, flush=True)
 
-    def close(self, view: View) -> None:
+    def close(self, view: RigView) -> None:
         """See `Display`."""
         print(*view.summary(), sep="\n", file=self._notes, flush=True)
 
 
-def line(view: View) -> str:
+def line(view: RigView) -> str:
     """How things are, in one line."""
     parts = [f"{view.elapsed_s:6.1f} s"]
     parts += [f"{stream.name} {stream.rate_hz:.1f} Hz" for stream in view.streams]

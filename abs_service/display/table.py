@@ -10,14 +10,14 @@ from rich.spinner import Spinner
 from rich.table import Table
 from rich.text import Text
 
-from abs_service.supervision.rig_view import View, size
+from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import State
-from abs_service.tracking.tracker_log import Report, TrackerLog
+from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
 
 REFRESH_HZ = 6
 
 _STATUS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
-_STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", State.PAUSED: "yellow"}
+_STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", State.BACKOFF: "yellow"}
 
 
 class TableDisplay:
@@ -40,25 +40,25 @@ class TableDisplay:
         """Gives the terminal back."""
         self._region.stop()
 
-    def update(self, view: View) -> None:
+    def update(self, view: RigView) -> None:
         """See `Display`; the region draws by itself what it was given last."""
         self._region.update(draw(view, self._spinner))
 
-    def estimate(self, report: Report) -> None:
+    def estimate(self, report: EstimateReport) -> None:
         """The table shows the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""
         self._console.print(Text(text, style="dim"))
 
-    def close(self, view: View) -> None:
+    def close(self, view: RigView) -> None:
         """See `Display`; leaves the last table in the terminal."""
         self._region.stop()
         self._console.print(draw(view, Text("")))
         self._console.print("\n".join(view.summary()), highlight=False, markup=False)
 
 
-def draw(view: View, spinner: Spinner | Text) -> RenderableType:
+def draw(view: RigView, spinner: Spinner | Text) -> RenderableType:
     """The whole table; `spinner` moves while something is waited for."""
     parts: list[RenderableType] = [_head(view), _streams(view)]
     if view.live.trackers:
@@ -75,7 +75,7 @@ def _level(level: int) -> str:
     return "red" if level == Health.LEVEL_ERROR else "yellow"
 
 
-def _head(view: View) -> Text:
+def _head(view: RigView) -> Text:
     minutes, seconds = divmod(int(view.elapsed_s), 60)
     return Text.assemble(
         (f" {view.rig}", "bold"), f"   {minutes:02d}:{seconds:02d}   applications connect to ", (view.endpoint, "cyan")
@@ -90,7 +90,7 @@ def _table(*columns: str) -> Table:
     return table
 
 
-def _streams(view: View) -> RenderableType:
+def _streams(view: RigView) -> RenderableType:
     table = _table("stream", "rate", "age", "images", "dropped")
     for stream in view.streams:
         table.add_row(
@@ -103,7 +103,7 @@ def _streams(view: View) -> RenderableType:
     return table if view.streams else Text(" no images yet", style="dim")
 
 
-def _trackers(view: View) -> RenderableType:
+def _trackers(view: RigView) -> RenderableType:
     table = _table("tracker", "status", "error", "surface", "solve", "age", "search", "skipped")
     parts: list[RenderableType] = [table]
     for name, tracker in view.live.trackers.items():
@@ -129,13 +129,13 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
     ]
 
 
-def _theta(name: str, report: Report) -> Text:
+def _theta(name: str, report: EstimateReport) -> Text:
     numbers = " ".join(f"{value:+.3f}" for value in report.theta)
     text = Text(f" {name} Θ[{len(report.theta)}] {numbers}", style="dim", no_wrap=True, overflow="ellipsis")
     return text
 
 
-def _recording(view: View) -> Text:
+def _recording(view: RigView) -> Text:
     recording = view.recording
     if recording is None:
         return Text(" not recording", style="dim")
@@ -145,7 +145,7 @@ def _recording(view: View) -> Text:
     return text
 
 
-def _processes(view: View) -> Text:
+def _processes(view: RigView) -> Text:
     text = Text(" processes")
     for child in view.children:
         number = str(child.process.pid) if child.state is State.RUNNING else child.state.value

@@ -1,4 +1,4 @@
-"""From the frames of one head to the image of one sensor, one reader for each kind of sensor."""
+"""From the frames of one head to the image of one sensor, one decoder for each kind of sensor."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -30,10 +30,10 @@ class ObservationError(ValueError):
     """A frame that does not fit the rig it is said to come from."""
 
 
-class Reader(Protocol):
+class Decoder(Protocol):
     """Makes the image of one sensor from the frames of its head."""
 
-    def read(self, frames: Mapping[Kind, Frame]) -> Image:
+    def decode(self, frames: Mapping[Kind, Frame]) -> Image:
         """The image.
 
         Raises:
@@ -46,7 +46,7 @@ def kinds(noise: Noise) -> tuple[Kind, ...]:
     """What frames a sensor needs; the image is of the first one's exposure."""
     match noise:
         case DepthNoise():
-            return (Kind.DEPTH, *_beside(noise))
+            return (Kind.DEPTH, *_auxiliary(noise))
         case GaussianColor() | GaussianGrey():
             return (Kind.COLOR,)
         case GaussianBayer():
@@ -57,43 +57,43 @@ def kinds(noise: Noise) -> tuple[Kind, ...]:
             return (Kind.BINARY,)
 
 
-def _beside(noise: DepthNoise) -> tuple[Kind, ...]:
+def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
     """What a depth noise model has to know of a measurement besides its distance."""
     match noise:
         case PerPixel():
-            return _beside(noise.law)
+            return _auxiliary(noise.law)
         case Measured():
             return (Kind.DEVIATION,)
     return (Kind.AMPLITUDE,) if noise.uses_amplitude else ()
 
 
-def reader(sensor: Sensor) -> Reader:
-    """The reader for what a sensor's noise model is about."""
+def decoder(sensor: Sensor) -> Decoder:
+    """The decoder for what a sensor's noise model is about."""
     match sensor.noise:
         case DepthNoise() as noise:
-            return _DepthReader(sensor, _beside(noise))
+            return _DepthDecoder(sensor, _auxiliary(noise))
         case GaussianColor():
-            return _ColorReader()
+            return _ColorDecoder()
         case GaussianGrey():
-            return _GreyReader()
+            return _GreyDecoder()
         case GaussianBayer():
-            return _BayerReader()
+            return _BayerDecoder()
         case GaussianIntensity():
-            return _IntensityReader(Kind(sensor.noise.stream))
+            return _IntensityDecoder(Kind(sensor.noise.stream))
         case LightBarrier():
-            return _BeamReader()
+            return _BeamDecoder()
 
 
-class _DepthReader:
-    def __init__(self, sensor: Sensor, beside: tuple[Kind, ...]):
-        self._beside = beside
+class _DepthDecoder:
+    def __init__(self, sensor: Sensor, auxiliary: tuple[Kind, ...]):
+        self._auxiliary = auxiliary
         # Radial distance per unit of what the frame holds, and what is added: conversion from z, less the depth terms.
         gain = 1 / (1 + sensor.depth_scale)
         self._per_z = (gain * sensor.camera.lookup.ray_length).astype(np.float32)
         self._per_radial = np.float32(gain)
         self._offset = np.float32(-gain * sensor.depth_offset)
 
-    def read(self, frames: Mapping[Kind, Frame]) -> DepthImage:
+    def decode(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]
         gain = self._per_z if depth.geometry == Geometry.Z else self._per_radial
         distance = depth.si() * gain + self._offset
@@ -103,21 +103,21 @@ class _DepthReader:
         self, frames: Mapping[Kind, Frame], gain: NDArray[np.float32] | np.float32, shape: tuple[int, ...]
     ) -> NDArray[np.float32]:
         """What the noise model asks for besides the distance; a σ is one of the same length as the distance."""
-        if Kind.DEVIATION in self._beside:
+        if Kind.DEVIATION in self._auxiliary:
             return frames[Kind.DEVIATION].si() * gain
         return frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full(shape, np.nan, np.float32)
 
 
-class _ColorReader:
-    def read(self, frames: Mapping[Kind, Frame]) -> ColorImage:
+class _ColorDecoder:
+    def decode(self, frames: Mapping[Kind, Frame]) -> ColorImage:
         needed = "rgb8 or bgr8; monochrome cameras have the noise type grey"
         return ColorImage(_rgb(frames[Kind.COLOR], "color", needed))
 
 
-class _GreyReader:
+class _GreyDecoder:
     """Grey as it comes, or the luma of a colour."""
 
-    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+    def decode(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         frame = frames[Kind.COLOR]
         match frame.encoding:
             case "mono8":
@@ -127,36 +127,36 @@ class _GreyReader:
         return ChannelImage(_rgb(frame, "grey", "mono8, mono16, rgb8 or bgr8") @ LUMA, ONE_CHANNEL)
 
 
-class _BayerReader:
-    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+class _BayerDecoder:
+    def decode(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         frame = frames[Kind.BAYER]
         order = frame.encoding.removeprefix("bayer_").removesuffix("8")
         if order not in BAYER_ORDERS:
-            raise _unfit(frame, "bayer", "bayer_rggb8, bayer_bggr8, bayer_grbg8 or bayer_gbrg8")
+            raise _wrong_encoding(frame, "bayer", "bayer_rggb8, bayer_bggr8, bayer_grbg8 or bayer_gbrg8")
         return ChannelImage(frame.si(), BAYER_ORDERS[order])
 
 
-class _IntensityReader:
+class _IntensityDecoder:
     def __init__(self, kind: Kind):
         self._kind = kind
 
-    def read(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
+    def decode(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         return ChannelImage(frames[self._kind].si(), ONE_CHANNEL)
 
 
-class _BeamReader:
-    def read(self, frames: Mapping[Kind, Frame]) -> BeamReading:
+class _BeamDecoder:
+    def decode(self, frames: Mapping[Kind, Frame]) -> BeamReading:
         return BeamReading(bool(frames[Kind.BINARY].si().max() > 0.5))
 
 
 def _rgb(frame: Frame, noise: str, needed: str) -> NDArray[np.uint8]:
     if frame.encoding not in {"rgb8", "bgr8"}:
-        raise _unfit(frame, noise, needed)
+        raise _wrong_encoding(frame, noise, needed)
     pixels = frame.data.view(np.uint8)
     return pixels[..., ::-1] if frame.encoding == "bgr8" else pixels
 
 
-def _unfit(frame: Frame, noise: str, needed: str) -> ObservationError:
+def _wrong_encoding(frame: Frame, noise: str, needed: str) -> ObservationError:
     return ObservationError(
         f"{frame.sensor}/{frame.stream} is {frame.encoding}, but sensors.{frame.sensor} has noise of type {noise}, "
         f"which needs {needed}"

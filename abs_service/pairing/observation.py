@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from abs_service.pairing.image_decoders import ObservationError, kinds, reader
+from abs_service.pairing.image_decoders import ObservationError, decoder, kinds
 from abs_service.pairing.images import Image
 from calib.camera import Camera
 from calib.rig import Rig
@@ -44,7 +44,7 @@ class Observer:
 
     def __init__(self, rig: Rig):
         self._rig = rig
-        self._readers = {name: reader(sensor) for name, sensor in rig.sensors.items()}
+        self._decoders = {name: decoder(sensor) for name, sensor in rig.sensors.items()}
 
     def observe(self, frames: FrameSet) -> Observation:
         """Converts a frame set.
@@ -60,7 +60,7 @@ class Observer:
                 _check_size(frame, sensor.camera)
             needed = kinds(sensor.noise)
             if members.keys() >= set(needed):
-                images[name] = self._readers[name].read(members)
+                images[name] = self._decoders[name].decode(members)
                 sources[name] = _source(members[needed[0]])
         missing = tuple(name for name in self._rig.sensors if name not in images)
         return Observation(frames.seq, frames.stamp_ns, images, sources, missing)

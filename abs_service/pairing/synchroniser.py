@@ -83,7 +83,7 @@ class Synchroniser:
         sets: list[FrameSet] = []
         while self._reference.waiting:
             is_over = self._reference.waiting[0].t_arrival_ns + self._deadline_ns <= now_ns
-            if not is_over and not all(stream.silent for stream in self._undecided()):
+            if not is_over and not all(stream.stalled for stream in self._incomplete_streams()):
                 break
             sets.append(self._emit())
         return sets
@@ -93,8 +93,8 @@ class Synchroniser:
         return [self._emit() for _ in range(len(self._reference.waiting))]
 
     def _insert(self, stream: "_Stream", frame: Frame) -> None:
-        if objection := stream.objection(frame):
-            self._count(frame.key, objection)
+        if rejection_cause := stream.rejection_cause(frame):
+            self._count(frame.key, rejection_cause)
             return
         stream.insert(frame)
         if stream is not self._reference and len(stream.waiting) > DEPTH:
@@ -102,11 +102,11 @@ class Synchroniser:
 
     def _form(self) -> list[FrameSet]:
         sets: list[FrameSet] = []
-        while self._reference.waiting and (len(self._reference.waiting) > DEPTH or not self._undecided()):
+        while self._reference.waiting and (len(self._reference.waiting) > DEPTH or not self._incomplete_streams()):
             sets.append(self._emit())
         return sets
 
-    def _undecided(self) -> list["_Stream"]:
+    def _incomplete_streams(self) -> list["_Stream"]:
         """The streams for which the first waiting set has no frame, but may still get one."""
         t_ns = self._reference.waiting[0].t_host_ns
         return [
@@ -116,18 +116,18 @@ class Synchroniser:
         ]
 
     def _emit(self) -> FrameSet:
-        silent = self._undecided()
+        stalled = self._incomplete_streams()
         reference = self._reference.take_oldest()
         t_ns = reference.t_host_ns
         frames, missing, spread_ns = {reference.key: reference}, [], 0
         for stream in self._members.values():
             nearest = stream.nearest(t_ns, self._tolerance_ns)
-            stream.silent = stream in silent
+            stream.stalled = stream in stalled
             # What lies before its frame, or before the reach of any later set, is of no use any more.
-            useless_ns = t_ns - self._tolerance_ns if nearest is None else nearest.t_host_ns - 1
-            while stream.waiting and stream.waiting[0].t_host_ns <= useless_ns:
+            obsolete_ns = t_ns - self._tolerance_ns if nearest is None else nearest.t_host_ns - 1
+            while stream.waiting and stream.waiting[0].t_host_ns <= obsolete_ns:
                 self._drop_oldest(stream, "unmatched")
-            stream.passed_ns = max(stream.passed_ns, useless_ns)
+            stream.passed_ns = max(stream.passed_ns, obsolete_ns)
             if nearest is None:
                 missing.append(stream.key)
                 continue
@@ -152,12 +152,12 @@ class _Stream:
         self.waiting: list[Frame] = []
         self.passed_ns = _NEVER_NS  # frames up to here are in a set or of no use
         self.latest_ns = _NEVER_NS  # of the frame that arrived last: the stream has come so far
-        self.silent = False  # made the last set wait in vain
+        self.stalled = False  # made the last set wait in vain
         self._epoch = -1
         self._form: tuple[object, ...] = ()
         self._seen: deque[int] = deque(maxlen=MEMORY)
 
-    def objection(self, frame: Frame) -> str:
+    def rejection_cause(self, frame: Frame) -> str:
         """Why a frame cannot be used; "" if it can."""
         if frame.epoch < self._epoch:
             return "old_epoch"
@@ -173,14 +173,14 @@ class _Stream:
         return ""
 
     def insert(self, frame: Frame) -> None:
-        """Takes a frame to which there is no objection; a new epoch forgets what was known of the last one."""
+        """Takes a frame to which there is no rejection_cause; a new epoch forgets what was known of the last one."""
         if frame.epoch > self._epoch:
             self._epoch = frame.epoch
             self._form = _form_of(frame)
             self._seen.clear()
         self._seen.append(frame.seq)
         self.latest_ns = frame.t_host_ns
-        self.silent = False
+        self.stalled = False
         insort(self.waiting, frame, key=lambda other: other.t_host_ns)
 
     def take_oldest(self) -> Frame:

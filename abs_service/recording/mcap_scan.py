@@ -23,7 +23,7 @@ _LARGEST_CHUNK = 1 << 30
 Data = bytes | mmap.mmap
 
 
-class Scan:
+class RecordScanner:
     """Iterates over the records outside of chunks; chunks come whole, see `open_chunk`.
 
     Damage inside of a record is found by its checksum and leaves the others alone. Where the lengths of records are

@@ -18,13 +18,13 @@ from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.recording_file import RecordingFile, open_for_writing
 from abs_service.wire import message_header as header
-from abs_service.wire.message_header import EnvelopeError
+from abs_service.wire.message_header import MessageHeaderError
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFileError
 
 #: What a file repeats at its start, so that it can be understood without the one before.
-_STANDING = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
+_LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
 #: How long the recorder waits for answers at its start [s].
-ASK_S = 1.0
+QUERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,11 +85,11 @@ class Recorder:
         self._open_file = open_file
         self._free_bytes = free_bytes
         self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes)
-        self._standing: dict[str, Sample] = {}
+        self._latched: dict[str, Sample] = {}
         self._last_seq: dict[str, int] = {}
         self._counts: Counter[str] = Counter()  # of the open file
         self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
-        self._told: Counter[str] = Counter()  # dropped messages that finished files tell of
+        self._reported_drops: Counter[str] = Counter()  # dropped messages that finished files tell of
         self._failed = ""
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
@@ -104,7 +104,9 @@ class Recorder:
             "**", lambda sample: self._queue.put(sample.topic, sample, sample.size)
         )
         # Only now, so that nothing falls between the answers and the subscription.
-        self._standing = {sample.topic: sample for sample in self._bus.ask("**", ASK_S) if sample.message in _STANDING}
+        self._latched = {
+            sample.topic: sample for sample in self._bus.query("**", QUERY_S) if sample.message in _LATCHED
+        }
         self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
@@ -153,7 +155,7 @@ class Recorder:
         self._counts = Counter()
         self._attached = {}
         try:
-            for sample in self._standing.values():
+            for sample in self._latched.values():
                 self._write(file, sample, is_repeated=True)
             reason = self._fill(file, started_ns)
             file.finish({"ended": reason, **self._summary()})
@@ -192,12 +194,12 @@ class Recorder:
         if sample.topic == keys.SCHEMA:
             return
         try:
-            about = header.read(sample)
+            about = header.parse(sample)
             stamp_ns = self._stamp_ns(about.stamp_ns, is_repeated)
             file.write(sample.topic, sample.message, sample.payload, stamp_ns, about.seq)
             if keys.is_image(sample.topic) and sample.attachment:
                 file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
-        except (EnvelopeError, McapFileError) as error:
+        except (MessageHeaderError, McapFileError) as error:
             # Anyone can publish below our keys; that must not end the recording.
             self._health.count("refused")
             self._health.label("refused", str(error))
@@ -205,8 +207,8 @@ class Recorder:
         if sample.message == header.MODEL:
             self._attach_calibration(file, sample, stamp_ns)
         self._count(sample.topic, about.seq)
-        if sample.message in _STANDING:
-            self._standing[sample.topic] = sample
+        if sample.message in _LATCHED:
+            self._latched[sample.topic] = sample
 
     def _attach_calibration(self, file: RecordingFile, sample: Sample, stamp_ns: int) -> None:
         """Attaches what a sensor is, when the file does not hold it yet, to be had without reading messages."""
@@ -232,9 +234,9 @@ class Recorder:
     def _summary(self) -> dict[str, str]:
         """What is in the file, and what should be."""
         dropped = Counter(self._queue.dropped)
-        for topic, number in (dropped - self._told).items():
+        for topic, number in (dropped - self._reported_drops).items():
             self._counts[f"dropped.{topic}"] = number
-        self._told = dropped
+        self._reported_drops = dropped
         return {name: str(number) for name, number in sorted(self._counts.items())}
 
     def _fail(self, reason: str) -> None:

@@ -24,7 +24,7 @@ class RecoveryError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
+class RecoveryReport:
     """What became of one file.
 
     Attributes:
@@ -53,7 +53,7 @@ class Report:
         return f"{saved}; {lost}; the original is {self.source}"
 
 
-def recover(source: Path) -> Report:
+def recover(source: Path) -> RecoveryReport:
     """Writes all that can be read of `source` to a new file with an index, beside it.
 
     `x.mcap.active` becomes `x.mcap`, and itself `x.mcap.broken` unless all of it was saved. Of any other file, `x.mcap`
@@ -81,7 +81,7 @@ def recover(source: Path) -> Report:
         os.replace(unfinished, target)
         lossless = not (salvage.damaged or salvage.orphans or salvage.skipped_bytes)
         kept = _retire(source, lossless) if was_active else source
-    return Report(
+    return RecoveryReport(
         kept,
         target,
         salvage.messages,

@@ -6,7 +6,7 @@ from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metada
 from mcap.well_known import MessageEncoding, SchemaEncoding
 from mcap.writer import CompressionType, Writer
 
-from abs_service.recording.mcap_scan import Data, Scan
+from abs_service.recording.mcap_scan import Data, RecordScanner
 from drivers.encoding.mcap_file import CHANNEL_METADATA, McapFileError, file_descriptor_set
 
 
@@ -24,7 +24,7 @@ class Salvage:
     def __init__(self, data: Data, output: BinaryIO) -> None:
         self.messages = self.chunks = self.orphans = 0
         self._data = data
-        self._scan = Scan(data)
+        self._scan = RecordScanner(data)
         self._writer = Writer(output, compression=CompressionType.LZ4)
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
@@ -49,7 +49,7 @@ class Salvage:
         """
         self._writer.start(profile="", library="abs-service recover")
         # A chunk says what its channels are, but may be damaged; so do metadata and, at the end, the index.
-        for record in Scan(self._data):
+        for record in RecordScanner(self._data):
             self._learn(record)
         for record in self._scan:
             if isinstance(record, Chunk):

@@ -13,7 +13,7 @@ from typing import IO, Protocol
 from abs_service.supervision import parent_watchdog
 
 #: Lines of a child's output that are kept.
-LAST_WORDS = 40
+TAIL_LINES = 40
 
 
 class Process(Protocol):
@@ -36,7 +36,7 @@ class Process(Protocol):
         """Ends it and everything it started; harmless if it has ended."""
         ...
 
-    def last_words(self) -> str:
+    def output_tail(self) -> str:
         """The last lines of what it wrote."""
         ...
 
@@ -56,7 +56,7 @@ class _NoProcess:
     def kill(self) -> None:
         """Does nothing."""
 
-    def last_words(self) -> str:
+    def output_tail(self) -> str:
         """It never said anything."""
         return ""
 
@@ -84,7 +84,7 @@ class ChildProcess:
         on_line: Callable[[str, str], None],
         program: Sequence[str] = (sys.executable, "-m", "abs_service"),
     ) -> None:
-        self._lines: deque[str] = deque(maxlen=LAST_WORDS)
+        self._lines: deque[str] = deque(maxlen=TAIL_LINES)
         # A group of its own, so that Ctrl-C in the terminal reaches only the supervisor, which knows the order.
         self._process = subprocess.Popen(
             [*program, *arguments],
@@ -122,7 +122,7 @@ class ChildProcess:
             with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the kernel, say in a driver
                 self._process.wait(1.0)
 
-    def last_words(self) -> str:
+    def output_tail(self) -> str:
         """See `Process`; waits until all that an ended process wrote has been read."""
         self._reader.join(timeout=1.0)
         return "\n".join(self._lines)

@@ -7,12 +7,12 @@ import sys
 SWITCH_S = 0.0005
 
 
-def take_short_turns() -> None:
+def shorten_switch_interval() -> None:
     """Lets a thread that has something to send or to receive interrupt one that computes."""
     sys.setswitchinterval(SWITCH_S)
 
 
-def keep_what_is_loaded() -> None:
+def freeze_loaded_objects() -> None:
     """Takes all that exists now, mostly modules, out of every later search for garbage.
 
     A search through all modules takes 50 to 90 ms, two or three frames; what comes and goes with a frame takes none.

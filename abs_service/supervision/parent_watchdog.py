@@ -11,16 +11,16 @@ import threading
 import time
 
 #: Set in the environment of children whose standard input is such a pipe.
-VARIABLE = "ABS_SERVICE_LIFELINE"
+VARIABLE = "ABS_SERVICE_PARENT_WATCHDOG"
 
 #: Time that an orphan has to end in order [s].
 GRACE_S = 3.0
 
 
-def hold() -> None:
+def start() -> None:
     """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force."""
     if os.environ.pop(VARIABLE, ""):
-        threading.Thread(target=_watch, args=(sys.stdin.fileno(), GRACE_S), name="lifeline", daemon=True).start()
+        threading.Thread(target=_watch, args=(sys.stdin.fileno(), GRACE_S), name="parent watchdog", daemon=True).start()
 
 
 def _watch(descriptor: int, grace_s: float) -> None:

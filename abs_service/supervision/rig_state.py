@@ -11,29 +11,29 @@ from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.tracking.tracker_log import Report, TrackerLog, points
+from abs_service.tracking.tracker_log import EstimateReport, TrackerLog, points
 
-#: The topics that `Live.take` understands.
+#: The topics that `RigState.take` understands.
 PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.truth("*"))
 
 
 @dataclass(frozen=True)
-class Heard:
-    """The last health of a component, when it came, CLOCK_MONOTONIC [ns], and the one before."""
+class Received:
+    """The last health of a component, when it came, CLOCK_MONOTONIC [ns], and the one previous."""
 
     health: Health = field(default_factory=Health)
     t_ns: int = 0
-    before: "Heard | None" = None
+    previous: "Received | None" = None
 
     def rate(self, gauge: str) -> float:
         """How fast a gauge grew lately, per second; 0 if it shrank, as a file's size does when a new one begins."""
-        if self.before is None or self.t_ns <= self.before.t_ns:
+        if self.previous is None or self.t_ns <= self.previous.t_ns:
             return 0.0
-        growth = self.health.gauges.get(gauge, 0.0) - self.before.health.gauges.get(gauge, 0.0)
-        return max(growth, 0.0) * 1e9 / (self.t_ns - self.before.t_ns)
+        growth = self.health.gauges.get(gauge, 0.0) - self.previous.health.gauges.get(gauge, 0.0)
+        return max(growth, 0.0) * 1e9 / (self.t_ns - self.previous.t_ns)
 
 
-class Live:
+class RigState:
     """The present of a rig. Not for several threads.
 
     Args:
@@ -43,28 +43,28 @@ class Live:
     Attributes:
         trackers: what each of them said.
         heard: health by component.
-        garbled: messages that could not be read.
+        malformed: messages that could not be read.
     """
 
     def __init__(self, trackers: Iterable[str], clock: Callable[[], int]) -> None:
         self.trackers = {name: TrackerLog() for name in trackers}
-        self.heard: dict[str, Heard] = {}
-        self.garbled = 0
+        self.received: dict[str, Received] = {}
+        self.malformed = 0
         self._clock = clock
 
-    def take(self, sample: Sample) -> list[Report]:
+    def take(self, sample: Sample) -> list[EstimateReport]:
         """Takes one message and returns the estimates that it completes; counts messages that cannot be read."""
         try:
             return self._take(sample)
         except (DecodeError, ValueError):
-            self.garbled += 1
+            self.malformed += 1
             return []
 
-    def _take(self, sample: Sample) -> list[Report]:
+    def _take(self, sample: Sample) -> list[EstimateReport]:
         if sample.message == Health.DESCRIPTOR.full_name:
             health = Health.FromString(sample.payload)
-            before = replace(self.heard.get(health.component, Heard()), before=None)
-            self.heard[health.component] = Heard(health, self._clock(), before if before.t_ns else None)
+            previous = replace(self.received.get(health.component, Received()), previous=None)
+            self.received[health.component] = Received(health, self._clock(), previous if previous.t_ns else None)
         elif sample.message == SurfaceTruth.DESCRIPTOR.full_name:
             self._take_truth(SurfaceTruth.FromString(sample.payload))
         elif (tracker := self.trackers.get(sample.topic.partition("/")[0])) is not None:
@@ -73,13 +73,13 @@ class Live:
 
     def health(self, component: str) -> Health:
         """What a component said last; empty if it said nothing yet."""
-        return self.heard.get(component, Heard()).health
+        return self.received.get(component, Received()).health
 
     def preparing(self) -> bool:
         """Whether a tracker is compiling its kernels, or loading those that it compiled once."""
         return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
 
-    def without_topology(self) -> list[str]:
+    def missing_topologies(self) -> list[str]:
         """The trackers whose mesh has to be asked for, because its topology was lost on the way."""
         return [name for name, tracker in self.trackers.items() if tracker.lacks_topology]
 
@@ -89,7 +89,7 @@ class Live:
             tracker.truth.add_truth(truth.header.t_host_ns, points_r, truth.surface)
 
 
-def _take_from(tracker: TrackerLog, sample: Sample) -> Iterator[Report]:
+def _take_from(tracker: TrackerLog, sample: Sample) -> Iterator[EstimateReport]:
     if sample.message == DeformationState.DESCRIPTOR.full_name:
         yield from tracker.take_state(DeformationState.FromString(sample.payload))
     elif sample.message == DeformedMesh.DESCRIPTOR.full_name:

@@ -8,9 +8,9 @@ from typing import Protocol, Self
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
-from abs_service.supervision.rig_state import Live
+from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.supervisor import Child, State
-from abs_service.tracking.tracker_log import Report
+from abs_service.tracking.tracker_log import EstimateReport
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class View:
+class RigView:
     """One look at a running rig.
 
     Attributes:
@@ -52,7 +52,7 @@ class View:
     rig: str
     endpoint: str
     directory: Path
-    live: Live
+    live: RigState
     children: Sequence[Child]
     elapsed_s: float
     now_ns: int
@@ -83,7 +83,7 @@ class View:
         return Recording(
             file=self.directory / health.labels["file"].removesuffix(".active"),
             size=int(health.gauges.get("file_bytes", 0)),
-            rate=self.live.heard["record"].rate("file_bytes"),
+            rate=self.live.received["record"].rate("file_bytes"),
             recorded=health.counters.get("recorded", 0),
             dropped=_sum(health, "dropped."),
         )
@@ -93,7 +93,7 @@ class View:
         """Component, level and message of everything that needs attention."""
         found: list[tuple[str, int, str]] = [
             (name, heard.health.level, heard.health.message)
-            for name, heard in sorted(self.live.heard.items())
+            for name, heard in sorted(self.live.received.items())
             if heard.health.level >= Health.LEVEL_WARNING and heard.health.message and name != "run"
         ]
         failed = [child for child in self.children if child.state is State.FAILED]
@@ -104,7 +104,7 @@ class View:
         """What is being waited for; "" once there are estimates, or if nothing is tracked."""
         if self.live.preparing():
             return "Preparing kernels; the first start compiles them, which takes up to a minute …"
-        if "capture" not in self.live.heard:
+        if "capture" not in self.live.received:
             return "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):
             return "Waiting for the first estimate …"
@@ -130,24 +130,24 @@ class View:
     def _ages_ms(self) -> dict[str, float]:
         ages: dict[str, float] = {}
         for tracker in self.live.trackers.values():
-            for sensor, t_host_ns in tracker.seen_ns.items():
+            for sensor, t_host_ns in tracker.exposure_ns.items():
                 age_ms = (self.now_ns - t_host_ns) * 1e-6
                 ages[sensor] = min(age_ms, ages.get(sensor, age_ms))
         return ages
 
 
 class Display(Protocol):
-    """Shows a running rig. Used in a `with` statement; after it, the terminal is as it was before."""
+    """Shows a running rig. Used in a `with` statement; after it, the terminal is as it was previous."""
 
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *error: object) -> None: ...
 
-    def update(self, view: View) -> None:
+    def update(self, view: RigView) -> None:
         """Shows how things are now; called some ten times a second."""
         ...
 
-    def estimate(self, report: Report) -> None:
+    def estimate(self, report: EstimateReport) -> None:
         """Shows one estimate."""
         ...
 
@@ -155,7 +155,7 @@ class Display(Protocol):
         """Says something once, in passing. May be called from any thread."""
         ...
 
-    def close(self, view: View) -> None:
+    def close(self, view: RigView) -> None:
         """Shows the summary."""
         ...
 

@@ -8,9 +8,9 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import LatestQueue
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.supervision import rig_state
-from abs_service.supervision.rig_view import Display, View
+from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Child, State, Supervisor
 
 #: Messages per topic that may wait to be shown.
@@ -18,16 +18,16 @@ DEPTH = 64
 #: Time between two looks at the children, at most [s].
 PERIOD_S = 0.05
 #: Time between two questions for what was lost, and patience for the answer [s].
-QUESTION_S, ANSWER_S = 1.0, 0.2
+QUERY_PERIOD_S, QUERY_TIMEOUT_S = 1.0, 0.2
 
 _LEVELS: Mapping[State, Level] = {
-    State.PAUSED: Level.WARNING,
+    State.BACKOFF: Level.WARNING,
     State.STALLED: Level.WARNING,
     State.FAILED: Level.ERROR,
 }
 
 
-class Session:
+class RunSession:
     """Everything that `abs-service run` does between its start and its end.
 
     Args:
@@ -56,9 +56,9 @@ class Session:
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
-        self._begin_ns = self._asked_ns = clock.monotonic()
-        self._live = rig_state.Live(trackers, clock.monotonic)
-        self._health = Health(bus, "run", Speaker(rig, clock))
+        self._begin_ns = self._queried_ns = clock.monotonic()
+        self._live = rig_state.RigState(trackers, clock.monotonic)
+        self._health = Health(bus, "run", HeaderFactory(rig, clock))
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:
             bus.subscribe(pattern, lambda sample: self._inbox.put(sample.topic, sample))
@@ -68,13 +68,13 @@ class Session:
         """Time since the start [s]."""
         return (self._clock.monotonic() - self._begin_ns) * 1e-9
 
-    def go_on_until(self, over: Callable[[], bool]) -> None:
+    def run_until(self, over: Callable[[], bool]) -> None:
         """Runs until `over` says so or the supervisor has nothing left to do."""
-        while not over() and self._supervisor.verdict() is None:
+        while not over() and self._supervisor.exit_code() is None:
             self._supervisor.poll()
             self._report()
             self._listen(PERIOD_S)
-            self._catch_up()
+            self._request_missing_topologies()
 
     def stop(self) -> None:
         """Stops the processes in order, and hears what they say last."""
@@ -89,9 +89,9 @@ class Session:
         self._report()
         self._health.publish()
 
-    def view(self) -> View:
+    def view(self) -> RigView:
         """One look at everything."""
-        return View(
+        return RigView(
             rig=self._rig,
             endpoint=self._endpoint,
             directory=self._directory,
@@ -110,13 +110,13 @@ class Session:
             self._take(*arrived)
         self._display.update(self.view())
 
-    def _catch_up(self) -> None:
+    def _request_missing_topologies(self) -> None:
         """Asks for the topologies that the network dropped: each is sent once, and errors are not known without."""
-        if self._clock.monotonic() - self._asked_ns < QUESTION_S * 1e9:
+        if self._clock.monotonic() - self._queried_ns < QUERY_PERIOD_S * 1e9:
             return
-        self._asked_ns = self._clock.monotonic()
-        for tracker in self._live.without_topology():
-            for sample in self._bus.ask(keys.topology(tracker), ANSWER_S):
+        self._queried_ns = self._clock.monotonic()
+        for tracker in self._live.missing_topologies():
+            for sample in self._bus.query(keys.topology(tracker), QUERY_TIMEOUT_S):
                 self._take(sample.topic, sample)
 
     def _take(self, topic: str, sample: Sample) -> None:
@@ -125,13 +125,13 @@ class Session:
         if topic.startswith("health/"):
             component = topic.removeprefix("health/")
             busy = self._live.health(component).labels.get("phase") == "preparing"
-            self._supervisor.heard(component, busy)
+            self._supervisor.heartbeat(component, busy)
 
     def _report(self) -> None:
         for child in self._supervisor.children.values():
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
             self._health.report(child.component, _LEVELS.get(child.state, Level.OK), _condition(child))
-        self._health.count_up_to({"garbled": self._live.garbled, "not_shown": sum(self._inbox.dropped.values())})
+        self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         self._health.tick()
 
 

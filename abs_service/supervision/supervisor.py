@@ -15,7 +15,7 @@ from abs_service.supervision.exit_codes import Exit
 _log = logging.getLogger(__name__)
 
 #: Pause before a restart: doubles with each end within the window, up to the longest.
-FIRST_PAUSE_NS, LONGEST_PAUSE_NS = 200_000_000, 3_000_000_000
+FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class State(StrEnum):
     """Where a child is in its life."""
 
     RUNNING = "running"
-    PAUSED = "paused"  # not there yet, or ended; will be started when its pause is over
+    BACKOFF = "backoff"  # not there yet, or ended; will be started when its pause is over
     STALLED = "stalled"  # lived, but said nothing for too long and was killed; will be started again
     FINISHED = "finished"  # ended in order by itself
     FAILED = "failed"  # given up
@@ -65,14 +65,14 @@ class Child:
     component: str
     arguments: tuple[str, ...]
     stage: int
-    state: State = State.PAUSED
+    state: State = State.BACKOFF
     reason: str = ""
     restarts: int = 0
     exit_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)
-    silent_after_ns: int = 0
+    deadline_ns: int = 0
     start_at_ns: int = 0
-    ends_ns: deque[int] = field(default_factory=deque, repr=False)
+    exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
 
 class Supervisor:
@@ -98,26 +98,26 @@ class Supervisor:
         now_ns = self._clock()
         for child in self.children.values():
             if child.state is State.RUNNING:
-                self._look_after(child, now_ns)
-            if child.state in (State.PAUSED, State.STALLED) and now_ns >= child.start_at_ns:
+                self._check(child, now_ns)
+            if child.state in (State.BACKOFF, State.STALLED) and now_ns >= child.start_at_ns:
                 self._start(child, now_ns)
 
-    def heard(self, component: str, busy: bool = False) -> None:
+    def heartbeat(self, component: str, busy: bool = False) -> None:
         """Notes a sign of life. A busy component (one that compiles kernels) may be silent for longer than others."""
         child = self.children.get(component)
         if child is not None and child.state is State.RUNNING:
-            child.silent_after_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.deadline_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
 
-    def refused(self) -> Child | None:
+    def misconfigured(self) -> Child | None:
         """A child that cannot work until the user changes something; everything should stop."""
         return next((child for child in self._failed() if child.exit_code == Exit.USER), None)
 
-    def verdict(self) -> Exit | None:
+    def exit_code(self) -> Exit | None:
         """The exit code with which the whole rig should end now; None as long as there is something to do.
 
         Without images or without any tracker there is nothing left to do; a recorder is not needed for that.
         """
-        if self.refused():
+        if self.misconfigured():
             return Exit.USER
         capture = [child for child in self.children.values() if child.component == "capture"]
         trackers = [child for child in self.children.values() if child.component.startswith("track/")]
@@ -145,52 +145,52 @@ class Supervisor:
             while self._clock() < deadline_ns and any(child.process.poll() is None for child in children):
                 wait(0.02)
             for child in children:
-                self._bury(child)
+                self._finalize(child)
 
     def _start(self, child: Child, now_ns: int) -> None:
         child.process = self._spawn(child.component, child.arguments)
         child.state, child.reason = State.RUNNING, ""
-        child.silent_after_ns = now_ns + self._limits.startup_ns
+        child.deadline_ns = now_ns + self._limits.startup_ns
 
-    def _look_after(self, child: Child, now_ns: int) -> None:
+    def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
-        if code is None and now_ns < child.silent_after_ns:
+        if code is None and now_ns < child.deadline_ns:
             return
         if code is None:
             child.process.kill()
-            self._ended(child, now_ns, "said nothing for too long", State.STALLED)
+            self._schedule_restart(child, now_ns, "said nothing for too long", State.STALLED)
             return
         child.exit_code = code
         if code == Exit.OK:
             child.state, child.process = State.FINISHED, NO_PROCESS
         elif code in (Exit.USER, Exit.GIVE_UP):
-            self._give_up(child, child.process.last_words())
+            self._give_up(child, child.process.output_tail())
         else:
-            self._ended(child, now_ns, _why(code, child.process.last_words()), State.PAUSED)
+            self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
 
-    def _ended(self, child: Child, now_ns: int, reason: str, state: State) -> None:
-        while child.ends_ns and child.ends_ns[0] <= now_ns - self._limits.window_ns:
-            child.ends_ns.popleft()
-        if len(child.ends_ns) >= self._limits.restarts:
+    def _schedule_restart(self, child: Child, now_ns: int, reason: str, state: State) -> None:
+        while child.exits_ns and child.exits_ns[0] <= now_ns - self._limits.window_ns:
+            child.exits_ns.popleft()
+        if len(child.exits_ns) >= self._limits.restarts:
             times = f"needed more than {self._limits.restarts} restarts in {self._limits.window_ns / 1e9:g} s"
             self._give_up(child, f"{times}; the last time it {reason}")
             return
-        child.start_at_ns = now_ns + min(FIRST_PAUSE_NS << len(child.ends_ns), LONGEST_PAUSE_NS)
-        child.ends_ns.append(now_ns)
+        child.start_at_ns = now_ns + min(FIRST_BACKOFF_NS << len(child.exits_ns), LONGEST_BACKOFF_NS)
+        child.exits_ns.append(now_ns)
         child.restarts += 1
         child.state, child.reason, child.process = state, reason, NO_PROCESS
         _log.warning("%s %s; starting it again", child.component, reason)
 
     def _give_up(self, child: Child, reason: str) -> None:
         child.state, child.reason, child.process = State.FAILED, reason, NO_PROCESS
-        if child is not self.refused():  # whose message is the last word of the whole run
+        if child is not self.misconfigured():  # whose message is the last word of the whole run
             _log.error("%s is given up: %s", child.component, reason)
 
-    def _bury(self, child: Child) -> None:
+    def _finalize(self, child: Child) -> None:
         if child.process.poll() is None:
             child.process.kill()
             child.reason = "did not end in time and was killed"
-        if child.state in (State.RUNNING, State.PAUSED, State.STALLED):
+        if child.state in (State.RUNNING, State.BACKOFF, State.STALLED):
             child.state, child.exit_code = State.STOPPED, child.process.poll() or 0
         child.process = NO_PROCESS
 
@@ -198,7 +198,7 @@ class Supervisor:
         return [child for child in self.children.values() if child.state is State.FAILED]
 
 
-def _why(code: int, last_words: str) -> str:
+def _exit_reason(code: int, output_tail: str) -> str:
     how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
-    last = last_words.strip().rpartition("\n")[2]
+    last = output_tail.strip().rpartition("\n")[2]
     return f"{how}: {last}" if last else how

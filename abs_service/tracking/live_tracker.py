@@ -8,23 +8,23 @@ from abs_service.bus import keys
 from abs_service.bus.contract import MESH, STATE, Bus
 from abs_service.bus.frames import DEPTH, FrameSubscriber
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import Speaker
+from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import Tracking
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 from drivers.contract.frame import FrameSet
 
 #: How long one turn waits for a frame [s]; a reader that is told to stop notices within this time.
-TURN_S = 0.05
+POLL_S = 0.05
 #: Turns of which the median says how fast the tracker is: a few slow ones, as after a stall, say nothing.
-TURNS = 9
+DURATIONS = 9
 
 
-class WaitingSets:
+class FrameSetQueue:
     """The frame sets that a tracker has still to take.
 
     A tracker that is faster than the cameras gets all of them, in order: what a stall of the machine has left waiting
@@ -46,7 +46,7 @@ class WaitingSets:
         self._synchroniser = synchroniser
         self._clock = clock
         self._waiting: deque[FrameSet] = deque()
-        self._turns_ns: deque[int] = deque(maxlen=TURNS)
+        self._durations_ns: deque[int] = deque(maxlen=DURATIONS)
         self._taken_ns: int | None = None  # when the set was taken that is being worked on
 
     @property
@@ -79,7 +79,7 @@ class WaitingSets:
     def take(self) -> FrameSet | None:
         """The next set; None if there is none yet. Whoever calls is done with the last one."""
         if self._taken_ns is not None:
-            self._turns_ns.append(self._clock() - self._taken_ns)
+            self._durations_ns.append(self._clock() - self._taken_ns)
         self._collect()
         allowed = DEPTH if self._keeps_up() else 1
         while len(self._waiting) > allowed:
@@ -89,7 +89,7 @@ class WaitingSets:
         return self._waiting.popleft() if self._waiting else None
 
     def _collect(self) -> None:
-        frame = self._frames.take(0 if self._waiting else TURN_S)
+        frame = self._frames.take(0 if self._waiting else POLL_S)
         while frame is not None:
             self._waiting.extend(self._synchroniser.add(frame))
             frame = self._frames.take(0)
@@ -97,20 +97,20 @@ class WaitingSets:
 
     def _keeps_up(self) -> bool:
         """Whether a turn usually takes less time than lies between the sets that wait."""
-        if len(self._waiting) < 2 or not self._turns_ns:
+        if len(self._waiting) < 2 or not self._durations_ns:
             return False
         interval_ns = (self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns) / (len(self._waiting) - 1)
-        return median(self._turns_ns) < interval_ns
+        return median(self._durations_ns) < interval_ns
 
 
 class EstimatePublisher:
     """Publishes the estimates of one tracker, its meshes, and each new mesh's topology."""
 
-    def __init__(self, bus: Bus, speaker: Speaker, tracker: str, model: str, calib_id: str):
-        self._speaker = speaker
+    def __init__(self, bus: Bus, headers: HeaderFactory, tracker: str, model: str, calib_id: str):
+        self._headers = headers
         self._state = bus.publisher(keys.state(tracker), estimate_messages.STATE, STATE)
         self._mesh = bus.publisher(keys.mesh(tracker), estimate_messages.MESH, MESH)
-        self._topology = bus.announce(keys.topology(tracker), estimate_messages.TOPOLOGY)
+        self._topology = bus.latched_publisher(keys.topology(tracker), estimate_messages.TOPOLOGY)
         self._identity = Identity(tracker, model, "", calib_id, 0)
         self._seq = 0
 
@@ -119,9 +119,9 @@ class EstimatePublisher:
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
             self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
             # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
-            header = self._speaker.header(tracking.made_ns, tracking.mesh_version, keys.RIG_FRAME)
+            header = self._headers.at(tracking.made_ns, tracking.mesh_version, keys.RIG_FRAME)
             self._topology.put(estimate_messages.topology(header, tracking.mesh, self._identity).SerializeToString())
-        header = self._speaker.header(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
+        header = self._headers.at(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
         self._state.put(estimate_messages.state(header, estimate, self._identity, effort).SerializeToString())
         self._mesh.put(estimate_messages.mesh(header, estimate, self._identity).SerializeToString())
         self._seq += 1
@@ -143,10 +143,10 @@ class LiveTracker:
     def __init__(
         self,
         tracking: Tracking,
-        sets: WaitingSets,
+        sets: FrameSetQueue,
         publisher: EstimatePublisher,
         health: Health,
-        residuals: ResidualWatch,
+        noise_monitor: NoiseMonitor,
         clock: Callable[[], int],
         budget_ms: float,
     ):
@@ -154,12 +154,12 @@ class LiveTracker:
         self._sets = sets
         self._publisher = publisher
         self._health = health
-        self._residuals = residuals
+        self._noise_monitor = noise_monitor
         self._clock = clock
         self._budget_ns = round(budget_ms * 1e6)
         self._reported = 0
 
-    def turn(self) -> None:
+    def process_next(self) -> None:
         """Handles the next frame set, if there is one."""
         frames = self._sets.take()
         if frames is None:
@@ -193,4 +193,4 @@ class LiveTracker:
         message = "" if level == Level.OK else f"{estimate.status}: {'; '.join(estimate.reasons)}"
         self._health.report("observation", Level.OK)
         self._health.report("status", level, message)
-        self._residuals.take(estimate)
+        self._noise_monitor.add(estimate)

@@ -12,15 +12,15 @@ WINDOW_NS = 1_000_000_000
 
 #: With a smaller share of inliers it is not the noise that is wrong: the object is lost, hidden, or bends as its model
 #: cannot.
-EXPLAINED = 0.6
+MINIMUM_INLIER_SHARE = 0.6
 
 #: Fewer residuals than this in a window are no evidence.
-LEAST_RESIDUALS = 200
+MINIMUM_RESIDUALS = 200
 
 #: The variance of residuals over deviations is 1 if the noise model is right. A warning begins outside the wider limits
 #: and ends within the narrower ones, so that what lies on a limit does not flicker.
-ALLOWED = (0.5, 2.0)
-SETTLED = (0.6, 1.7)
+WARN_OUTSIDE = (0.5, 2.0)
+CLEAR_INSIDE = (0.6, 1.7)
 
 
 @dataclass(slots=True)
@@ -31,7 +31,7 @@ class _Sum:
     squares: float = 0.0
 
 
-class ResidualWatch:
+class NoiseMonitor:
     """Enters into health the gauge `residual_variance.<sensor>`, and a warning where a sensor's noise model is wrong.
 
     A deviation that is too small rejects good measurements; one that is too large gives the sensor too little weight
@@ -47,14 +47,14 @@ class ResidualWatch:
         self._sums: dict[str, _Sum] = {}
         self._warned: set[str] = set()
 
-    def take(self, estimate: Estimate) -> None:
+    def add(self, estimate: Estimate) -> None:
         """Adds an estimate's residuals, if it explains what the sensors see."""
-        if estimate.inlier_share < EXPLAINED:
+        if estimate.inlier_share < MINIMUM_INLIER_SHARE:
             return
         if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:
             for sensor, total in self._sums.items():
-                if total.number >= LEAST_RESIDUALS:
-                    self._judge(sensor, total.squares / total.number)
+                if total.number >= MINIMUM_RESIDUALS:
+                    self._check(sensor, total.squares / total.number)
             self._begin_ns = estimate.t_host_ns
             self._sums = {}
         for fit in estimate.fits:
@@ -63,9 +63,9 @@ class ResidualWatch:
                 total.number += fit.inliers
                 total.squares += fit.inliers * fit.normalized_residual**2
 
-    def _judge(self, sensor: str, variance: float) -> None:
+    def _check(self, sensor: str, variance: float) -> None:
         self._health.gauge(f"residual_variance.{sensor}", variance)
-        low, high = SETTLED if sensor in self._warned else ALLOWED
+        low, high = CLEAR_INSIDE if sensor in self._warned else WARN_OUTSIDE
         wrong = not low <= variance <= high
         (self._warned.add if wrong else self._warned.discard)(sensor)
         level = Level.WARNING if wrong else Level.OK

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any
 
 from abs_service.bus import keys
-from abs_service.bus.stamps import Speaker
+from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking.session import Tracking
-from abs_service.tracking.tracker_log import Report, TrackerLog
+from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 from drivers.contract.device import Truth
@@ -33,7 +33,7 @@ class OfflineTracker:
         synchroniser: makes its frame sets.
         model: type of its deformation model.
         calib_id: hash of its rig's calibration.
-        speaker: writes the headers.
+        headers: writes the headers.
         file: takes the messages.
         clock: measures the time of a search [ns]; nothing depends on it.
 
@@ -48,7 +48,7 @@ class OfflineTracker:
         synchroniser: Synchroniser,
         model: str,
         calib_id: str,
-        speaker: Speaker,
+        headers: HeaderFactory,
         file: McapFile,
         clock: Callable[[], int],
     ):
@@ -57,7 +57,7 @@ class OfflineTracker:
         self._name = name
         self._tracking = tracking
         self._identity = Identity(name, model, "", calib_id, 0)
-        self._speaker = speaker
+        self._headers = headers
         self._file = file
         self._clock = clock
 
@@ -65,22 +65,22 @@ class OfflineTracker:
         """Takes what the simulated device knew."""
         self.log.truth.add_truth(truth.t_host_ns, truth.points_r, truth.surface)
 
-    def add_frame(self, frame: Frame) -> Iterator[Report]:
+    def add_frame(self, frame: Frame) -> Iterator[EstimateReport]:
         """Takes a frame and reports the estimates that it makes possible."""
         for frames in self.synchroniser.add(frame):
             yield from self._track(frames)
 
-    def finish(self) -> Iterator[Report]:
+    def finish(self) -> Iterator[EstimateReport]:
         """Reports the estimates of the frame sets that still wait for something."""
         for frames in self.synchroniser.flush():
             yield from self._track(frames)
 
-    def _track(self, frames: FrameSet) -> Iterator[Report]:
+    def _track(self, frames: FrameSet) -> Iterator[EstimateReport]:
         begin_ns = self._clock()
         estimate = self._tracking.track(frames, _always)
         solve_ms = (self._clock() - begin_ns) * 1e-6
         self._write_new_topology()
-        header = self._speaker.header(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
+        header = self._headers.at(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
         state = estimate_messages.state(header, estimate, self._identity, Effort(solve_ms, NO_BUDGET_MS, NO_AGE, 0, {}))
         mesh = estimate_messages.mesh(header, estimate, self._identity)
         self._write(keys.state(self._name), estimate_messages.STATE, state, estimate)
@@ -93,19 +93,19 @@ class OfflineTracker:
         if mesh is None or version == self._identity.mesh_version:
             return
         self._identity = estimate_messages.with_mesh(self._identity, mesh, version)
-        header = self._speaker.header(self._tracking.made_ns, version, keys.RIG_FRAME)
+        header = self._headers.at(self._tracking.made_ns, version, keys.RIG_FRAME)
         topology = estimate_messages.topology(header, mesh, self._identity)
         topic = f"/{keys.topology(self._name)}"
-        wall_ns = self._speaker.clock.wall(self._tracking.made_ns)
+        wall_ns = self._headers.clock.wall(self._tracking.made_ns)
         self._file.write(topic, estimate_messages.TOPOLOGY, topology.SerializeToString(), wall_ns, version)
         self.log.truth.add_topology(mesh.vertices, self._tracking.made_ns)
 
     def _write(self, topic: str, message: str, content: Any, estimate: Estimate) -> None:
-        wall_ns = self._speaker.clock.wall(estimate.t_host_ns)
+        wall_ns = self._headers.clock.wall(estimate.t_host_ns)
         self._file.write(f"/{topic}", message, content.SerializeToString(), wall_ns, estimate.seq)
 
 
-def replay(recording: Recording, trackers: Mapping[str, OfflineTracker]) -> Iterator[tuple[str, Report | None]]:
+def replay(recording: Recording, trackers: Mapping[str, OfflineTracker]) -> Iterator[tuple[str, EstimateReport | None]]:
     """Runs a recording through the trackers.
 
     Yields:

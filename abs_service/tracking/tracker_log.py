@@ -11,11 +11,11 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from numpy.typing import NDArray
 
-from abs_service.tracking.truth import TruthComparison, expected_mm
+from abs_service.tracking.truth import TruthComparison, rms_sigma_mm
 
 
 @dataclass(frozen=True)
-class Report:
+class EstimateReport:
     """One estimate as people and scripts see it; None where something is not known.
 
     Attributes:
@@ -55,7 +55,7 @@ class Report:
 
 
 @dataclass
-class Total:
+class RunningStats:
     """Mean and maximum of numbers that come one by one."""
 
     count: int = 0
@@ -80,49 +80,49 @@ class TrackerLog:
         last: its last estimate.
         estimates, skipped: how many estimates it made, and how many frame sets it passed over.
         error_mm, surface_mm, solve_ms: totals over all estimates.
-        seen_ns: exposure of every sensor that it used last, CLOCK_MONOTONIC [ns].
+        exposure_ns: exposure of every sensor that it used last, CLOCK_MONOTONIC [ns].
         truth: what the errors are measured against.
     """
 
     def __init__(self) -> None:
-        self.last: Report | None = None
+        self.last: EstimateReport | None = None
         self.estimates = 0
         self.statuses: Counter[str] = Counter()
         self.skipped = 0
-        self.error_mm, self.surface_mm, self.solve_ms = Total(), Total(), Total()
-        self.seen_ns: dict[str, int] = {}
+        self.error_mm, self.surface_mm, self.solve_ms = RunningStats(), RunningStats(), RunningStats()
+        self.exposure_ns: dict[str, int] = {}
         self.truth = TruthComparison()
         self._pending: DeformationState | None = None
         self._mesh: DeformedMesh | None = None
-        self._said: tuple[str, int] | None = None  # which mesh the last estimate is of,
-        self._known: tuple[str, int] | None = None  # and the last topology
+        self._estimate_mesh: tuple[str, int] | None = None  # which mesh the last estimate is of,
+        self._topology_mesh: tuple[str, int] | None = None  # and the last topology
 
     @property
     def lacks_topology(self) -> bool:
         """Whether the topology that the last estimate belongs to did not arrive."""
-        return self._said != self._known
+        return self._estimate_mesh != self._topology_mesh
 
     def take_topology(self, topology: MeshTopology) -> None:
         """Takes the mesh at rest; the same one may come again."""
         which = (topology.header.boot_id, topology.mesh_version)
-        if which != self._known:
-            self._known = which
+        if which != self._topology_mesh:
+            self._topology_mesh = which
             self.truth.add_topology(points(topology.rest_vertices_f32), topology.header.t_host_ns)
 
-    def take_state(self, state: DeformationState) -> Iterator[Report]:
+    def take_state(self, state: DeformationState) -> Iterator[EstimateReport]:
         """Takes an estimate; it is reported when its mesh has come, or at the latest with the next estimate."""
         if self._pending is not None:
             yield self._report(self._pending, DeformedMesh())
-        self._pending, self._said = state, (state.header.boot_id, state.mesh_version)
-        self.seen_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
+        self._pending, self._estimate_mesh = state, (state.header.boot_id, state.mesh_version)
+        self.exposure_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
         yield from self._pair()
 
-    def take_mesh(self, mesh: DeformedMesh) -> Iterator[Report]:
+    def take_mesh(self, mesh: DeformedMesh) -> Iterator[EstimateReport]:
         """Takes the deformed vertices of an estimate, which may come before or after it."""
         self._mesh = mesh
         yield from self._pair()
 
-    def _pair(self) -> Iterator[Report]:
+    def _pair(self) -> Iterator[EstimateReport]:
         state, mesh = self._pending, self._mesh
         if state is not None and mesh is not None and state.header.t_host_ns == mesh.header.t_host_ns:
             self._pending = self._mesh = None
@@ -143,9 +143,9 @@ class TrackerLog:
             f"surface error mean {surface.mean:.2f} mm, max {surface.max:.2f} mm",
         ]
 
-    def _report(self, state: DeformationState, mesh: DeformedMesh) -> Report:
+    def _report(self, state: DeformationState, mesh: DeformedMesh) -> EstimateReport:
         errors = self.truth.compare(state.header.t_host_ns, points(mesh.vertices_f32))
-        report = Report(
+        report = EstimateReport(
             tracker=state.tracker,
             seq=state.header.seq,
             stamp=state.header.stamp.ToJsonString(),
@@ -154,7 +154,7 @@ class TrackerLog:
             theta=tuple(state.theta),
             error_mm=errors.vertex_mm if errors else None,
             surface_mm=errors.surface_mm if errors else None,
-            vertex_sigma_mm=expected_mm(mesh.covariance_f32),
+            vertex_sigma_mm=rms_sigma_mm(mesh.covariance_f32),
             solve_ms=state.solve_ms,
             age_ms=None if math.isnan(state.age_ms) else state.age_ms,
             generations=state.generations,

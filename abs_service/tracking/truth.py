@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 Grid = NDArray[np.float64]
 
 #: Over so short a time a surface moves on a straight line, as far as a mesh on it can tell [ns].
-STRAIGHT_NS = 250_000_000
+MAXIMUM_INTERPOLATION_NS = 250_000_000
 #: A nearest point that moves by less than this is found [grid cells]: a thousandth is 0.01 mm of a sheet.
-STILL = 1e-3
+TOLERANCE = 1e-3
 #: Truths kept while their estimate is still being searched for.
-KEPT = 256
+MAXIMUM_TRUTHS = 256
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class TruthComparison:
     def add_truth(self, t_host_ns: int, points_r: NDArray[np.floating], surface: int = 0) -> None:
         """Takes the true positions (rows, columns, 3) [m] of a surface's material points at `t_host_ns`."""
         self._truths.setdefault(t_host_ns, {})[surface] = np.asarray(points_r, np.float64)
-        while len(self._truths) > KEPT:
+        while len(self._truths) > MAXIMUM_TRUTHS:
             self._truths.popitem(last=False)
 
     def compare(self, t_host_ns: int, vertices: NDArray[np.floating]) -> Errors | None:
@@ -83,14 +83,14 @@ class TruthComparison:
             return self._truths[t_host_ns]
         before = max((t for t in self._truths if t < t_host_ns), default=None)
         after = min((t for t in self._truths if t > t_host_ns), default=None)
-        if before is None or after is None or after - before > STRAIGHT_NS:
+        if before is None or after is None or after - before > MAXIMUM_INTERPOLATION_NS:
             return {}
         share = (t_host_ns - before) / (after - before)
         one, other = self._truths[before], self._truths[after]
         return {surface: (1 - share) * one[surface] + share * other[surface] for surface in one.keys() & other.keys()}
 
 
-def expected_mm(covariance_f32: bytes) -> float | None:
+def rms_sigma_mm(covariance_f32: bytes) -> float | None:
     """What a mesh's own covariances say of its vertex errors: their root mean square [mm]; None where they say nothing.
 
     Args:
@@ -130,7 +130,7 @@ def _closest_parameters(vertices: NDArray[np.float64], grid: Grid) -> NDArray[np
         step = np.linalg.solve(normal_matrix, gradient[..., None])[..., 0]
         before = place[moving]
         place[moving] = np.clip(before + np.clip(step, -1, 1), 0, (rows - 1, columns - 1))
-        moving = moving[np.abs(place[moving] - before).max(axis=1) > STILL]
+        moving = moving[np.abs(place[moving] - before).max(axis=1) > TOLERANCE]
         if not len(moving):
             break
     return place

@@ -19,12 +19,12 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from abs_service.bus.contract import Sample
 
 
-class EnvelopeError(ValueError):
+class MessageHeaderError(ValueError):
     """A message that is none of this service's, or none at all."""
 
 
 @dataclass(frozen=True, slots=True)
-class Envelope:
+class MessageHeader:
     """When and which: wall-clock time [ns], 0 if the message does not say, and the sender's number."""
 
     stamp_ns: int
@@ -47,20 +47,20 @@ def _ns(stamp: Timestamp) -> int:
     return stamp.seconds * 1_000_000_000 + stamp.nanos
 
 
-def _of_header(message: Any) -> Envelope:
-    return Envelope(_ns(message.header.stamp), message.header.seq)
+def _of_header(message: Any) -> MessageHeader:
+    return MessageHeader(_ns(message.header.stamp), message.header.seq)
 
 
-def _of_calibration(message: Any) -> Envelope:
-    return Envelope(_ns(message.timestamp), 0)
+def _of_calibration(message: Any) -> MessageHeader:
+    return MessageHeader(_ns(message.timestamp), 0)
 
 
-def _of_transforms(message: Any) -> Envelope:
+def _of_transforms(message: Any) -> MessageHeader:
     stamps = [_ns(transform.timestamp) for transform in message.transforms]
-    return Envelope(max(stamps, default=0), 0)
+    return MessageHeader(max(stamps, default=0), 0)
 
 
-_READERS: Mapping[str, tuple[type[Message], Callable[[Any], Envelope]]] = {
+_PARSERS: Mapping[str, tuple[type[Message], Callable[[Any], MessageHeader]]] = {
     **{message.DESCRIPTOR.full_name: (message, _of_header) for message in _WITH_HEADER},
     CameraCalibration_pb2.CameraCalibration.DESCRIPTOR.full_name: (
         CameraCalibration_pb2.CameraCalibration,
@@ -79,22 +79,24 @@ CONFIG = sensor_model_pb2.Config.DESCRIPTOR.full_name
 TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
 
 #: Full names of all messages that a rig publishes.
-MESSAGES = frozenset(_READERS) | {IMAGE, INFO}
+MESSAGES = frozenset(_PARSERS) | {IMAGE, INFO}
 
 
-def read(sample: Sample) -> Envelope:
-    """The envelope of a message; that of an image is in its attachment, so that the pixels need not be parsed.
+def parse(sample: Sample) -> MessageHeader:
+    """The header of a message; that of an image is in its attachment, so that the pixels need not be parsed.
 
     Raises:
-        EnvelopeError: the type is none of `MESSAGES`, or the bytes are not of that type.
+        MessageHeaderError: the type is none of `MESSAGES`, or the bytes are not of that type.
     """
     try:
         if sample.message == IMAGE:
             info = frame_info_pb2.FrameInfo.FromString(sample.attachment)
-            return Envelope(_ns(info.header.stamp), info.seq)
-        message, envelope = _READERS[sample.message]
-        return envelope(message.FromString(sample.payload))
+            return MessageHeader(_ns(info.header.stamp), info.seq)
+        message, header = _PARSERS[sample.message]
+        return header(message.FromString(sample.payload))
     except KeyError:
-        raise EnvelopeError(f"{sample.topic}: {sample.message!r} is none of {sorted(MESSAGES)}") from None
+        raise MessageHeaderError(f"{sample.topic}: {sample.message!r} is none of {sorted(MESSAGES)}") from None
     except DecodeError as error:
-        raise EnvelopeError(f"{sample.topic}: {len(sample.payload)} bytes are no {sample.message}: {error}") from None
+        raise MessageHeaderError(
+            f"{sample.topic}: {len(sample.payload)} bytes are no {sample.message}: {error}"
+        ) from None

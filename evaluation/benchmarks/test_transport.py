@@ -8,7 +8,7 @@ import pytest
 from abs_service.bus import keys
 from abs_service.bus.frames import FramePublisher, FrameSubscriber
 from abs_service.bus.session import Role
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.recording.recording_file import RecordingFile
@@ -17,7 +17,7 @@ from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 
 CLOCK = WallClock()
-SPEAKER = Speaker("demo", CLOCK)
+SPEAKER = HeaderFactory("demo", CLOCK)
 STREAMS = {
     ("tof", "depth"): (Kind.DEPTH, "16UC1", (144, 176)),
     ("tof", "amplitude"): (Kind.AMPLITUDE, "16UC1", (144, 176)),
@@ -87,7 +87,7 @@ def test_into_a_recording(benchmark, tmp_path):
     def write():
         for frame in exposures.next():
             topic, stamp_ns = keys.image(frame.sensor, frame.stream), CLOCK.wall(frame.t_host_ns)
-            info = codec.encode_info(frame, SPEAKER.header(frame.t_host_ns, frame.seq))
+            info = codec.encode_info(frame, SPEAKER.at(frame.t_host_ns, frame.seq))
             file.write(topic, message_header.IMAGE, codec.encode_image(frame, stamp_ns), stamp_ns, frame.seq)
             file.write(keys.info(topic), message_header.INFO, info, stamp_ns, frame.seq)
 

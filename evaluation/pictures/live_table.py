@@ -14,7 +14,7 @@ from rich.text import Text
 
 from abs_service.commands import run
 from abs_service.display.table import TableDisplay, draw
-from abs_service.supervision.rig_view import View
+from abs_service.supervision.rig_view import RigView
 
 #: Length of the run [s].
 DURATION_S = 15
@@ -26,9 +26,9 @@ class _LastTable(TableDisplay):
     def __init__(self) -> None:
         super().__init__(Console(file=io.StringIO(), force_terminal=True, width=108, height=40))
         self._recorder = Console(file=io.StringIO(), record=True, width=108)
-        self._last: View | None = None
+        self._last: RigView | None = None
 
-    def update(self, view: View) -> None:
+    def update(self, view: RigView) -> None:
         self._last = view
         if view.elapsed_s > DURATION_S - 1 and not self._recorder.export_text(clear=False):
             self._recorder.print(draw(view, Text("")))

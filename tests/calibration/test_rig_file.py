@@ -159,7 +159,7 @@ def refusal(rig: Path) -> str:
 def test_what_both_files_say_is_a_mistake_that_names_both_places(rig: Path) -> None:
     rig.write_text(RIG + "[sensors.tof.camera]\nT_rs = {}\n[sensors.tof.noise]\ntype = 'constant'\n", encoding="utf-8")
     message = refusal(rig)
-    assert message.startswith(f"{rig}: 2 mistakes")
+    assert message.startswith(f"{rig}: 2 errors")
     assert f"sensors.tof.camera.T_rs = {{}}: {rig.parent / 'lab' / 'bench.calibration.toml'} has" in message
     assert "sensors.tof.noise" in message
 

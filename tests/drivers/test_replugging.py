@@ -7,9 +7,9 @@ from importlib import import_module
 import pytest
 
 from abs_service.bus.health import Health
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor
-from abs_service.capture.device_supervisor import DeviceKeeper
+from abs_service.capture.device_supervisor import DeviceSupervisor
 from drivers.contract.device import Device
 from tests.drivers import benches
 from tests.drivers.conformance import Bench, Ear, Fault, eventually
@@ -24,7 +24,7 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
 
 
 def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device_supervisor, "FIRST_PAUSE_S", 0.1)
+    monkeypatch.setattr(device_supervisor, "FIRST_BACKOFF_S", 0.1)
     opened: list[tuple[str, str]] = []
     faults = iter([Fault.UNPLUG])
 
@@ -36,14 +36,16 @@ def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeyp
 
     heads: dict[str, str] = {}
     ear, clock = Ear(), WallClock()
-    health = Health(LoopbackBus(), "capture", Speaker("demo", clock))
-    keeper = DeviceKeeper("cam", "any://", open_device, lambda device: None, ear, heads, health, clock.monotonic)
-    keeper.start()
+    health = Health(LoopbackBus(), "capture", HeaderFactory("demo", clock))
+    supervisor = DeviceSupervisor(
+        "cam", "any://", open_device, lambda device: None, ear, heads, health, clock.monotonic
+    )
+    supervisor.start()
     try:
         assert eventually(lambda: len({frame.epoch for frame in list(ear.frames)}) == 2)
         assert ear.hears(2)
     finally:
-        keeper.close(10)
+        supervisor.close(10)
     epochs = [frame.epoch for frame in ear.frames]
     assert epochs == sorted(epochs)
     assert health._counters["device.cam.reconnects"] == 1

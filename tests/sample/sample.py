@@ -12,7 +12,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.config import ServiceConfig, plugins
 from abs_service.pairing.synchroniser import Synchroniser
@@ -45,17 +45,17 @@ def rig() -> ServiceConfig:
 def write(path: Path, settings: ServiceConfig) -> None:
     """Writes the recording."""
     simulation = parse(DEVICE).build()
-    speaker = Speaker(settings.name, WallClock(monotonic=lambda: 0, wall=lambda: START_NS), boot_id="sample")
+    headers = HeaderFactory(settings.name, WallClock(monotonic=lambda: 0, wall=lambda: START_NS), boot_id="sample")
     toml = config.to_toml(settings)
     with path.open("wb") as stream:
         file = McapFile(stream, Compression.ZSTD)
         file.attach("rig.toml", "text/toml", toml.encode(), START_NS)
-        _write_announcements(file, settings, simulation, speaker)
+        _write_announcements(file, settings, simulation, headers)
         for k in EXPOSURES:
             frames, truth = simulation.expose(k)
-            _write_truth(file, truth, speaker)
+            _write_truth(file, truth, headers)
             for frame in frames:
-                _write_frame(file, frame, speaker)
+                _write_frame(file, frame, headers)
         file.finish()
 
 
@@ -71,8 +71,10 @@ def track(path: Path) -> list[list[float]]:
     return [tracking.track(frames, lambda: True).theta.tolist() for frames in [*sets, *synchroniser.flush()]]
 
 
-def _write_announcements(file: McapFile, settings: ServiceConfig, simulation: Simulation, speaker: Speaker) -> None:
-    header = speaker.header(0, 0)
+def _write_announcements(
+    file: McapFile, settings: ServiceConfig, simulation: Simulation, headers: HeaderFactory
+) -> None:
+    header = headers.at(0, 0)
     cameras = {name: head.camera for name, head in simulation.heads.items()}
     messages = {
         keys.CONFIG: sensor_metadata.config(header, config.to_toml(settings)),
@@ -88,16 +90,16 @@ def _write_announcements(file: McapFile, settings: ServiceConfig, simulation: Si
         file.write(f"/{topic}", message.DESCRIPTOR.full_name, payload, START_NS, 0)
 
 
-def _write_frame(file: McapFile, frame: Frame, speaker: Speaker) -> None:
-    topic, wall_ns = keys.image(frame.sensor, frame.stream), speaker.clock.wall(frame.t_host_ns)
-    info = codec.encode_info(frame, speaker.header(frame.t_host_ns, frame.seq, frame.sensor))
+def _write_frame(file: McapFile, frame: Frame, headers: HeaderFactory) -> None:
+    topic, wall_ns = keys.image(frame.sensor, frame.stream), headers.clock.wall(frame.t_host_ns)
+    info = codec.encode_info(frame, headers.at(frame.t_host_ns, frame.seq, frame.sensor))
     file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
     file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
 
 
-def _write_truth(file: McapFile, truth: Truth, speaker: Speaker) -> None:
-    payload = codec.encode_truth(truth, speaker.header(truth.t_host_ns, truth.seq))
-    wall_ns = speaker.clock.wall(truth.t_host_ns)
+def _write_truth(file: McapFile, truth: Truth, headers: HeaderFactory) -> None:
+    payload = codec.encode_truth(truth, headers.at(truth.t_host_ns, truth.seq))
+    wall_ns = headers.clock.wall(truth.t_host_ns)
     file.write(f"/{keys.truth('sim')}", codec.TRUTH_SCHEMA, payload, wall_ns, truth.seq)
 
 

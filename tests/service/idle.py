@@ -22,5 +22,5 @@ class Idle:
     def kill(self) -> None:
         self.terminate()
 
-    def last_words(self) -> str:
+    def output_tail(self) -> str:
         return ""

@@ -18,16 +18,16 @@ class LoopbackBus:
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
         return _Publisher(self, topic, message)
 
-    def announce(self, topic: str, message: str) -> Publisher:
+    def latched_publisher(self, topic: str, message: str) -> Publisher:
         publisher = _Publisher(self, topic, message)
         self._answers[topic] = (message, lambda: publisher.last)
         return publisher
 
-    def answer(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
+    def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
         self._answers[topic] = (message, payload)
         return _Closer(lambda: self._answers.pop(topic, None))
 
-    def ask(self, pattern: str, timeout_s: float) -> list[Sample]:
+    def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         found = [
             (topic, message, payload()) for topic, (message, payload) in self._answers.items() if _hit(topic, pattern)
         ]
@@ -38,11 +38,11 @@ class LoopbackBus:
         self._subscribers.append(entry)
         return _Closer(lambda: entry in self._subscribers and self._subscribers.remove(entry))
 
-    def show_alive(self, component: str) -> Subscription:
+    def declare_liveliness(self, component: str) -> Subscription:
         self.alive.add(component)
         return _Closer(lambda: self.alive.discard(component))
 
-    def watch_alive(self, on_change: Callable[[str, bool], None]) -> Subscription:
+    def watch_liveliness(self, on_change: Callable[[str, bool], None]) -> Subscription:
         for component in self.alive:
             on_change(component, True)
         return _Closer(lambda: None)

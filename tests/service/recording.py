@@ -9,7 +9,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -25,13 +25,13 @@ class Rig:
     def __init__(self, directory, free_bytes=lambda folder: 1 << 40, open_file=open_for_writing, **settings):
         self.bus = LoopbackBus()
         self.clock = WallClock()
-        self.speaker = Speaker("demo", self.clock)
-        self.health = Health(self.bus, "record", self.speaker)
+        self.headers = HeaderFactory("demo", self.clock)
+        self.health = Health(self.bus, "record", self.headers)
         settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)
         self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes)
 
     def publish_image(self, frame):
-        header = self.speaker.header(frame.t_host_ns, frame.seq)
+        header = self.headers.at(frame.t_host_ns, frame.seq)
         image = codec.encode_image(frame, self.clock.wall(frame.t_host_ns))
         info = codec.encode_info(frame, header)
         self.bus.publisher(keys.image(frame.sensor, frame.stream), codec.IMAGE_SCHEMA, IMAGES).put(image, info)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,32 +56,32 @@ def test_a_message_arrives_as_it_was_sent(buses, qos):
 
 def test_an_announcement_is_heard_and_answers_with_the_last(buses):
     _, sender, receiver = buses
-    publisher = sender.announce("config", "absmsg.v1.Config")
-    assert receiver.ask("config", 1) == []
+    publisher = sender.latched_publisher("config", "absmsg.v1.Config")
+    assert receiver.query("config", 1) == []
     arrived = listen(receiver, "config")
     publish_until_received(publisher, arrived, b"old")
     publisher.put(b"new")
-    assert receiver.ask("**", 1) == [Sample("config", "absmsg.v1.Config", b"new")]
+    assert receiver.query("**", 1) == [Sample("config", "absmsg.v1.Config", b"new")]
 
 
 def test_an_answer_is_made_when_asked(buses):
     _, sender, receiver = buses
-    sender.answer("schema", "google.protobuf.FileDescriptorSet", lambda: b"files")
+    sender.answer_queries("schema", "google.protobuf.FileDescriptorSet", lambda: b"files")
     answers = []
     while not answers:
-        answers = receiver.ask("schema", 1)
+        answers = receiver.query("schema", 1)
     assert answers == [Sample("schema", "google.protobuf.FileDescriptorSet", b"files")]
 
 
 def test_components_come_and_go(buses):
     _, one, two = buses
     changes = queue.SimpleQueue()
-    token = one.show_alive("track/sheet")
-    two.watch_alive(lambda *change: changes.put(change))
+    token = one.declare_liveliness("track/sheet")
+    two.watch_liveliness(lambda *change: changes.put(change))
     assert changes.get(timeout=5) == ("track/sheet", True)
     token.close()
     assert changes.get(timeout=5) == ("track/sheet", False)
-    one.show_alive("capture")
+    one.declare_liveliness("capture")
     assert changes.get(timeout=5) == ("capture", True)
     gc.collect()
     with pytest.raises(queue.Empty):
@@ -129,12 +130,12 @@ from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 with ZenohBus.open("demo", "{endpoint}", Role.CLIENT) as bus:
     bus.subscribe("**", lambda sample: None)
-    bus.show_alive("stopped")
+    bus.declare_liveliness("stopped")
     print("ready", flush=True)
     time.sleep(60)
 """
     alive = queue.SimpleQueue()
-    receiver.watch_alive(lambda *change: alive.put(change))
+    receiver.watch_liveliness(lambda *change: alive.put(change))
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout
@@ -160,14 +161,14 @@ def test_everything_resumes_when_the_router_comes_back(buses, endpoint):
     router, sender, receiver = buses
     arrived = listen(receiver, "sheet/state")
     publisher = sender.publisher("sheet/state", "absmsg.v1.DeformationState", STATE)
-    sender.announce("config", "absmsg.v1.Config").put(b"answer")
+    sender.latched_publisher("config", "absmsg.v1.Config").put(b"answer")
     publish_until_received(publisher, arrived, b"before")
     router.close()
     publisher.put(b"nobody hears this, and nothing blocks")
     with ZenohBus.open("demo", endpoint, Role.ROUTER):
         while publish_until_received(publisher, arrived, b"after").payload != b"after":
             pass
-        while not (answers := receiver.ask("config", 1)):
+        while not (answers := receiver.query("config", 1)):
             pass
         assert answers[0].payload == b"answer"
 
@@ -211,8 +212,8 @@ from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
     bus.subscribe("**", print)
-    bus.watch_alive(print)
-    bus.announce("config", "absmsg.v1.Config").put(b"x")
+    bus.watch_liveliness(print)
+    bus.latched_publisher("config", "absmsg.v1.Config").put(b"x")
     bus.publisher("sheet/state", "absmsg.v1.DeformationState", STATE).put(b"y")
 """
     ended = subprocess.run([sys.executable, "-c", program], check=False, timeout=10, stdout=subprocess.DEVNULL)
@@ -228,13 +229,14 @@ def test_closing_twice_is_fine(endpoint):
 
 def test_a_callback_that_does_not_return_is_left_behind_with_a_warning(caplog):
     class Session:
-        def is_closed(self):
+        def is_closed(self) -> bool:
             return False
 
         def close(self):
             raise zenoh.ZError("close operation timed out!")
 
-    ZenohBus(Session(), "demo").close()
+    session: Any = Session()
+    ZenohBus(session, "demo").close()
     assert "rig demo: the session did not close, a callback has not returned" in caplog.text
 
 
@@ -243,10 +245,10 @@ def test_the_interpreter_waits_for_callbacks_that_a_daemon_declared(open_bus):
     before = set(threading.enumerate())
 
     def declare():
-        bus.announce("config", "absmsg.v1.Config")
-        bus.answer("schema", "bytes", bytes)
+        bus.latched_publisher("config", "absmsg.v1.Config")
+        bus.answer_queries("schema", "bytes", bytes)
         bus.subscribe("**", lambda sample: None)
-        bus.watch_alive(lambda component, alive: None)
+        bus.watch_liveliness(lambda component, alive: None)
 
     daemon = threading.Thread(target=declare, daemon=True)
     daemon.start()

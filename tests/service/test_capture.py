@@ -17,12 +17,12 @@ from google.protobuf.descriptor_pool import DescriptorPool
 from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor, sensor_metadata, stall_detector
-from abs_service.capture.device_supervisor import DeviceKeeper
+from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.commands import capture as command
 from abs_service.commands import rig_devices
-from abs_service.commands.capture import Crier
+from abs_service.commands.capture import MetadataPublisher
 from abs_service.commands.rig_devices import HeadError, SettingError
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
@@ -86,35 +86,35 @@ def frame(sensor="head", seq=0):
 
 @pytest.fixture
 def asked():
-    """The addresses that keepers have opened."""
+    """The addresses that supervisors have opened."""
     return []
 
 
 @pytest.fixture
 def keep(monkeypatch, asked):
-    """Starts a keeper on devices that are made one after the other; closed after the test."""
-    monkeypatch.setattr(device_supervisor, "FIRST_PAUSE_S", 0.1)
-    keepers = []
+    """Starts a supervisor on devices that are made one after the other; closed after the test."""
+    monkeypatch.setattr(device_supervisor, "FIRST_BACKOFF_S", 0.1)
+    supervisors = []
 
     def keep(*make, on_open=lambda device: None):
         makers = iter(make)
         collector, bus = Collector(), LoopbackBus()
-        health = Health(bus, "capture", Speaker("demo", WallClock()))
+        health = Health(bus, "capture", HeaderFactory("demo", WallClock()))
 
         def open_device(uri):
             asked.append(uri)
             return next(makers)()
 
-        keeper = DeviceKeeper(
+        supervisor = DeviceSupervisor(
             "sim", "fake://", open_device, on_open, collector, {"head": "tof"}, health, WallClock().monotonic
         )
-        keepers.append(keeper)
-        keeper.start()
-        return keeper, collector, health
+        supervisors.append(supervisor)
+        supervisor.start()
+        return supervisor, collector, health
 
     yield keep
-    for keeper in keepers:
-        keeper.close(5)
+    for supervisor in supervisors:
+        supervisor.close(5)
 
 
 def no_device():
@@ -165,8 +165,8 @@ def test_an_address_that_no_device_can_have_is_refused(keep):
     def misspelt():
         raise AddressError("simulated://shet: there is no such scene")
 
-    keeper, collector, _ = keep(misspelt, working)
-    assert eventually(lambda: isinstance(keeper.refusal, AddressError))
+    supervisor, collector, _ = keep(misspelt, working)
+    assert eventually(lambda: isinstance(supervisor.fatal_error, AddressError))
     assert collector.frames.empty()
 
 
@@ -181,7 +181,7 @@ def test_a_mistake_of_a_driver_is_a_failure_like_any_other(keep, caplog):
 
 def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monkeypatch):
     monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
-    monkeypatch.setattr(stall_detector, "SILENCE_NS", 600_000_000)
+    monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
     _, collector, health = keep(working, working)
     first = collector.frames.get(timeout=5)
     assert eventually(lambda: health._labels["device.sim"] == "stalled")
@@ -242,9 +242,9 @@ def test_a_device_that_does_not_answer_when_it_is_set_is_tried_again(keep):
         if len(calls) == 1:
             raise DeviceError("does not answer")
 
-    keeper, collector, _ = keep(working, working, on_open=on_open)
+    supervisor, collector, _ = keep(working, working, on_open=on_open)
     assert collector.frames.get(timeout=5)
-    assert keeper.refusal is None
+    assert supervisor.fatal_error is None
 
 
 def test_frames_of_heads_that_nobody_configured_are_counted_and_left_out(keep):
@@ -257,8 +257,8 @@ def test_frames_of_heads_that_nobody_configured_are_counted_and_left_out(keep):
 
 def test_a_device_at_its_end_is_not_opened_again(keep):
     device = FakeDevice(start=lambda sink: sink.on_state(DeviceState.CLOSED, "end of the recording"))
-    keeper, _, health = keep(lambda: device)
-    assert eventually(lambda: keeper.finished)
+    supervisor, _, health = keep(lambda: device)
+    assert eventually(lambda: supervisor.finished)
     assert device.closed.wait(5)
     assert health.level == Level.OK
 
@@ -269,8 +269,8 @@ def test_a_device_that_does_not_fit_is_refused_and_closed(keep):
     def refuse(_):
         raise HeadError("no such head")
 
-    keeper, _, _ = keep(lambda: device, on_open=refuse)
-    assert eventually(lambda: keeper.refusal)
+    supervisor, _, _ = keep(lambda: device, on_open=refuse)
+    assert eventually(lambda: supervisor.fatal_error)
     assert device.closed.wait(5)
 
 
@@ -292,15 +292,15 @@ head = "other"
 
 
 @pytest.fixture
-def crier(tmp_path):
+def metadata(tmp_path):
     bus = LoopbackBus()
-    return bus, Crier(bus, Speaker("demo", WallClock()), config.loads(RIG, "rig.toml", tmp_path))
+    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), config.loads(RIG, "rig.toml", tmp_path))
 
 
-def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(crier):
-    bus, crier = crier
-    crier.add_device("cam", FakeDevice())
-    told = {sample.topic: sample.payload for sample in bus.ask("**", 1)}
+def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(metadata):
+    bus, metadata = metadata
+    metadata.add_device("cam", FakeDevice())
+    told = {sample.topic: sample.payload for sample in bus.query("**", 1)}
     assert set(told) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
     model = SensorModel.FromString(told["tof/model"])
     assert (model.noise, model.fx, model.width) == ("gaussian_polynomial", 5.0, 4)
@@ -334,22 +334,22 @@ def test_viewers_are_told_of_a_fisheye_and_recordings_give_it_back():
         decode_camera(model)
 
 
-def test_a_head_that_the_device_does_not_have_is_explained(crier):
-    _, crier = crier
+def test_a_head_that_the_device_does_not_have_is_explained(metadata):
+    _, metadata = metadata
     with pytest.raises(HeadError, match=r'sensors\.color: device "cam" has no head "other"; it has: head'):
-        crier.add_device("cam", FakeDevice(heads=["head"]))
+        metadata.add_device("cam", FakeDevice(heads=["head"]))
 
 
-def test_a_step_of_the_wall_clock_is_said_once(crier):
-    bus, crier = crier
+def test_a_step_of_the_wall_clock_is_said_once(metadata):
+    bus, metadata = metadata
     now = {"monotonic": 10**9, "wall": 10**18}
     clock = WallClock(lambda: now["monotonic"], lambda: now["wall"])
-    health = Health(bus, "capture", Speaker("demo", clock))
+    health = Health(bus, "capture", HeaderFactory("demo", clock))
     levels = []
     for step_ns in (0, 3600 * 10**9, 0):
         now["monotonic"] += 10**9
         now["wall"] += 10**9 + step_ns
-        command._tick(crier, {}, health, clock)
+        command._tick(metadata, {}, health, clock)
         levels.append((health.level, health._counters["clock_steps"]))
     assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
     said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]

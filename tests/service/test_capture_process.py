@@ -33,7 +33,7 @@ sensors.color.device = "sim"
 def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint, launch):
     with ZenohBus.open("demo", endpoint, Role.ROUTER) as bus:
         changes, health = queue.SimpleQueue(), queue.SimpleQueue()
-        bus.watch_alive(lambda *change: changes.put(change))
+        bus.watch_liveliness(lambda *change: changes.put(change))
         bus.subscribe("health/capture", lambda sample: health.put(Health.FromString(sample.payload)))
         subscriber = FrameSubscriber(bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")])
         process = launch("capture", rig, "--connect", endpoint)
@@ -43,7 +43,7 @@ def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint,
             frame = subscriber.take(60)
             assert frame is not None
             seen[frame.key] = frame
-        assert {sample.topic for sample in bus.ask("**", 2)} == {
+        assert {sample.topic for sample in bus.query("**", 2)} == {
             *("config", "schema", "tf"),
             *("tof/model", "tof/calibration", "color/model", "color/calibration"),
         }

@@ -10,17 +10,17 @@ from rich.spinner import Spinner
 
 from abs_service.display.lines import JsonDisplay, PlainDisplay, line
 from abs_service.display.table import TableDisplay, draw
-from abs_service.supervision.rig_state import Live
-from abs_service.supervision.rig_view import View, size
+from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import Child, State
-from abs_service.tracking.tracker_log import Report
+from abs_service.tracking.tracker_log import EstimateReport
 from tests.service.idle import Idle
 
 S = 1_000_000_000
 
 
 def report(**changes):
-    return Report(
+    return EstimateReport(
         **{
             "tracker": "sheet",
             "seq": 41,
@@ -52,7 +52,7 @@ class Clock:
 def live():
     """A rig in full swing: two seconds of health, one estimate."""
     clock = Clock()
-    live = Live(["sheet"], clock)
+    live = RigState(["sheet"], clock)
     for second in range(2):
         clock.now_ns += S
         take_health(live, capture(30 * second))
@@ -61,7 +61,7 @@ def live():
     tracker = live.trackers["sheet"]
     tracker.last, tracker.estimates, tracker.skipped = report(), 12, 3
     tracker.statuses["TRACKING"] = 12
-    tracker.seen_ns = {"tof": clock.now_ns - 50_000_000}
+    tracker.exposure_ns = {"tof": clock.now_ns - 50_000_000}
     for total, value in ((tracker.error_mm, 2.345), (tracker.surface_mm, 0.987), (tracker.solve_ms, 17.3)):
         total.add(value)
     return live
@@ -95,7 +95,7 @@ def recorder(file_bytes):
 
 
 def view(live, **changes):
-    children = [Child("capture", (), 0, State.RUNNING), Child("record", (), 1, State.PAUSED, "ended", restarts=2)]
+    children = [Child("capture", (), 0, State.RUNNING), Child("record", (), 1, State.BACKOFF, "ended", restarts=2)]
     children[0].process = Idle()
     fields = {
         "rig": "demo",
@@ -106,7 +106,7 @@ def view(live, **changes):
         "elapsed_s": 83.4,
         "now_ns": 102 * S,
     }
-    return View(**(fields | changes))
+    return RigView(**(fields | changes))
 
 
 def drawn(view, width=80):
@@ -143,7 +143,7 @@ def test_the_recorder_shows_its_file_size_rate_and_losses(live):
 
 
 def test_processes_show_their_number_or_state_and_restarts(live):
-    assert "processes  capture 4711  record paused restarted 2×" in drawn(view(live))
+    assert "processes  capture 4711  record backoff restarted 2×" in drawn(view(live))
 
 
 @pytest.mark.parametrize("width", [80, 120])
@@ -169,7 +169,7 @@ def test_preparing_is_said_with_a_spinner(live):
 
 
 def test_before_anything_is_known_the_table_says_what_it_waits_for():
-    live = Live(["sheet"], Clock())
+    live = RigState(["sheet"], Clock())
     text = drawn(view(live))
     assert "no images yet" in text
     assert "Starting the processes" in text
@@ -225,9 +225,9 @@ def test_json_is_one_object_per_estimate_and_nothing_else():
     with JsonDisplay(out, notes) as display:
         display.estimate(report())
         display.note("something")
-        display.update(view(Live(["sheet"], Clock())))
+        display.update(view(RigState(["sheet"], Clock())))
         display.estimate(report(error_mm=None, surface_mm=None))
-        display.close(view(Live(["sheet"], Clock())))
+        display.close(view(RigState(["sheet"], Clock())))
     first, second = map(json.loads, out.getvalue().splitlines())
     assert first == report().as_dict() | {"theta": list(report().theta), "reasons": []}
     assert second["error_mm"] is None

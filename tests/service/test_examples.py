@@ -55,7 +55,7 @@ def test_meshes_become_arrays_also_after_the_tracker_was_restarted(endpoint, ope
     topology, mesh = golden(MeshTopology), golden(DeformedMesh)
     mesh.vertices_f32 = topology.rest_vertices_f32
     bus = open_bus()
-    topologies = bus.announce(keys.topology("sheet"), MeshTopology.DESCRIPTOR.full_name)
+    topologies = bus.latched_publisher(keys.topology("sheet"), MeshTopology.DESCRIPTOR.full_name)
     meshes = bus.publisher(keys.mesh("sheet"), DeformedMesh.DESCRIPTOR.full_name, MESH)
     topologies.put(topology.SerializeToString())
     with reading(python("mesh.py", "--endpoint", endpoint)) as reader:

@@ -1,7 +1,7 @@
 from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus.health import PERIOD_NS, Health, Level
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from tests.service.loopback import LoopbackBus
 
 
@@ -11,7 +11,9 @@ class Rig:
     def __init__(self):
         self.now_ns = 0
         self.bus = LoopbackBus()
-        self.health = Health(self.bus, "capture", Speaker("demo", WallClock(lambda: self.now_ns, lambda: self.now_ns)))
+        self.health = Health(
+            self.bus, "capture", HeaderFactory("demo", WallClock(lambda: self.now_ns, lambda: self.now_ns))
+        )
 
     @property
     def said(self):

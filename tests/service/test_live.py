@@ -8,8 +8,8 @@ from absmsg.v1.health_pb2 import Health
 from absmsg.v1.surface_truth_pb2 import SurfaceTruth
 
 from abs_service.bus.contract import Sample
-from abs_service.supervision.rig_state import Live
-from abs_service.tracking.tracker_log import Total
+from abs_service.supervision.rig_state import RigState
+from abs_service.tracking.tracker_log import RunningStats
 
 
 def sample(topic, message):
@@ -49,7 +49,7 @@ def mesh(t, z=1.0):
 
 @pytest.fixture
 def live():
-    return Live(["sheet"], lambda: 42)
+    return RigState(["sheet"], lambda: 42)
 
 
 def take(live, *samples):
@@ -68,15 +68,15 @@ def test_an_estimate_is_reported_with_its_error_once_its_mesh_has_come(live):
 
 
 def test_a_topology_that_did_not_arrive_is_missed_until_it_comes(live):
-    assert live.without_topology() == []
+    assert live.missing_topologies() == []
     take(live, truth(1), truth(2), state(2, 1), mesh(2))
-    assert live.without_topology() == ["sheet"]
+    assert live.missing_topologies() == ["sheet"]
     take(live, topology(1), topology(1))
-    assert live.without_topology() == []
+    assert live.missing_topologies() == []
     (report,) = take(live, truth(3), state(3, 2), mesh(3))
     assert report.error_mm == pytest.approx(0, abs=1e-3)
     take(live, state(4, 3, mesh_version=2))
-    assert live.without_topology() == ["sheet"]
+    assert live.missing_topologies() == ["sheet"]
 
 
 def test_an_estimate_whose_mesh_was_lost_is_reported_with_the_next_one_and_without_error(live):
@@ -123,7 +123,7 @@ def test_totals_are_kept_over_all_estimates(live):
 
 def test_health_is_kept_with_the_time_at_which_it_came(live):
     take(live, sample("health/track/sheet", Health(component="track/sheet", labels={"phase": "preparing"})))
-    assert live.heard["track/sheet"].t_ns == 42
+    assert live.received["track/sheet"].t_ns == 42
     assert live.preparing()
     take(live, sample("health/track/sheet", Health(component="track/sheet", labels={"phase": "tracking"})))
     assert not live.preparing()
@@ -136,16 +136,16 @@ def test_what_cannot_be_read_is_counted_and_harms_nothing(live):
     take(live, state(2, 1), sample("sheet/mesh", odd))
     take(live, Sample("health/record", Health.DESCRIPTOR.full_name, b"\xff\xff"))
     take(live, sample("sim/truth", SurfaceTruth(rows=5, columns=7)))
-    assert live.garbled == 3
+    assert live.malformed == 3
 
 
 def test_strangers_are_ignored(live):
     assert take(live, Sample("other/state", DeformationState.DESCRIPTOR.full_name, b"")) == []
-    assert live.garbled == 0
+    assert live.malformed == 0
 
 
 def test_total():
-    total = Total()
+    total = RunningStats()
     for value in (1.0, None, 3.0):
         total.add(value)
     assert (total.count, total.mean, total.max) == (2, 2.0, 3.0)

@@ -43,7 +43,7 @@ def test_one_process_may_listen_and_others_connect_wherever_they_are_told(endpoi
         rig_process.open_bus(rig, parse("--listen", endpoint)),
         rig_process.open_bus(rig, parse("--connect", endpoint)) as bus,
     ):
-        assert bus.ask("**", 0.1) == []
+        assert bus.query("**", 0.1) == []
 
 
 def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file():

@@ -19,13 +19,13 @@ def as_it_was():
 @pytest.mark.usefixtures("as_it_was")
 def test_threads_take_short_turns():
     sys.setswitchinterval(0.005)
-    gc_tuning.take_short_turns()
+    gc_tuning.shorten_switch_interval()
     assert sys.getswitchinterval() == pytest.approx(gc_tuning.SWITCH_S)
 
 
 @pytest.mark.usefixtures("as_it_was")
 def test_what_is_loaded_is_searched_for_garbage_no_more():
     frozen = gc.get_freeze_count()
-    gc_tuning.keep_what_is_loaded()
+    gc_tuning.freeze_loaded_objects()
     assert gc.get_freeze_count() > frozen + 1000
     assert len(gc.get_objects()) < 1000

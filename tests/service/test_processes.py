@@ -25,7 +25,7 @@ def child(monkeypatch):
     yield start
     for process in started:
         process.kill()
-        process.last_words()
+        process.output_tail()
 
 
 def wait_for_end(process, seconds=10.0):
@@ -42,7 +42,7 @@ def test_lines_of_both_outputs_arrive_with_the_name_of_the_component(child):
         "import sys; print('out'); print('err', file=sys.stderr); sys.exit(3)", lambda *line: lines.append(line)
     )
     assert wait_for_end(process) == 3
-    assert process.last_words() == "out\nerr"
+    assert process.output_tail() == "out\nerr"
     assert lines == [("act", "out"), ("act", "err")]
 
 
@@ -79,7 +79,7 @@ import signal, time
 from abs_service import lifeline
 lifeline.GRACE_S = 0.2
 signal.signal(signal.SIGTERM, {handler})
-lifeline.hold()
+parent_watchdog.start()
 print("ready", flush=True)
 while True:
     time.sleep(60)

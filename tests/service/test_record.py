@@ -40,7 +40,7 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
 def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_every_file(tmp_path):
     rig = Rig(tmp_path, rotate_bytes=1, flush_s=0.001)
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
-    header = rig.speaker.now(0)
+    header = rig.headers.now(0)
     for topic, message in {
         keys.CONFIG: sensor_metadata.config(header, "version = 1"),
         keys.calibration("tof"): sensor_metadata.calibration("tof", camera, 1),
@@ -49,8 +49,8 @@ def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_ever
         ),
         keys.TRANSFORMS: sensor_metadata.transforms({"tof": camera}, 1),
     }.items():
-        rig.bus.announce(topic, message.DESCRIPTOR.full_name).put(message.SerializeToString())
-    rig.bus.answer(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
+        rig.bus.latched_publisher(topic, message.DESCRIPTOR.full_name).put(message.SerializeToString())
+    rig.bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
     rig.recorder.start()
     seq = 0
     while len(recordings(tmp_path)) < 2:
@@ -109,6 +109,6 @@ def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
 
 def test_messages_of_every_type_have_an_envelope():
     for message in message_header.MESSAGES - {message_header.INFO}:
-        message_header.read(Sample("x", message, b"", b""))
-    with pytest.raises(message_header.EnvelopeError, match="is none of"):
-        message_header.read(Sample("x", "google.protobuf.Timestamp", b""))
+        message_header.parse(Sample("x", message, b"", b""))
+    with pytest.raises(message_header.MessageHeaderError, match="is none of"):
+        message_header.parse(Sample("x", "google.protobuf.Timestamp", b""))

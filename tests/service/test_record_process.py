@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.session import Role
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.recording.recovery import recover
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -52,7 +52,7 @@ class Stream:
 
     def __init__(self, endpoint, shape=(48, 64)):
         self._clock = WallClock()
-        self._speaker = Speaker("demo", self._clock)
+        self._headers = HeaderFactory("demo", self._clock)
         self._pixels = np.random.default_rng(1).integers(0, 65535, shape, np.uint16)
         self._stop = threading.Event()
         self._bus = ZenohBus.open("demo", endpoint, Role.ROUTER)
@@ -80,7 +80,7 @@ class Stream:
         while not self._stop.wait(0.005):
             t_ns = self._clock.monotonic()
             frame = Frame("tof", "depth", Kind.DEPTH, self._pixels, "16UC1", t_ns, t_ns, seq, geometry=Geometry.RADIAL)
-            header = self._speaker.header(t_ns, seq)
+            header = self._headers.at(t_ns, seq)
             publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
             seq += 1
 

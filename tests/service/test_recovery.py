@@ -12,14 +12,14 @@ from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import recover as command
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 
-HEADER = Speaker("demo", WallClock(), "boot").header(0, 0)
+HEADER = HeaderFactory("demo", WallClock(), "boot").at(0, 0)
 CHUNK_HEAD = 9 + 32 + len("lz4") + 8  # bytes of a chunk record before its compressed data
 FRAMES = 40
 

@@ -5,7 +5,7 @@ from absmsg.v1 import common_pb2, deformation_state_pb2
 
 from abs_service.bus import keys
 from abs_service.bus.contract import STATE
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import reinitialize
 from tests.service.loopback import LoopbackBus
 
@@ -35,7 +35,7 @@ class Tracker:
     ("finds", "code", "words"), [(True, 0, "has a new mesh, version 2"), (False, 1, "found no object within")]
 )
 def test_the_tracker_is_told_and_its_new_mesh_reported(monkeypatch, capsys, finds, code, words):
-    monkeypatch.setattr(reinitialize, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.2)
     bus = LoopbackBus()
     tracker = Tracker(bus, finds)
     subscribe = bus.subscribe
@@ -46,12 +46,12 @@ def test_the_tracker_is_told_and_its_new_mesh_reported(monkeypatch, capsys, find
         return subscription
 
     monkeypatch.setattr(bus, "subscribe", and_publish)
-    assert reinitialize._reinitialize(bus, "sheet", Speaker("demo", WallClock())) == code
+    assert reinitialize._reinitialize(bus, "sheet", HeaderFactory("demo", WallClock())) == code
     assert [header.rig for header in tracker.told] == ["demo"]
     assert words in capsys.readouterr().out
 
 
 def test_a_silent_tracker_is_named(monkeypatch, capsys):
-    monkeypatch.setattr(reinitialize, "PATIENCE_S", 0.05)
-    assert reinitialize._reinitialize(LoopbackBus(), "sheet", Speaker("demo", WallClock())) == 1
+    monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.05)
+    assert reinitialize._reinitialize(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock())) == 1
     assert 'tracker "sheet" says nothing' in capsys.readouterr().out

@@ -7,11 +7,11 @@ import pytest
 from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus.health import Health
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.base import SensorFit
-from abs_service.tracking.noise_monitor import EXPLAINED, LEAST_RESIDUALS, WINDOW_NS, ResidualWatch
+from abs_service.tracking.noise_monitor import MINIMUM_INLIER_SHARE, MINIMUM_RESIDUALS, WINDOW_NS, NoiseMonitor
 from abs_service.tracking.session import Tracking
 from tests.service.loopback import LoopbackBus
 from tests.service.test_estimates import ESTIMATE
@@ -26,8 +26,8 @@ class Watch:
 
     def __init__(self):
         self.bus = LoopbackBus()
-        self.health = Health(self.bus, "track/sheet", Speaker("demo", WallClock(lambda: 0, lambda: 0)))
-        self.watch = ResidualWatch(self.health)
+        self.health = Health(self.bus, "track/sheet", HeaderFactory("demo", WallClock(lambda: 0, lambda: 0)))
+        self.watch = NoiseMonitor(self.health)
         self.t_ns = 10**12
 
     def see(self, seconds=2.0, share=0.9, inliers=250, **variances):
@@ -38,7 +38,7 @@ class Watch:
         """The same for sensors whose names are not Python's."""
         fits = tuple(SensorFit(name, 300, 0, 300, inliers, 1.0, float(np.sqrt(v))) for name, v in variances.items())
         for _ in range(int(seconds * 1e9 / PERIOD_NS)):
-            self.watch.take(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, inlier_share=share, fits=fits))
+            self.watch.add(dataclasses.replace(ESTIMATE, t_host_ns=self.t_ns, inlier_share=share, fits=fits))
             self.t_ns += PERIOD_NS
         return self.said
 
@@ -95,15 +95,15 @@ def test_a_few_frames_are_no_evidence():
 
 
 def test_a_few_residuals_are_no_evidence():
-    said = Watch().see(inliers=LEAST_RESIDUALS // 40, tof=9.0)
+    said = Watch().see(inliers=MINIMUM_RESIDUALS // 40, tof=9.0)
     assert said.level == OK
     assert not said.gauges
 
 
 def test_an_object_that_is_lost_or_bends_as_its_model_cannot_says_nothing_about_noise():
     watch = Watch()
-    assert watch.see(share=EXPLAINED - 0.05, tof=9.0).level == OK
-    assert watch.see(share=EXPLAINED + 0.05, tof=9.0).level == WARNING
+    assert watch.see(share=MINIMUM_INLIER_SHARE - 0.05, tof=9.0).level == OK
+    assert watch.see(share=MINIMUM_INLIER_SHARE + 0.05, tof=9.0).level == WARNING
 
 
 def test_time_that_goes_back_begins_a_new_window():
@@ -125,7 +125,7 @@ def watched(uri, **changes):
     tracking = Tracking(rig_of(simulation), default_plan(optimizer=cma.Settings(generations=2), **changes))
     watch = Watch()
     for step in drive(tracking, simulation, range(62)):
-        watch.watch.take(step.estimate)
+        watch.watch.add(step.estimate)
     return watch.said
 
 

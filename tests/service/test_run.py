@@ -18,7 +18,7 @@ from abs_service.bus.stamps import WallClock
 from abs_service.commands import run
 from abs_service.display.lines import PlainDisplay
 from abs_service.supervision.exit_codes import Exit
-from abs_service.supervision.run_session import Session
+from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
 from abs_service.wire import estimate_messages
 from tests.service.idle import Idle
@@ -119,7 +119,7 @@ class Bench:
         self.supervisor = Supervisor(
             children, lambda component, _: Idle(component, self.killed), time.monotonic_ns, limits
         )
-        self.session = Session(
+        self.session = RunSession(
             self.bus, "bench", "tcp/127.0.0.1:1", Path(), trackers, self.supervisor, display, WallClock()
         )
 
@@ -137,7 +137,7 @@ def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
     bench.bus.publisher(keys.health("capture"), Health.DESCRIPTOR.full_name, EVENTS).put(
         Health(component="capture").SerializeToString()
     )
-    bench.session.go_on_until(lambda: False)  # ends because capture, once heard, is silent and has no restart left
+    bench.session.run_until(lambda: False)  # ends because capture, once heard, is silent and has no restart left
     assert bench.supervisor.children["capture"].state == "failed"
     told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
     assert told[-1].level == Health.LEVEL_ERROR
@@ -152,18 +152,18 @@ def test_a_topology_that_the_network_lost_is_asked_for():
         asked.append(bench.session.elapsed_s)
         return MeshTopology(mesh_version=3).SerializeToString()
 
-    bench.bus.answer(keys.topology("sheet"), estimate_messages.TOPOLOGY, topology)
+    bench.bus.answer_queries(keys.topology("sheet"), estimate_messages.TOPOLOGY, topology)
     state = DeformationState(tracker="sheet", mesh_version=3).SerializeToString()
     bench.bus.publisher(keys.state("sheet"), estimate_messages.STATE, EVENTS).put(state)
-    bench.session.go_on_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
+    bench.session.run_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
     assert len(asked) == 1
-    assert bench.session.view().live.without_topology() == []
+    assert bench.session.view().live.missing_topologies() == []
 
 
 def test_the_processes_are_stopped_also_when_nobody_reads_the_output_any_more():
     bench = Bench(PlainDisplay(Gone(), io.StringIO()))
     with pytest.raises(BrokenPipeError):
-        bench.session.go_on_until(lambda: False)
+        bench.session.run_until(lambda: False)
     bench.session.stop()
     assert bench.killed == ["capture", "record"]
 

@@ -1,4 +1,4 @@
-from abs_service.bus.stamps import STEP_NS, Speaker, WallClock
+from abs_service.bus.stamps import STEP_NS, HeaderFactory, WallClock
 
 
 class Clocks:
@@ -40,8 +40,8 @@ def test_slow_drift_is_followed_but_is_no_step():
 def test_a_header_says_who_speaks_and_when():
     clocks = Clocks()
     clock = WallClock(clocks.monotonic, clocks.wall)
-    speaker = Speaker("demo", clock)
-    header = speaker.header(2_000_000_000, 7, "tof")
+    headers = HeaderFactory("demo", clock)
+    header = headers.at(2_000_000_000, 7, "tof")
     assert header.stamp.ToNanoseconds() == clock.wall(2_000_000_000)
     assert (header.t_host_ns, header.seq, header.rig, header.frame_id) == (2_000_000_000, 7, "demo", "tof")
-    assert header.boot_id == speaker.boot_id != Speaker("demo", clock).boot_id
+    assert header.boot_id == headers.boot_id != HeaderFactory("demo", clock).boot_id

@@ -25,7 +25,7 @@ class FakeProcess:
         self.world.events.append(("kill", self.component))
         self.code = -9
 
-    def last_words(self):
+    def output_tail(self):
         return self.world.words
 
 
@@ -97,7 +97,7 @@ def test_a_child_that_crashes_too_often_is_given_up_and_the_others_go_on(world):
     failed = supervisor.children["track/a"]
     assert (failed.state, failed.restarts) == (State.FAILED, 5)
     assert "more than 5 restarts in 60 s" in failed.reason
-    assert supervisor.verdict() is None
+    assert supervisor.exit_code() is None
     assert supervisor.children["track/b"].state is State.RUNNING
 
 
@@ -113,16 +113,16 @@ def test_crashes_that_are_long_ago_are_forgiven(world):
 def test_without_images_or_any_tracker_there_is_nothing_left_to_do(world, lost):
     supervisor = world.supervisor("capture", "track/a", "track/b", "record", restarts=0)
     for component in lost:
-        assert supervisor.verdict() is None
+        assert supervisor.exit_code() is None
         ends(world, supervisor, component, 1)
-    assert supervisor.verdict() is Exit.FAILED
+    assert supervisor.exit_code() is Exit.FAILED
 
 
 def test_a_failed_recorder_stops_nothing(world):
     supervisor = world.supervisor("capture", "track/a", "record", restarts=0)
     ends(world, supervisor, "record", 1)
     assert supervisor.children["record"].state is State.FAILED
-    assert supervisor.verdict() is None
+    assert supervisor.exit_code() is None
 
 
 def test_exit_code_3_means_do_not_start_me_again(world):
@@ -131,31 +131,31 @@ def test_exit_code_3_means_do_not_start_me_again(world):
     ends(world, supervisor, "capture", Exit.GIVE_UP)
     child = supervisor.children["capture"]
     assert (child.state, child.restarts, child.reason) == (State.FAILED, 0, "the SDK is not installed")
-    assert supervisor.verdict() is Exit.FAILED
+    assert supervisor.exit_code() is Exit.FAILED
 
 
 def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
     supervisor = world.supervisor("capture", "track/a", "record")
     world.words = "abs-service: error: record.directory is read-only"
     ends(world, supervisor, "record", Exit.USER)
-    refused = supervisor.refused()
+    refused = supervisor.misconfigured()
     assert refused is not None
     assert refused.reason == world.words
-    assert supervisor.verdict() is Exit.USER
+    assert supervisor.exit_code() is Exit.USER
 
 
 def test_when_the_devices_have_no_more_images_the_run_is_over(world):
     supervisor = world.supervisor("capture", "track/a")
     ends(world, supervisor, "capture", 0)
-    assert supervisor.verdict() is Exit.OK
+    assert supervisor.exit_code() is Exit.OK
     assert supervisor.children["capture"].restarts == 0
 
 
 def test_a_silent_child_is_killed_and_started_again(world):
     supervisor = world.supervisor("capture")
-    supervisor.heard("capture")
+    supervisor.heartbeat("capture")
     world.now_ns += 9 * S
-    supervisor.heard("capture")
+    supervisor.heartbeat("capture")
     world.now_ns += 9 * S
     supervisor.poll()
     assert supervisor.children["capture"].state is State.RUNNING
@@ -173,7 +173,7 @@ def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
     supervisor = world.supervisor("track/a")
     world.now_ns += 170 * S
     supervisor.poll()
-    supervisor.heard("track/a", busy=True)
+    supervisor.heartbeat("track/a", busy=True)
     world.now_ns += 170 * S
     supervisor.poll()
     assert world.events == []
@@ -181,7 +181,7 @@ def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
 
 def test_health_of_strangers_is_ignored(world):
     supervisor = world.supervisor("capture")
-    supervisor.heard("track/elsewhere")
+    supervisor.heartbeat("track/elsewhere")
     assert list(supervisor.children) == ["capture"]
     assert world.events == []
 

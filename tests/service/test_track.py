@@ -12,11 +12,11 @@ from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.optimizers import cma
-from abs_service.tracking.live_tracker import EstimatePublisher, LiveTracker, WaitingSets
-from abs_service.tracking.noise_monitor import ResidualWatch
+from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
+from abs_service.tracking.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import Tracking, streams
 from drivers.contract.frame import Kind
 from drivers.encoding import codec
@@ -35,17 +35,17 @@ class Bench:
         self.now_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
-        self.speaker = Speaker("demo", self.wall)
-        self.health = Health(self.bus, "track/sheet", self.speaker)
+        self.headers = HeaderFactory("demo", self.wall)
+        self.health = Health(self.bus, "track/sheet", self.headers)
         frames = FrameSubscriber(self.bus, MEMBERS)
-        self.sets = WaitingSets(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
+        self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
         self.tracking = Tracking(RIG, default_plan(optimizer=cma.Settings(generations=2)))
         self.live = LiveTracker(
             self.tracking,
             self.sets,
-            EstimatePublisher(self.bus, self.speaker, "sheet", "nurbs", RIG.calib_id),
+            EstimatePublisher(self.bus, self.headers, "sheet", "nurbs", RIG.calib_id),
             self.health,
-            ResidualWatch(self.health),
+            NoiseMonitor(self.health),
             self.clock,
             budget_ms,
         )
@@ -62,7 +62,7 @@ class Bench:
         for taken in SIMULATION.expose(k)[0]:
             if taken.kind in kinds:
                 frame = dataclasses.replace(change(taken), t_arrival_ns=self.now_ns)
-                header = self.speaker.header(frame.t_host_ns, frame.seq)
+                header = self.headers.at(frame.t_host_ns, frame.seq)
                 publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
                 publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
 
@@ -89,7 +89,7 @@ def bench():
 def test_an_exposure_becomes_an_estimate(bench):
     bench.expose(0)
     bench.now_ns += 7_000_000
-    bench.live.turn()
+    bench.live.process_next()
     (state,) = bench.states
     assert state.status == DeformationState.STATUS_TRACKING
     assert (state.header.t_host_ns, state.header.seq, state.header.rig) == (0, 0, "demo")
@@ -103,7 +103,7 @@ def test_an_exposure_becomes_an_estimate(bench):
 def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
     for k in range(2):
         bench.expose(k)
-        bench.live.turn()
+        bench.live.process_next()
     topics = [sample.topic for sample in bench.bus.sent if sample.topic.startswith("sheet/")]
     assert topics == ["sheet/topology", "sheet/state", "sheet/mesh", "sheet/state", "sheet/mesh"]
     (topology,) = bench.sent("sheet/topology", MeshTopology)
@@ -112,15 +112,15 @@ def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
     assert all(len(mesh.vertices_f32) == len(topology.rest_vertices_f32) for mesh in meshes)
     assert [mesh.header.t_host_ns for mesh in meshes] == [state.header.t_host_ns for state in bench.states]
     # Whoever comes later asks.
-    assert [MeshTopology.FromString(s.payload) for s in bench.bus.ask("sheet/topology", 0.0)] == [topology]
+    assert [MeshTopology.FromString(s.payload) for s in bench.bus.query("sheet/topology", 0.0)] == [topology]
 
 
 def test_before_a_tracker_is_known_to_be_fast_the_newest_set_wins_and_the_others_are_counted(bench):
     for k in range(3):
         bench.expose(k)
-    bench.live.turn()
+    bench.live.process_next()
     bench.expose(3)
-    bench.live.turn()
+    bench.live.process_next()
     assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(2), SIMULATION.time_ns(3)]
     assert [state.skipped for state in bench.states] == [2, 0]
     assert bench.said.counters["skipped"] == 2
@@ -129,14 +129,14 @@ def test_before_a_tracker_is_known_to_be_fast_the_newest_set_wins_and_the_others
 def test_a_tracker_that_is_faster_than_the_cameras_works_off_what_a_stall_left(bench):
     for k in range(4):  # three quick turns and a slow one
         bench.expose(k)
-        bench.live.turn()
+        bench.live.process_next()
         bench.now_ns += 20_000_000 if k < 3 else 120_000_000
         if k < 3:
-            bench.live.turn()  # finds nothing
+            bench.live.process_next()  # finds nothing
     for k in range(4, 7):
         bench.expose(k)
     for _ in range(3):
-        bench.live.turn()
+        bench.live.process_next()
         bench.now_ns += 20_000_000
     assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in range(7)]
     assert bench.said.counters["skipped"] == 0
@@ -146,7 +146,7 @@ def test_a_slower_tracker_takes_the_newest(bench):
     for k in range(6):
         bench.expose(k)
         if k % 2:
-            bench.live.turn()
+            bench.live.process_next()
             bench.now_ns += 50_000_000
     assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in (1, 3, 5)]
     assert [state.skipped for state in bench.states] == [1, 1, 1]
@@ -155,17 +155,17 @@ def test_a_slower_tracker_takes_the_newest(bench):
 def test_topologies_are_numbered_by_themselves_so_that_a_recorder_misses_none(bench):
     for k in range(3):
         bench.expose(k)
-        bench.live.turn()
+        bench.live.process_next()
     bench.tracking.reinitialize()
     bench.expose(3)
-    bench.live.turn()
+    bench.live.process_next()
     assert [topology.header.seq for topology in bench.sent("sheet/topology", MeshTopology)] == [1, 2]
 
 
 def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
     for k in range(10):
         bench.expose(k)
-    bench.live.turn()
+    bench.live.process_next()
     assert bench.states[0].header.t_host_ns == SIMULATION.time_ns(9)
     counters = bench.said.counters
     dropped = [number for name, number in counters.items() if name.startswith("dropped.")]
@@ -174,18 +174,18 @@ def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
 
 
 def test_without_frames_nothing_is_said(bench):
-    bench.live.turn()
+    bench.live.process_next()
     assert bench.bus.sent == []
 
 
 def test_a_set_that_waits_for_nothing_any_more_is_taken_at_its_deadline(bench):
     bench.expose(0)
-    bench.live.turn()
+    bench.live.process_next()
     bench.expose(1, kinds=(Kind.DEPTH, Kind.AMPLITUDE))
-    bench.live.turn()
+    bench.live.process_next()
     assert len(bench.states) == 1
     bench.now_ns += 200_000_000
-    bench.live.turn()
+    bench.live.process_next()
     state = bench.states[1]
     assert state.status == DeformationState.STATUS_DEGRADED
     assert list(state.reasons) == ["no frame from color"]
@@ -197,7 +197,7 @@ def test_a_set_that_waits_for_nothing_any_more_is_taken_at_its_deadline(bench):
 
 def test_until_there_is_an_object_it_says_so_and_sends_no_topology(bench):
     bench.expose(0, lambda frame: dataclasses.replace(frame, data=np.zeros_like(frame.data)))
-    bench.live.turn()
+    bench.live.process_next()
     assert bench.states[0].status == DeformationState.STATUS_INITIALIZING
     assert "no connected surface" in bench.states[0].reasons[0]
     assert bench.states[0].mesh_version == 0
@@ -207,7 +207,7 @@ def test_until_there_is_an_object_it_says_so_and_sends_no_topology(bench):
 
 def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
     bench.expose(0, lambda frame: dataclasses.replace(frame, data=frame.data[:100]))
-    bench.live.turn()
+    bench.live.process_next()
     said = bench.said
     assert said.level == Message.LEVEL_ERROR
     assert "pixels, but the camera model of sensors." in said.message
@@ -215,7 +215,7 @@ def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
     assert bench.states == []
     # In a new epoch the sensor may have another size.
     bench.expose(1, lambda frame: dataclasses.replace(frame, epoch=1))
-    bench.live.turn()
+    bench.live.process_next()
     assert len(bench.states) == 1
     assert bench.said.level == Message.LEVEL_OK
 
@@ -223,15 +223,15 @@ def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
 def test_what_the_residuals_say_of_the_noise_models_is_in_health(bench):
     for k in (0, 31):
         bench.expose(k)
-        bench.live.turn()
+        bench.live.process_next()
     assert bench.said.gauges["residual_variance.tof"] == pytest.approx(1, abs=0.5)
 
 
 def test_malformed_messages_are_counted_and_explained(bench):
     bench.bus.publisher("tof/depth/image", codec.IMAGE_SCHEMA, IMAGES).put(b"\xff", b"\xff")
-    bench.live.turn()
+    bench.live.process_next()
     bench.expose(0)
-    bench.live.turn()
+    bench.live.process_next()
     said = bench.said
     assert said.counters["malformed.tof/depth/image"] == 1
     assert "are no foxglove.RawImage" in said.labels["malformed"]
@@ -243,7 +243,7 @@ def test_the_budget_bounds_the_search_of_all_but_the_first_frame():
     bench.tick_ns = 10_000_000  # every look at the clock takes 10 ms
     for k in range(2):
         bench.expose(k)
-        bench.live.turn()
+        bench.live.process_next()
     assert [state.generations for state in bench.states] == [2, 1]
     assert bench.states[1].solve_ms >= 10
     assert [state.budget_ms for state in bench.states] == [5, 5]

@@ -79,8 +79,8 @@ def test_a_noise_map_that_is_smaller_than_the_nominal_image_does_no_harm(monkeyp
     statuses = []
 
     class Recorded(warmup.Tracking):
-        def track(self, *arguments):
-            statuses.append((estimate := super().track(*arguments)).status)
+        def track(self, frames, in_time):
+            statuses.append((estimate := super().track(frames, in_time)).status)
             return estimate
 
     monkeypatch.setattr(warmup, "Tracking", Recorded)

@@ -17,7 +17,7 @@ from calib import pose
 from drivers.simulated import address
 from tests.drivers.kinect1 import studio
 from tests.drivers.kinect1.testbed import SERIALS, Server
-from tests.system.running import START_S, Ear, wait_until
+from tests.system.running import START_S, RigListener, wait_until
 
 SCENE = "simulated://sheet?seed=1&sensors=tof&speed=0.05"
 
@@ -68,13 +68,13 @@ def main(folder: Path, endpoint: str) -> None:
     write_rig(rig, endpoint)
     with Server("--films", *map(str, films)) as server:
         command = [sys.executable, "-m", "abs_service", "run", str(rig), "--json"]
-        with subprocess.Popen(command) as process, Ear(endpoint, rig="kinects") as ear:
-            wait_until(lambda: ear.frames("tof/depth/image"), START_S, "an image of the simulated camera")
-            first = ear.frames("tof/depth/image")[0]
+        with subprocess.Popen(command) as process, RigListener(endpoint, rig="kinects") as listener:
+            wait_until(lambda: listener.frames("tof/depth/image"), START_S, "an image of the simulated camera")
+            first = listener.frames("tof/depth/image")[0]
             server.tell(f"play {first.header.t_host_ns - round(first.seq * 1e9 / 30)} {FILM_HZ}")
-            wait_until(ear.states, START_S, "an estimate")
+            wait_until(listener.states, START_S, "an estimate")
             # TRACKING means with every camera: on a busy machine images are late, so it may take a while.
-            enough, end_s = ear.tracks_since(0, ESTIMATES), time.monotonic() + PATIENCE_S
+            enough, end_s = listener.tracks_since(0, ESTIMATES), time.monotonic() + PATIENCE_S
             wait_until(lambda: enough() or time.monotonic() > end_s, START_S, "the end")
             process.send_signal(signal.SIGTERM)
             process.wait(20)

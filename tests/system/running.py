@@ -37,30 +37,30 @@ def write_rig(path: Path, endpoint: str) -> Path:
 
 
 @dataclass(frozen=True)
-class Heard:
+class Received:
     """A message and when it arrived, CLOCK_MONOTONIC [ns]."""
 
     t_ns: int
     sample: Sample
 
 
-class Ear:
+class RigListener:
     """A client of the rig that keeps everything that was published, images without their pixels."""
 
     def __init__(self, endpoint: str, pattern: str = "**", rig: str = "demo"):
-        self.heard: list[Heard] = []
+        self.received: list[Received] = []
         self._bus = connect(endpoint, rig)
         self._bus.subscribe(pattern, self._take)
 
     def _take(self, sample: Sample) -> None:
         is_image = sample.message == RawImage.DESCRIPTOR.full_name
         kept = Sample(sample.topic, sample.message, b"" if is_image else sample.payload, sample.attachment)
-        self.heard.append(Heard(time.monotonic_ns(), kept))
+        self.received.append(Received(time.monotonic_ns(), kept))
 
     def close(self) -> None:
         self._bus.close()
 
-    def __enter__(self) -> "Ear":
+    def __enter__(self) -> "RigListener":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -87,8 +87,8 @@ class Ear:
 
         return holds
 
-    def _of(self, topic: str) -> list[Heard]:
-        return [one for one in self.heard if one.sample.topic == topic]
+    def _of(self, topic: str) -> list[Received]:
+        return [one for one in self.received if one.sample.topic == topic]
 
 
 def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any:

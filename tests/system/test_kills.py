@@ -23,24 +23,24 @@ def lost(frames: Sequence[FrameInfo]) -> int:
     return numbers[-1] - numbers[0] + 1 - len(numbers)
 
 
-def not_published(ear) -> int:
+def not_published(listener) -> int:
     """Exposures that capture itself says it left out."""
-    counters = ear.health("capture")[-1].counters
+    counters = listener.health("capture")[-1].counters
     return counters["device.sim.late"] + counters[f"dropped.{DEPTH}"]
 
 
 def test_a_killed_tracker_comes_back_and_capture_goes_on(run):
-    process, ear = run
-    boot_id = ear.states()[-1][1].header.boot_id
+    process, listener = run
+    boot_id = listener.states()[-1][1].header.boot_id
     killed_ns = kill(children(process.pid)["track"])
-    wait_until(ear.tracks_since(killed_ns), 30, "TRACKING again")
-    back_ns, state = next((t, s) for t, s in ear.states() if s.header.t_host_ns > killed_ns)
+    wait_until(listener.tracks_since(killed_ns), 30, "TRACKING again")
+    back_ns, state = next((t, s) for t, s in listener.states() if s.header.t_host_ns > killed_ns)
     print(f"estimates again {(back_ns - killed_ns) * 1e-9:.1f} s after kill -9 of the tracker")
     assert state.header.boot_id != boot_id
-    wait_until(lambda: ear.health("run")[-1].counters["restarts.track/sheet"] == 1, 5, "the restart in health")
-    frames = ear.frames(DEPTH)
+    wait_until(lambda: listener.health("run")[-1].counters["restarts.track/sheet"] == 1, 5, "the restart in health")
+    frames = listener.frames(DEPTH)
     # On a busy machine the listener itself may miss one or two that were published.
-    assert lost(frames) <= not_published(ear) + 0.05 * len(frames)
+    assert lost(frames) <= not_published(listener) + 0.05 * len(frames)
 
 
 def newest_image_ns(path) -> int:
@@ -50,10 +50,12 @@ def newest_image_ns(path) -> int:
 
 
 def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_second(run, tmp_path):
-    process, ear = run
-    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in ear.health("record")), 20, "a growing file")
-    late = len(ear.frames(DEPTH)) + 22  # the file was flushed just now; most of a second later there is most to lose
-    wait_until(lambda: len(ear.frames(DEPTH)) > late, 10, "more images")
+    process, listener = run
+    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in listener.health("record")), 20, "a growing file")
+    late = (
+        len(listener.frames(DEPTH)) + 22
+    )  # the file was flushed just now; most of a second later there is most to lose
+    wait_until(lambda: len(listener.frames(DEPTH)) > late, 10, "more images")
     kill(children(process.pid)["record"])
     killed_s = time.time()
     (cut,) = (tmp_path / "takes").glob("*.mcap.active")
@@ -66,10 +68,10 @@ def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_secon
     assert active != cut
     size = active.stat().st_size
     wait_until(lambda: active.stat().st_size > size + 1_000_000, 10, "growth of the new file")
-    frames = ear.frames(DEPTH)
+    frames = listener.frames(DEPTH)
     # On a busy machine the listener itself may miss one or two that were published.
-    assert lost(frames) <= not_published(ear) + 0.05 * len(frames)
-    assert len({state.header.boot_id for _, state in ear.states()}) == 1, "the tracker was not restarted"
+    assert lost(frames) <= not_published(listener) + 0.05 * len(frames)
+    assert len({state.header.boot_id for _, state in listener.states()}) == 1, "the tracker was not restarted"
 
 
 def test_nothing_survives_a_killed_run(run):

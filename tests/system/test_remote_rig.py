@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.system.running import START_S, Ear, kill, wait_until, write_rig
+from tests.system.running import START_S, RigListener, kill, wait_until, write_rig
 
 pytestmark = pytest.mark.slow
 
@@ -36,14 +36,14 @@ def test_what_one_process_captures_another_tracks(endpoint, launch, tmp_path):
     output = tmp_path / "output.jsonl"
     with output.open("w", encoding="utf-8") as stream:
         process = launch("run", rig, "--json", "--no-record", stdout=stream)
-        with Ear(endpoint) as ear:
-            wait_until(ear.tracks_since(0, 30), START_S, "TRACKING from afar")
+        with RigListener(endpoint) as listener:
+            wait_until(listener.tracks_since(0, 30), START_S, "TRACKING from afar")
             lost_ns = kill(capture.pid)
-            wait_until(lambda: _state(ear) == "reconnecting", 15, "noticing that the other process is gone")
+            wait_until(lambda: _state(listener) == "reconnecting", 15, "noticing that the other process is gone")
             launch("capture", cameras, "--listen", f"tcp/{far}")
-            wait_until(lambda: _state(ear) == "streaming", START_S, "reconnecting")
-            wait_until(ear.tracks_since(time.monotonic_ns(), 20), START_S, "TRACKING again")
-            frames = ear.frames("tof/depth/image")
+            wait_until(lambda: _state(listener) == "streaming", START_S, "reconnecting")
+            wait_until(listener.tracks_since(time.monotonic_ns(), 20), START_S, "TRACKING again")
+            frames = listener.frames("tof/depth/image")
         process.send_signal(signal.SIGTERM)
         assert process.wait(15) == 0
     epochs = sorted({frame.epoch for frame in frames})
@@ -57,6 +57,6 @@ def test_what_one_process_captures_another_tracks(endpoint, launch, tmp_path):
     assert np.median(errors) < 3
 
 
-def _state(ear: Ear) -> str:
-    said = ear.health("capture")
+def _state(listener: RigListener) -> str:
+    said = listener.health("capture")
     return said[-1].labels.get("device.sim", "") if said else ""

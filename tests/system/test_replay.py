@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from tests.system.running import Ear, abs_service, wait_until
+from tests.system.running import RigListener, abs_service, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -16,9 +16,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def recording(run, tmp_path):
     """About four seconds of the demo rig, and what the live tracker found."""
-    process, ear = run
-    enough = len(ear.states()) + 60
-    wait_until(lambda: len(ear.states()) > enough, 30, "two more seconds")
+    process, listener = run
+    enough = len(listener.states()) + 60
+    wait_until(lambda: len(listener.states()) > enough, 30, "two more seconds")
     process.send_signal(signal.SIGTERM)
     assert process.wait(10) == 0
     (path,) = (tmp_path / "takes").iterdir()
@@ -62,11 +62,11 @@ def test_at_speed_1_the_estimates_come_at_the_pace_of_the_recording_until_it_end
     path, live = recording
     process = launch("replay", path, "--speed", "1", "--json", stdout=-1)
     begin_s = time.monotonic()
-    with Ear(endpoint, "sheet/state") as ear:
+    with RigListener(endpoint, "sheet/state") as listener:
         out, complaints = process.communicate(timeout=60)
         assert process.returncode == 0, complaints
         print(f"replay at speed 1 took {time.monotonic() - begin_s:.1f} s, start included")
-        stamps_ns = np.array([state.header.t_host_ns for _, state in ear.states()])
+        stamps_ns = np.array([state.header.t_host_ns for _, state in listener.states()])
     estimates = estimates_of(out)
     rate_hz = (len(stamps_ns) - 1) / np.ptp(stamps_ns) * 1e9
     print(f"{len(estimates)} estimates at {rate_hz:.1f} Hz, error {mean_error_mm(estimates):.2f} mm")

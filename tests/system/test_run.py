@@ -64,10 +64,10 @@ def read_whole(path):
 
 
 def test_a_subscriber_receives_nearly_all_estimates_and_ctrl_c_leaves_a_complete_recording(run, tmp_path):
-    process, ear = run
+    process, listener = run
     begin_ns = time.monotonic_ns()
     wait_until(lambda: time.monotonic_ns() - begin_ns > 10_000_000_000, 20, "ten seconds")
-    received = [(t_ns, state) for t_ns, state in ear.states() if state.header.t_host_ns > begin_ns]
+    received = [(t_ns, state) for t_ns, state in listener.states() if state.header.t_host_ns > begin_ns]
     numbers = [state.header.seq for _, state in received]
     share = len(set(numbers)) / (numbers[-1] - numbers[0] + 1)
     ages_ms = [(t_ns - state.header.t_host_ns) * 1e-6 for t_ns, state in received]
@@ -97,8 +97,8 @@ def test_a_subscriber_receives_nearly_all_estimates_and_ctrl_c_leaves_a_complete
 
 
 def test_sigterm_to_run_ends_everything_in_time_and_the_last_line_of_output_is_whole(run, tmp_path):
-    process, ear = run
-    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in ear.health("record")), 20, "a growing file")
+    process, listener = run
+    wait_until(lambda: any(h.gauges["file_bytes"] > 1e6 for h in listener.health("record")), 20, "a growing file")
     took_s = end(process, lambda: process.send_signal(signal.SIGTERM))
     print(f"SIGTERM took {took_s:.1f} s")
     assert took_s < 5

@@ -11,7 +11,7 @@ import pytest
 from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
-from tests.system.running import START_S, TRACKING, Ear, wait_until
+from tests.system.running import START_S, TRACKING, RigListener, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -21,14 +21,14 @@ NAMES = ("left", "right")
 WATCHED_S = 15.0
 
 
-def states(ear, name):
+def states(listener, name):
     """Every estimate of one tracker so far."""
     topic = keys.state(name)
-    return [DeformationState.FromString(one.sample.payload) for one in ear.heard if one.sample.topic == topic]
+    return [DeformationState.FromString(one.sample.payload) for one in listener.received if one.sample.topic == topic]
 
 
-def both_track(ear):
-    return all(Counter(state.status for state in states(ear, name))[TRACKING] > 10 for name in NAMES)
+def both_track(listener):
+    return all(Counter(state.status for state in states(listener, name))[TRACKING] > 10 for name in NAMES)
 
 
 def test_both_track_their_own_sheet_equally_often(endpoint, launch, tmp_path):
@@ -37,11 +37,11 @@ def test_both_track_their_own_sheet_equally_often(endpoint, launch, tmp_path):
     output = tmp_path / "output.jsonl"
     with output.open("w", encoding="utf-8") as stream:
         process = launch("run", rig_file, "--json", "--no-record", stdout=stream)
-        with Ear(endpoint, rig="pair") as ear:
-            wait_until(lambda: both_track(ear), START_S, "TRACKING of both")
-            begin = {name: len(states(ear, name)) for name in NAMES}
+        with RigListener(endpoint, rig="pair") as listener:
+            wait_until(lambda: both_track(listener), START_S, "TRACKING of both")
+            begin = {name: len(states(listener, name)) for name in NAMES}
             time.sleep(WATCHED_S)
-            watched = {name: states(ear, name)[begin[name] :] for name in NAMES}
+            watched = {name: states(listener, name)[begin[name] :] for name in NAMES}
         process.send_signal(signal.SIGTERM)
         assert process.wait(10) == 0
     errors: dict[str, list[float]] = {name: [] for name in NAMES}

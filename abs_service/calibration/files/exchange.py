@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from calib.camera import Camera
 from calib.formats import depthai, kalibr, mrcal, opencv, ros, tf, urdf
 from calib.formats.content import Content, FormatError, Hints, Written
@@ -82,7 +82,7 @@ def read(path: Path, text: str, name: str, hints: Hints) -> Content:
         ExchangeError: it is not of this format, or holds what cannot be expressed.
     """
     if name not in READERS:
-        raise ExchangeError(f"{path}: {name} is only written, not read; {none_of(name, list(READERS))}")
+        raise ExchangeError(f"{path}: {name} is only written, not read; {allowed_instead(name, list(READERS))}")
     try:
         return READERS[name](text, hints)
     except FormatError as error:

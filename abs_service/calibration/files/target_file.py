@@ -8,7 +8,7 @@ from typing import Any
 
 import tomli_w
 
-from abs_service.config.problems import ABSENT, Problem, none_of
+from abs_service.config.problems import ABSENT, Problem, allowed_instead
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError
 
 #: The values of `kind`.
@@ -50,7 +50,7 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
     """
     kind = table.get("kind", ABSENT)
     if kind not in KINDS:
-        raise _error(path, Problem(("kind",), f"the kind of board, {none_of(str(kind), KINDS)}", kind))
+        raise _error(path, Problem(("kind",), f"the kind of board, {allowed_instead(str(kind), KINDS)}", kind))
     Kind = KINDS[kind]
     values = {}
     for key, value in table.items():
@@ -59,7 +59,7 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
             continue
         if name not in {field.name for field in fields(Kind)}:
             allowed = ["kind", *to_table(_EXAMPLES[kind]), *(n for n in _LENGTHS if n in Kind.__dataclass_fields__)]
-            raise _error(path, Problem((key,), f"unknown key of a {kind}, {none_of(key, set(allowed))}", value))
+            raise _error(path, Problem((key,), f"unknown key of a {kind}, {allowed_instead(key, set(allowed))}", value))
         if name in values:
             raise _error(path, Problem((key,), f"{name} is given twice, in m and in mm", value))
         checked = _checked(path, key, name, value)

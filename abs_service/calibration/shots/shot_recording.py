@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from abs_service.bus import keys
-from abs_service.bus.stamps import Speaker
+from abs_service.bus.stamps import HeaderFactory
 from abs_service.calibration.shots.shots import Shot
 from abs_service.capture import sensor_metadata
 from calib.camera import Camera
@@ -22,7 +22,7 @@ class ShotRecording:
 
     Args:
         path: file to write; must not exist.
-        speaker: writes the headers.
+        headers: writes the headers.
         cameras: of all sensors, by name.
         rig_toml: configuration to attach.
 
@@ -30,9 +30,9 @@ class ShotRecording:
         ShotFileError: the file exists, or cannot be written.
     """
 
-    def __init__(self, path: Path, speaker: Speaker, cameras: Mapping[str, Camera], rig_toml: str) -> None:
+    def __init__(self, path: Path, headers: HeaderFactory, cameras: Mapping[str, Camera], rig_toml: str) -> None:
         self._path = path
-        self._speaker = speaker
+        self._headers = headers
         try:
             self._stream = path.open("xb")
         except FileExistsError:
@@ -40,7 +40,7 @@ class ShotRecording:
         except OSError as error:
             raise ShotFileError(f"{path}: cannot be written: {error.strerror}") from error
         self._file = McapFile(self._stream)
-        now_ns = speaker.clock.wall(speaker.clock.monotonic())
+        now_ns = headers.clock.wall(headers.clock.monotonic())
         self._file.attach("rig.toml", "text/toml", rig_toml.encode(), now_ns)
         self._write_cameras(cameras, now_ns)
 
@@ -72,7 +72,7 @@ class ShotRecording:
 
     def _write_cameras(self, cameras: Mapping[str, Camera], wall_ns: int) -> None:
         for sensor, camera in cameras.items():
-            model = sensor_metadata.sensor_model(self._speaker.now(0), sensor, camera, {})
+            model = sensor_metadata.sensor_model(self._headers.now(0), sensor, camera, {})
             calibration = sensor_metadata.calibration(sensor, camera, wall_ns)
             for topic, message in ((keys.model(sensor), model), (keys.calibration(sensor), calibration)):
                 self._file.write(f"/{topic}", message.DESCRIPTOR.full_name, message.SerializeToString(), wall_ns, 0)
@@ -80,7 +80,7 @@ class ShotRecording:
         self._file.write(f"/{keys.TRANSFORMS}", poses.DESCRIPTOR.full_name, poses.SerializeToString(), wall_ns, 0)
 
     def _write_frame(self, frame: Frame) -> None:
-        topic, wall_ns = keys.image(frame.sensor, frame.stream), self._speaker.clock.wall(frame.t_host_ns)
-        info = codec.encode_info(frame, self._speaker.header(frame.t_host_ns, frame.seq))
+        topic, wall_ns = keys.image(frame.sensor, frame.stream), self._headers.clock.wall(frame.t_host_ns)
+        info = codec.encode_info(frame, self._headers.at(frame.t_host_ns, frame.seq))
         self._file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
         self._file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)

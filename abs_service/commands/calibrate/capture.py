@@ -25,7 +25,7 @@ import cv2
 from rich.console import Console
 
 from abs_service import config
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.calibration.files import target_file
 from abs_service.calibration.shots.collection import Collector
 from abs_service.calibration.shots.corner_extraction import see
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     end_ns = time.monotonic_ns() + arguments.limit_s * 1e9
     console = Console(stderr=True)
     with opened(rig, arguments.config) as (devices, cameras):
-        speaker = Speaker(rig.name, WallClock())
+        headers = HeaderFactory(rig.name, WallClock())
         shots = LiveShots(
             devices,
             cameras,
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
             lambda: stop.is_set() or time.monotonic_ns() > end_ns,
         )
         collector = Collector(_sizes(devices))
-        recording = ShotRecording(arguments.out, speaker, cameras, config.to_toml(rig))
+        recording = ShotRecording(arguments.out, headers, cameras, config.to_toml(rig))
         guide = LiveGuide(console) if console.is_terminal else LineGuide(console)
         try:
             with shots, guide:

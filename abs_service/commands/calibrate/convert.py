@@ -22,7 +22,7 @@ from pathlib import Path
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
 from abs_service.commands import calibrations
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
@@ -132,10 +132,10 @@ def _chosen(contents: list[Content], options: Options) -> Content:
     there = [name for content in contents for name in content.cameras]
     unknown = [name for name in options.names if name not in there]
     if unknown:
-        raise ConvertError(f"--rename {unknown[0]}: no such sensor, {none_of(unknown[0], there)}")
+        raise ConvertError(f"--rename {unknown[0]}: no such sensor, {allowed_instead(unknown[0], there)}")
     unknown = [name for name in options.sensors if name not in cameras]
     if unknown:
-        raise ConvertError(f"--sensor {unknown[0]}: no such sensor, {none_of(unknown[0], cameras)}")
+        raise ConvertError(f"--sensor {unknown[0]}: no such sensor, {allowed_instead(unknown[0], cameras)}")
     wanted = options.sensors or tuple(cameras)
     size = options.hints.size
     return Content({name: resized(cameras[name], *size) if size else cameras[name] for name in wanted}, tuple(lost))

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.solving import Material, SolveOptionError
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
 
@@ -46,5 +46,7 @@ def _sensor(wanted: str | None, found: Material) -> str:
     if wanted is None and len(there) == 1:
         return there[0]
     if wanted not in there:
-        raise SolveOptionError(f"--sensor {wanted or ''}: boards were seen by several, {none_of(wanted or '', there)}")
+        raise SolveOptionError(
+            f"--sensor {wanted or ''}: boards were seen by several, {allowed_instead(wanted or '', there)}"
+        )
     return wanted

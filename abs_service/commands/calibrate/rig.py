@@ -20,7 +20,7 @@ from collections.abc import Iterable
 
 from abs_service.commands.calibrate import solving
 from abs_service.commands.calibrate.solving import Material, SolveOptionError
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
 #: What `--depth-terms` may say.
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
         _check_names(option, names, there)
     for name, term in terms.items():
         if term not in TERMS:
-            raise SolveOptionError(f"--depth-terms {name}={term}: {none_of(term, TERMS)}")
+            raise SolveOptionError(f"--depth-terms {name}={term}: {allowed_instead(term, TERMS)}")
     with_corners = {view.sensor for view in found.seen.corners}
     sensors = {
         name: solving.sensor_task(
@@ -79,7 +79,7 @@ def _views(found: Material) -> list:
 def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:
     for name in names:
         if name not in there:
-            raise SolveOptionError(f"{option} {name}: no sensor that saw the board, {none_of(name, there)}")
+            raise SolveOptionError(f"{option} {name}: no sensor that saw the board, {allowed_instead(name, there)}")
 
 
 def _reference(found: Material, there: list[str], free_running: list[str]) -> str:

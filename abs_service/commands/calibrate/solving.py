@@ -20,7 +20,7 @@ from abs_service.calibration.shots.shot_sources import FolderShots, RecordingSho
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands import calibrations
 from abs_service.commands.calibrate import live
-from abs_service.config.problems import none_of
+from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.board import coverage
@@ -139,7 +139,7 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     lenses = named(arguments.lens, "--lens")
     kind = lenses.get(name, kind_of(factory[0].lens).name if factory else "brown-conrady")
     if kind not in KINDS:
-        raise SolveOptionError(f"--lens {name}={kind}: {none_of(kind, KINDS)}")
+        raise SolveOptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")
     if factory and name in lenses and kind_of(factory[0].lens).make is not KINDS[kind].make and not keeps:
         factory = ()  # of another family: nothing to start from
     if keeps and not factory:

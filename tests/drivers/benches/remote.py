@@ -13,7 +13,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Subscription
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.session import Role
-from abs_service.bus.stamps import Speaker, WallClock
+from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.capture import sensor_metadata
 from abs_service.wire.message_header import CONFIG, MODEL
@@ -34,13 +34,13 @@ class Peer:
 
     def __init__(self, rig: str, endpoint: str, role: Role) -> None:
         self.bus = ZenohBus.open(rig, endpoint, role, shared_memory=False)
-        speaker = Speaker(rig, WallClock())
-        self.publisher = FramePublisher(self.bus, speaker, "sim")
-        model = sensor_metadata.sensor_model(speaker.now(0), "tof", CAMERAS["tof"], {})
-        self.bus.announce(keys.model("tof"), MODEL).put(model.SerializeToString())
-        toml = sensor_metadata.config(speaker.now(0), '[sensors.tof]\ndevice = "sim"\n')
-        self.bus.announce(keys.CONFIG, CONFIG).put(toml.SerializeToString())
-        self.alive: Subscription = self.bus.show_alive("capture")
+        headers = HeaderFactory(rig, WallClock())
+        self.publisher = FramePublisher(self.bus, headers, "sim")
+        model = sensor_metadata.sensor_model(headers.now(0), "tof", CAMERAS["tof"], {})
+        self.bus.latched_publisher(keys.model("tof"), MODEL).put(model.SerializeToString())
+        toml = sensor_metadata.config(headers.now(0), '[sensors.tof]\ndevice = "sim"\n')
+        self.bus.latched_publisher(keys.CONFIG, CONFIG).put(toml.SerializeToString())
+        self.alive: Subscription = self.bus.declare_liveliness("capture")
         self.frames = [frame for frame in SIMULATION.frames(0) if frame.sensor == "tof"]
         self.fault, self.begin, self.seq, self.epoch = Fault.NONE, 0, 0, 5_000
         self.stop = threading.Event()
@@ -55,7 +55,7 @@ class Peer:
         """Captures again, if it has ceased to."""
         if self.fault == Fault.UNPLUG:
             self.alive.close()
-            self.alive = self.bus.show_alive("capture")
+            self.alive = self.bus.declare_liveliness("capture")
         self.fault = Fault.NONE
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ def error_of(source: str, problems: list[Problem]) -> ConfigError:
     """All problems of a file as one error."""
     if len(problems) == 1:
         return ConfigError(f"{source}: {problems[0]}")
-    return ConfigError("\n".join([f"{source}: {len(problems)} mistakes", *(f"  {problem}" for problem in problems)]))
+    return ConfigError("\n".join([f"{source}: {len(problems)} errors", *(f"  {problem}" for problem in problems)]))
 
 
 def allowed_at(root: type[BaseModel], key: Key) -> Collection[str]:
