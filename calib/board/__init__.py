@@ -1,1 +1,1 @@
-"""Calibration boards: what they are, where an image shows them, and whether a set of views is enough."""
+"""Calibration boards: geometry, corner detection, and coverage of a set of views."""

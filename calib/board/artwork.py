@@ -1,4 +1,4 @@
-"""What is printed on a board: black and white shapes in the board's frame, for paper and for simulated boards alike."""
+"""Printed pattern of a board: black shapes in the board's frame, for paper and for simulation."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Artwork:
 
 
 def artwork(target: Target) -> Artwork:
-    """The shapes of a board in its own frame: the first corner, or the first disc's centre, is at (0, 0)."""
+    """Shapes of a board in its own frame, with the first corner, or the centre of the first disc, at (0, 0)."""
     if isinstance(target, Chessboard):
         return Artwork(_black_squares(target.columns + 1, target.rows + 1, target.square), np.zeros((0, 3)))
     if isinstance(target, Charuco):
@@ -38,7 +38,7 @@ def artwork(target: Target) -> Artwork:
 
 
 def _squares(columns: int, rows: int, square: float, odd: int) -> NDArray[np.float64]:
-    """Left, top, width, height of the squares whose column and row add up to an even number, or to an odd one."""
+    """Left, top, width, height of the squares whose column and row sum is even (odd = 0) or odd (odd = 1)."""
     row, column = np.indices((rows, columns))
     chosen = (row + column) % 2 == odd
     edge = np.full(np.count_nonzero(chosen), square)
@@ -50,7 +50,7 @@ def _black_squares(columns: int, rows: int, square: float) -> NDArray[np.float64
 
 
 def _markers(target: Charuco) -> NDArray[np.float64]:
-    """The black cells of all markers, those side by side in a row joined, so that no gap shows between them."""
+    """Black cells of all markers; adjacent cells of a row are merged, so that no gaps appear between them."""
     dictionary = target.markers()
     cells = dictionary.markerSize + 2 * _FRAME
     cell = target.marker / cells
@@ -67,16 +67,16 @@ def _markers(target: Charuco) -> NDArray[np.float64]:
     return np.array(found)
 
 
-def raster(target: Target, density: float, samples: int = 4) -> tuple[NDArray[np.float32], tuple[float, float]]:
-    """The print as an image of how white it is, 0 to 1, with a white rim as wide as its margin.
+def rasterize(target: Target, density: float, samples: int = 4) -> tuple[NDArray[np.float32], tuple[float, float]]:
+    """Image of the print, 0 (black) to 1 (white), with a white border as wide as its margin.
 
     Args:
         target: the board.
         density: pixels per metre.
-        samples: per pixel and axis; a pixel is the mean of what they see.
+        samples: supersampling per pixel and axis.
 
     Returns:
-        The image (rows, columns), and where the centre of its first pixel is in the board's frame, (x, y) [m].
+        The image (rows, columns), and the position of its first pixel's centre in the board's frame, (x, y) [m].
     """
     shapes, points = artwork(target), target.points()[:, :2]
     rim = 2 * target.margin

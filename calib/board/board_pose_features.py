@@ -1,4 +1,4 @@
-"""How a board stands in an image, roughly: enough to tell views apart before any camera is known."""
+"""Features of a board's pose in an image, computable without calibration; used to tell views apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ import numpy as np
 from calib import pose
 from calib.views import CornerView
 
-#: Two stances differ by so much in place (of half the image), in size (a factor), or in an angle [rad].
+#: Two poses differ if they are this far apart in position (of half the image), size (a factor), or an angle [rad].
 _PLACE, _SIZE, _ANGLE = 0.2, 1.2, np.deg2rad(8)
 
 
 @dataclass(frozen=True, slots=True)
-class Stance:
-    """How a board stands.
+class BoardPose:
+    """Approximate pose of a board in an image.
 
     Attributes:
-        place: of its middle in the image, (-1, -1) the upper left corner and (1, 1) the lower right one.
-        size: the larger of its width and height, as part of the image's.
-        tilt: angles that it is turned by to the sides and up and down [rad]: the direction that its print faces, as
-            the sensor sees it, has positive components for right and down.
+        place: position of its centre in the image, from (-1, -1), the upper left corner, to (1, 1), the lower right.
+        size: the larger of its width and height, relative to the image's.
+        tilt: rotation to the sides and up and down [rad]: the viewing direction of the print, as seen by the sensor,
+            has positive components for right and down.
         roll: angle of its rows in the image [rad].
     """
 
@@ -31,11 +31,11 @@ class Stance:
     roll: float
 
 
-def stance(view: CornerView, size: tuple[int, int]) -> Stance:
-    """How the board stands in a view of an image of width and height `size` [px].
+def board_pose_features(view: CornerView, size: tuple[int, int]) -> BoardPose:
+    """Approximate pose of the board in a view of an image of width and height `size` [px].
 
-    The focal length is taken to be the image's longer side, a lens of 53°; tilts of other lenses come out as too small
-    or too large by up to a half.
+    The focal length is assumed to be the image's longer side (53° field of view); for other lenses tilts are wrong by
+    up to a factor of 1.5.
     """
     low, high = view.pixels.min(axis=0), view.pixels.max(axis=0)
     middle, half = (np.array(size) - 1) / 2, np.array(size) / 2
@@ -44,16 +44,16 @@ def stance(view: CornerView, size: tuple[int, int]) -> Stance:
     ideal = np.ascontiguousarray((view.pixels - middle) / max(size))
     found, rotation, _ = cv2.solvePnP(view.points_b, ideal, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
     if not found:
-        return Stance((float(place[0]), float(place[1])), share, (0.0, 0.0), 0.0)
+        return BoardPose((float(place[0]), float(place[1])), share, (0.0, 0.0), 0.0)
     R = pose.from_rotation_vector(rotation.ravel(), np.zeros(3))[:3, :3]
-    # The print faces away from z of the board.
+    # The print faces the negative z axis of the board.
     across, along = (float(np.arcsin(np.clip(-R[axis, 2], -1, 1))) for axis in (0, 1))
     roll = float(np.arctan2(R[1, 0], R[0, 0]))
-    return Stance((float(place[0]), float(place[1])), share, (across, along), roll)
+    return BoardPose((float(place[0]), float(place[1])), share, (across, along), roll)
 
 
-def differs(a: Stance, b: Stance) -> bool:
-    """Whether two stances are different enough to be two views."""
+def differs(a: BoardPose, b: BoardPose) -> bool:
+    """True if two poses are different enough to count as two views."""
     place = max(abs(x - y) for x, y in zip(a.place, b.place))
     tilt = max(abs(x - y) for x, y in zip(a.tilt, b.tilt))
     roll = abs((a.roll - b.roll + np.pi) % (2 * np.pi) - np.pi)
@@ -62,6 +62,6 @@ def differs(a: Stance, b: Stance) -> bool:
 
 
 def extent(views: Sequence[CornerView]) -> tuple[int, int]:
-    """A width and height that all views fit into, for when those of the image are not known [px]."""
+    """Width and height that contain the corners of all views [px], for an unknown image size."""
     largest = np.max([view.pixels.max(axis=0) for view in views], axis=0)
     return int(largest[0]) + 2, int(largest[1]) + 2

@@ -1,4 +1,4 @@
-"""What a depth sensor says of a board: its distances where the board's white is, and nothing beside it."""
+"""Distances that a depth sensor measures on the white parts of a board."""
 
 import cv2
 import numpy as np
@@ -11,13 +11,13 @@ from calib.lens import LensError
 from calib.pose import Pose
 from calib.views import CornerView, PlaneView
 
-#: Distances at rims of squares and boards are mixtures; so many pixels are left out along the region's edge.
+#: Erosion of regions [px], because distances at edges of squares and boards are mixed.
 _RIM_PX = 2
-#: More pixels say no more about a plane that is held once.
-MOST_PIXELS = 2000
-#: Fewer say nothing.
-LEAST_PIXELS = 30
-#: Dark and bright amplitudes are told apart where one is this many times the other.
+#: Maximum number of pixels of a view; more add no information about a plane.
+MAX_PIXELS = 2000
+#: Minimum number of pixels.
+MIN_PIXELS = 30
+#: Minimum ratio of bright to dark amplitudes for a segmentation.
 _CONTRAST = 1.5
 
 Mask = NDArray[np.bool_]
@@ -32,8 +32,8 @@ def region(pixels: NDArray[np.float64], shape: tuple[int, int]) -> Mask:
     return cv2.erode(inside, kernel, borderType=cv2.BORDER_CONSTANT, borderValue=0) > 0
 
 
-def bright(amplitude: NDArray[np.integer | np.floating], inside: Mask) -> Mask:
-    """The pixels of a region (height, width) on white, if there is black in it at all; the others have weak returns."""
+def white_pixels(amplitude: NDArray[np.integer | np.floating], inside: Mask) -> Mask:
+    """Pixels of a region (height, width) on white; all of them if it contains no black, whose returns are weak."""
     low, high = np.percentile(amplitude[inside].astype(np.float64), (10, 90)) if inside.any() else (1.0, 1.0)
     return inside if high < _CONTRAST * low else inside & (amplitude > 0.5 * (low + high))
 
@@ -46,21 +46,21 @@ def plane_view(
     distance: NDArray[np.floating],
     sigma: NDArray[np.floating],
 ) -> PlaneView | None:
-    """The distances that a sensor measured on a board.
+    """Distances that a sensor measured on a board.
 
     Args:
-        sensor, shot, t_s: as of a `PlaneView`.
-        inside: pixels (height, width) on the board, `region` of it and `bright`.
+        sensor, shot, t_s: see `PlaneView`.
+        inside: pixels (height, width) on the board: `region` and `white_pixels`.
         distance: radial distances (height, width) [m], NaN without return.
-        sigma: their deviations (height, width) [m]; where they are NaN, what neighbouring distances scatter by.
+        sigma: their deviations (height, width) [m]; NaN is replaced by the scatter of neighbouring distances.
 
     Returns:
-        The view, thinned out to `MOST_PIXELS`; None if there are fewer than `LEAST_PIXELS` distances.
+        The view, subsampled to `MAX_PIXELS`; None with fewer than `MIN_PIXELS` distances.
     """
     rows, columns = np.nonzero(inside & np.isfinite(distance))
-    if len(rows) < LEAST_PIXELS:
+    if len(rows) < MIN_PIXELS:
         return None
-    chosen = np.linspace(0, len(rows) - 1, min(len(rows), MOST_PIXELS)).round().astype(int)
+    chosen = np.linspace(0, len(rows) - 1, min(len(rows), MAX_PIXELS)).round().astype(int)
     rows, columns = rows[chosen], columns[chosen]
     known = sigma[rows, columns].astype(np.float64)
     return PlaneView(
@@ -69,15 +69,15 @@ def plane_view(
         t_s=t_s,
         pixels=np.stack([columns, rows], axis=1).astype(np.float64),
         distances=distance[rows, columns].astype(np.float64),
-        sigmas=np.where(known > 0, known, scatter(distance, inside)),
+        sigmas=np.where(known > 0, known, estimate_sigma(distance, inside)),
     )
 
 
-def scatter(distance: NDArray[np.floating], inside: Mask) -> float:
-    """What distances (height, width) in a region scatter by from pixel to pixel [m].
+def estimate_sigma(distance: NDArray[np.floating], inside: Mask) -> float:
+    """Standard deviation of distances (height, width) in a region from pixel to pixel [m].
 
     Second differences along rows, x₂ − 2 x₁ + x₀, cancel a slope and have √6 times the deviation of independent noise.
-    Steps in which distances come are at least a part of what they scatter by, 1/√12 of a step.
+    The quantisation step gives the lower bound 1/√12 of a step.
     """
     used = np.where(inside, distance, np.nan).astype(np.float64)
     differences = np.abs(np.diff(used, n=2, axis=1))
@@ -89,7 +89,7 @@ def scatter(distance: NDArray[np.floating], inside: Mask) -> float:
 
 
 def board_pose(view: CornerView, camera: Camera) -> Pose | None:
-    """Roughly where a board is, `T_rb`, as one camera sees it; None if it cannot be told.
+    """Approximate pose `T_rb` of a board from one camera; None if undetermined.
 
     Args:
         view: four corners or more.
@@ -107,9 +107,9 @@ def board_pose(view: CornerView, camera: Camera) -> Pose | None:
 
 
 def projected_region(target: Target, T_rb: Pose, camera: Camera, slack_px: float) -> Mask:
-    """Pixels (height, width) that see the inner part of a board of roughly known pose, `slack_px` inside its points.
+    """Pixels (height, width) on the inner part of a board of approximately known pose, `slack_px` inside its points.
 
-    For sensors that measure distances and see no print. Empty if the board is not wholly in front of the camera.
+    For sensors that measure distances only. Empty if the board is not entirely in front of the camera.
     """
     shape = (camera.height, camera.width)
     pixels = camera.project(pose.transform(T_rb, target.points()))

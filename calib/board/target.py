@@ -1,4 +1,4 @@
-"""The kinds of boards there are, in the frame of `calib.views`: origin in the first corner, x along the first row."""
+"""Kinds of boards, in the frame of `calib.views`: origin in the first corner, x along the first row."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -14,24 +14,24 @@ Dictionary = Literal[
     "6x6_250", "6x6_1000", "7x7_50", "7x7_100", "7x7_250", "7x7_1000", "original",
 ]  # fmt: skip
 
-#: OpenCV's sets of markers; their order is that of its numbers.
+#: OpenCV's marker dictionaries, in the order of its enumeration.
 DICTIONARIES: tuple[Dictionary, ...] = get_args(Dictionary)
 
 
 class TargetError(ValueError):
-    """Numbers that describe no board; the message begins with the attribute that is wrong."""
+    """Invalid board parameters; the message begins with the wrong attribute."""
 
 
 @dataclass(frozen=True)
 class Chessboard:
     """Black and white squares, black in the upper left corner; its corners are where four squares meet.
 
-    With `columns + rows` odd there is one way up. Otherwise a board that is turned by 180° looks the same, and corners
-    are counted so that x points to the right of the image: sensors that are rolled by 90° and more will disagree.
+    With `columns + rows` odd the orientation is unique. Otherwise the board is symmetric under rotation by 180°, and
+    corners are numbered so that x points to the right in the image: sensors rolled by 90° or more will disagree.
 
     Attributes:
         columns, rows: inner corners along x and y: one less than squares.
-        square: edge of a square [m].
+        square: edge length of a square [m].
     """
 
     columns: int
@@ -54,7 +54,7 @@ class Chessboard:
 
     @property
     def margin(self) -> float:
-        """How far the print reaches beyond the outer points [m]."""
+        """Extent of the print beyond the outer points [m]."""
         return self.square
 
     def points(self) -> Points:
@@ -64,14 +64,15 @@ class Chessboard:
 
 @dataclass(frozen=True)
 class Charuco:
-    """A chessboard with an ArUco marker in every white square, which is found even where only a part is seen.
+    """Chessboard with an ArUco marker in every white square; may be partly visible.
 
-    It has one way up whatever its size, and the only kind that tells a mirror image. Markers are numbered row by row.
+    Its orientation is always unique, and it is the only board that reveals a mirrored image. Markers are numbered by
+    rows.
 
     Attributes:
-        columns, rows: squares along x and y; there is a corner less each way.
-        square, marker: edges of a square and of a marker [m].
-        dictionary: OpenCV's set that the markers are taken from.
+        columns, rows: squares along x and y; there is one corner less each way.
+        square, marker: edge lengths of a square and of a marker [m].
+        dictionary: OpenCV's marker dictionary.
     """
 
     columns: int
@@ -104,11 +105,11 @@ class Charuco:
 
     @property
     def margin(self) -> float:
-        """How far the print reaches beyond the outer points [m]."""
+        """Extent of the print beyond the outer points [m]."""
         return self.square
 
     def points(self) -> Points:
-        """Corners row by row (n, 3) [m]; the row number in it is the corner's number in OpenCV."""
+        """Corners row by row (n, 3) [m]; the row index is OpenCV's corner id."""
         return _lattice(*self.grid, self.square)
 
     def markers(self) -> cv2.aruco.Dictionary:
@@ -120,7 +121,7 @@ class Charuco:
 class Circles:
     """Black discs on a regular grid.
 
-    Turned by 180° it looks the same; discs are counted so that x points to the right of the image.
+    Symmetric under rotation by 180°; discs are numbered so that x points to the right in the image.
 
     Attributes:
         columns, rows: discs along x and y.
@@ -143,7 +144,7 @@ class Circles:
 
     @property
     def margin(self) -> float:
-        """How far the print reaches beyond the outer points [m]."""
+        """Extent of the print beyond the outer points [m]."""
         return self.diameter / 2
 
     def points(self) -> Points:
@@ -153,7 +154,7 @@ class Circles:
 
 @dataclass(frozen=True)
 class AsymmetricCircles:
-    """Black discs in rows that are shifted against each other, every second row by `spacing`; it has one way up.
+    """Black discs in rows that are shifted against each other, every second row by `spacing`; unique orientation.
 
     Attributes:
         columns: discs in a row.
@@ -179,7 +180,7 @@ class AsymmetricCircles:
 
     @property
     def margin(self) -> float:
-        """How far the print reaches beyond the outer points [m]."""
+        """Extent of the print beyond the outer points [m]."""
         return self.diameter / 2
 
     def points(self) -> Points:
@@ -192,7 +193,7 @@ Target = Chessboard | Charuco | Circles | AsymmetricCircles
 
 
 def outline(target: Target) -> Points:
-    """Corners (4, 3) [m] of the rectangle that the print fills, clockwise from the upper left."""
+    """Corners (4, 3) [m] of the rectangle of the print, clockwise from the upper left."""
     points, margin = target.points()[:, :2], target.margin
     (left, top), (right, bottom) = points.min(axis=0) - margin, points.max(axis=0) + margin
     return np.array([[left, top, 0], [right, top, 0], [right, bottom, 0], [left, bottom, 0]])

@@ -1,6 +1,6 @@
-"""Whether a stored calibration still explains what its sensors see, and if not, which sensor has moved.
+"""Check of a stored calibration against new views, with identification of a sensor that has moved.
 
-Boards are placed anew, everything else stays as it was stored. Three questions: does each camera explain its own
-corners; has a pair of sensors moved relative to each other, by more than the stored and the new covariance allow; and
-which single sensor, set free, explains it all.
+Board poses are estimated anew, everything else is fixed. Three questions are answered: does each camera fit its own
+corners; has a pair of sensors moved relative to each other by more than the stored and new covariances allow; and which
+single sensor, with a free pose, removes the residuals.
 """

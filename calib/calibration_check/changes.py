@@ -1,4 +1,4 @@
-"""By how much pairs of sensors moved relative to each other, and how sure that is."""
+"""Relative motion of pairs of sensors since the calibration, with its significance."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,25 +16,25 @@ from calib.pose import Pose
 from calib.solve.bundle import rotations
 from calib.solve.bundle.layout import POSE
 
-#: Fewest shots that two sensors are compared in.
-LEAST_SHOTS = 3
+#: Minimum number of common shots of two sensors.
+MIN_SHOTS = 3
 
-#: A change that chance makes in one check of a thousand is none.
+#: Threshold of significance: exceeded by chance in one check of a thousand.
 QUANTILE = float(stats.chi2.ppf(0.999, 6))
 
 
 @dataclass(frozen=True)
 class PairChange:
-    """How a sensor moved relative to another since the calibration.
+    """Motion of a sensor relative to another since the calibration.
 
     Attributes:
         first, second: the sensors.
-        shots: number of shots that both saw.
+        shots: number of common shots.
         turn: rotation vector about the rig's axes (3,) [rad].
-        move: displacement (3,) [m].
-        shift_px: how far it moves what the second sensor sees [px], root mean square.
-        sigma_px: one deviation of that by chance, in the stored and the new calibration together [px].
-        squared: squared Mahalanobis distance of turn and move; chi-squared with 6 degrees of freedom by chance.
+        move: translation (3,) [m].
+        shift_px: resulting shift in the second sensor's image [px], root mean square.
+        sigma_px: standard deviation of that shift, from the stored and the new covariance [px].
+        squared: squared Mahalanobis distance of turn and move; chi-squared with 6 degrees of freedom without motion.
     """
 
     first: str
@@ -48,12 +48,12 @@ class PairChange:
 
     @property
     def is_significant(self) -> bool:
-        """Whether chance does not explain it."""
+        """True if the motion is significant."""
         return self.squared > QUANTILE
 
 
 def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
-    """Of all pairs that saw the board together in enough shots, and of which one at least sees corners."""
+    """Motion of all pairs with enough common shots, in which at least one sensor detects corners."""
     shots = views.shots
     seeing = {view.sensor for view in views.corners}
     present = [name for name in stored.sensors if name in shots]
@@ -62,7 +62,7 @@ def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
     return [
         _change(stored, views.of(pair, both), pair, len(both))
         for pair, both in common.items()
-        if len(both) >= LEAST_SHOTS
+        if len(both) >= MIN_SHOTS
     ]
 
 
@@ -89,9 +89,9 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> 
 
 
 def _relative_covariance(stored: Stored, first: str, second: str) -> NDArray[np.float64]:
-    """Stored covariance (6, 6) of the second sensor's pose as seen from the first; zero where nothing is known.
+    """Stored covariance (6, 6) of the second sensor's pose relative to the first; zero if unknown.
 
-    A turn of the first sensor about itself carries the second along.
+    A rotation of the first sensor translates the second relative to it.
     """
     if stored.covariance is None:
         return np.zeros((6, 6))
@@ -119,7 +119,7 @@ def _points(boards: Mapping[int, Pose], camera: Camera, views: Views, sensor: st
 
 
 def _shift(camera: Camera, points_r: NDArray[np.float64], change: NDArray[np.float64]) -> float:
-    """Root mean square of the pixels by which a small turn and displacement (6,) of a camera moves points [px]."""
+    """Root mean square shift [px] of points by a small rotation and translation (6,) of a camera."""
     T_rs = camera.T_rs.copy()
     T_rs[:3, :3] = rotations.exponential(change[None, :3])[0] @ T_rs[:3, :3]
     T_rs[:3, 3] += change[3:]

@@ -1,4 +1,4 @@
-"""Does each camera explain its own corners, and which sensor, set free, explains the rest?"""
+"""Fit of each stored camera to its own corners, and hypotheses about a sensor that moved."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,24 +8,24 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from calib.calibration_check.board_poses import cost, loss, solve
-from calib.calibration_check.changes import LEAST_SHOTS
+from calib.calibration_check.changes import MIN_SHOTS
 from calib.calibration_check.stored import Stored, Views
 from calib.solve.bundle import robust
-from calib.solve.start.board_poses import sightings
+from calib.solve.start.board_poses import pose_candidates
 
-#: A sensor that explains this share of what does not fit may have moved …
+#: A sensor is a suspect if its motion explains this share of the excess cost …
 EXPLAINS = 0.9
 
-#: … unless another leaves so many times less.
+#: … and the remaining cost is at most this many times that of the best hypothesis.
 RIVAL = 4.0
 
 
 @dataclass(frozen=True)
-class OwnFit:
-    """How well a stored camera explains its own corners, each board placed for itself.
+class CornerFit:
+    """Residuals of a stored camera on its own corners, with free board poses.
 
     Attributes:
-        pixels, residuals: of the corners (n, 2) [px]; predicted less measured.
+        pixels, residuals: of the corners (n, 2) [px]; predicted minus measured.
         views: number of views.
     """
 
@@ -35,27 +35,27 @@ class OwnFit:
 
     @property
     def rms(self) -> float:
-        """Root mean square of a corner's miss [px], gross errors left out."""
+        """Root mean square reprojection error [px] without gross errors."""
         squares = np.sum(self.residuals**2, axis=1)
         return float(np.sqrt(np.mean(squares[squares <= robust.OUTLIER**2 * np.median(squares)])))
 
 
-def own_fit(stored: Stored, views: Views, sensor: str) -> OwnFit:
-    """Of one sensor that sees corners."""
+def corner_fit(stored: Stored, views: Views, sensor: str) -> CornerFit:
+    """Residuals of one sensor that detects corners."""
     own = Views([view for view in views.corners if view.sensor == sensor], ())
     adjusted = solve(stored, own, ())
     group = adjusted.equations.groups[0]
     residuals = (adjusted.residuals.reshape(-1, 2)) * group.measured.sigmas[:, None]
-    return OwnFit(group.measured.pixels, residuals, len(own.corners))
+    return CornerFit(group.measured.pixels, residuals, len(own.corners))
 
 
 @dataclass(frozen=True)
 class DistanceBias:
-    """By how much a sensor's distances to boards exceed those that its own corners say.
+    """Mean difference between a sensor's measured distances and those derived from its corners.
 
     Attributes:
         mean: over the views [m].
-        sigma: deviation of the mean, as the views scatter [m].
+        sigma: standard error of the mean, from the scatter of the views [m].
         views: number of views.
     """
 
@@ -65,9 +65,9 @@ class DistanceBias:
 
 
 def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | None:
-    """Of a sensor that sees corners and measures distances in the same shots; None if there are fewer than three."""
+    """Bias of a sensor with corners and distances in the same shots; None with fewer than three."""
     corners = [view for view in views.corners if view.sensor == sensor]
-    boards = {view.shot: sightings(stored.sensors[sensor].camera, view) for view in corners}
+    boards = {view.shot: pose_candidates(stored.sensors[sensor].camera, view) for view in corners}
     state = stored.sensors[sensor]
     excesses: list[float] = []
     for view in views.planes:
@@ -77,7 +77,7 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
             true = (T_sb[:3, 2] @ T_sb[:3, 3]) / (directions @ T_sb[:3, 2])
             predicted = (1 + state.depth_scale) * true + state.depth_offset
             excesses.append(float(np.median(view.distances - predicted)))
-    if len(excesses) < LEAST_SHOTS:
+    if len(excesses) < MIN_SHOTS:
         return None
     return DistanceBias(
         float(np.mean(excesses)), float(np.std(excesses, ddof=1) / np.sqrt(len(excesses))), len(excesses)
@@ -85,34 +85,34 @@ def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | N
 
 
 @dataclass(frozen=True)
-class Explanation:
-    """What setting one sensor free makes of what does not fit.
+class MotionHypothesis:
+    """Result of the hypothesis that one sensor moved.
 
     Attributes:
-        share: that goes away, 0…1.
-        left: that stays, in squared deviations; chi-squared with 6 degrees of freedom for each sensor but two, if this
-            sensor is the only one that moved and the others stand exactly as they were stored.
+        share: motion_hypotheses share of the excess cost, 0…1.
+        left: remaining cost, in squared deviations; chi-squared with 6 degrees of freedom for each sensor but two, if
+            this sensor is the only one that moved and the others are exactly as stored.
     """
 
     share: float
     left: float
 
 
-def explained(stored: Stored, views: Views) -> dict[str, Explanation]:
-    """What each sensor would explain, by sensor.
+def motion_hypotheses(stored: Stored, views: Views) -> dict[str, MotionHypothesis]:
+    """Result of each hypothesis, by sensor.
 
-    All hypotheses are compared with the same deviations: those with which everything is free.
+    All hypotheses are compared with the same deviations: those estimated with all poses free.
     """
     names = list(views.shots)
     everything = solve(stored, views, names[1:])
     least = float(np.sum(loss(everything.residuals)))
     gap = max(cost(stored, views, (), everything.factors) - least, 1e-12)
     left = {name: max(cost(stored, views, (name,), everything.factors) - least, 0.0) for name in names}
-    return {name: Explanation(float(np.clip(1 - one / gap, 0, 1)), one) for name, one in left.items()}
+    return {name: MotionHypothesis(float(np.clip(1 - one / gap, 0, 1)), one) for name, one in left.items()}
 
 
-def suspects(explanations: Mapping[str, Explanation]) -> list[str]:
-    """The sensors any of which may be the one that moved; none if no single one explains it."""
+def moved_candidates(explanations: Mapping[str, MotionHypothesis]) -> list[str]:
+    """Sensors that may be the one that moved; none if no single motion explains the residuals."""
     if not explanations:
         return []
     chance = float(stats.chi2.ppf(0.999, 6 * max(len(explanations) - 2, 1)))

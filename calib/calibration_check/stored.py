@@ -1,4 +1,4 @@
-"""What a recheck compares: a calibration as it was stored, and new views of a board."""
+"""Input of a calibration check: a stored calibration, and new views of a board."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,22 +8,22 @@ from numpy.typing import NDArray
 
 from calib.solve.bundle.layout import POSE
 from calib.solve.bundle.state import SensorState
-from calib.solve.start.board_poses import sightings
+from calib.solve.start.board_poses import pose_candidates
 from calib.views import CornerView, PlaneView
 
 
-class RecheckError(ValueError):
-    """Views that say nothing about a calibration."""
+class CalibrationCheckError(ValueError):
+    """Views that do not allow a check of the calibration."""
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A calibration as it was stored.
+    """Stored calibration.
 
     Attributes:
         sensors: cameras and depth terms.
-        names: of parameters with known covariance, `color.rotation_x` and so on.
-        covariance: theirs (n, n).
+        names: of parameters with known covariance, such as `color.rotation_x`.
+        covariance: of these parameters (n, n).
     """
 
     sensors: Mapping[str, SensorState]
@@ -31,20 +31,20 @@ class Stored:
     covariance: NDArray[np.float64] | None = None
 
     def of_pose(self, sensor: str) -> list[int]:
-        """Rows of the covariance of a sensor's pose; empty if it was not determined."""
+        """Rows of the covariance of a sensor's pose; empty if it is unknown."""
         wanted = [f"{sensor}.{name}" for name in POSE]
         return [self.names.index(name) for name in wanted] if set(wanted) <= set(self.names) else []
 
 
 @dataclass(frozen=True)
 class Views:
-    """What the sensors saw of a board."""
+    """New views of a board."""
 
     corners: Sequence[CornerView]
     planes: Sequence[PlaneView]
 
     def of(self, sensors: Collection[str], shots: Collection[int]) -> "Views":
-        """Those of some sensors and shots."""
+        """Views of some sensors and shots."""
         return Views(
             [view for view in self.corners if view.sensor in sensors and view.shot in shots],
             [view for view in self.planes if view.sensor in sensors and view.shot in shots],
@@ -52,7 +52,7 @@ class Views:
 
     @property
     def shots(self) -> dict[str, set[int]]:
-        """Numbers of the shots that each sensor contributed to."""
+        """Numbers of the shots of each sensor."""
         found: dict[str, set[int]] = {}
         for view in (*self.corners, *self.planes):
             found.setdefault(view.sensor, set()).add(view.shot)
@@ -60,13 +60,13 @@ class Views:
 
 
 def usable(stored: Stored, views: Views) -> Views:
-    """The views without those that no board in front of the stored cameras explains.
+    """Views with a valid board pose in front of the stored cameras.
 
     Raises:
-        RecheckError: none is left.
+        CalibrationCheckError: none is left.
     """
-    corners = [view for view in views.corners if sightings(stored.sensors[view.sensor].camera, view)]
+    corners = [view for view in views.corners if pose_candidates(stored.sensors[view.sensor].camera, view)]
     if not corners:
-        raise RecheckError("no view shows a board that a sensor of this calibration could have seen")
+        raise CalibrationCheckError("no view shows a board that a sensor of this calibration could have seen")
     shots = {view.shot for view in corners}
     return Views(corners, [view for view in views.planes if view.shot in shots])

@@ -12,7 +12,7 @@ from calib.camera import Camera
 from calib.noise.base import NoiseError
 from calib.pose import Pose
 from calib.sequences import plane
-from calib.solve.start.board_poses import sightings
+from calib.solve.start.board_poses import pose_candidates
 from calib.views import CornerView
 
 #: Increments of a pose that derivatives are told from [rad, m].
@@ -56,7 +56,7 @@ def place(view: CornerView, seeing: Camera, depth: Camera) -> Placed:
     Raises:
         NoiseError: no pose explains the view, or the depth sensor does not see the board.
     """
-    found = [_refined(seeing.T_rs @ each.T_sb, view, seeing) for each in sightings(seeing, view)]
+    found = [_refined(seeing.T_rs @ each.T_sb, view, seeing) for each in pose_candidates(seeing, view)]
     if not found:
         raise NoiseError(f"{view.sensor}: no pose of the board explains where its corners are seen")
     T_rb, misses, jacobian = min(found, key=lambda each: float(np.sum(np.square(each[1]))))

@@ -1,1 +1,1 @@
-"""The joint solve: cameras, poses, boards and depth terms from corners and planes, with covariances."""
+"""Bundle adjustment of cameras, poses, boards and depth terms from corners and planes, with covariances."""

@@ -1,4 +1,4 @@
-"""The whole way from views to a solution."""
+"""Calibration from views to a solution."""
 
 from collections.abc import Callable
 
@@ -12,20 +12,20 @@ from calib.solve.validation import diagnoses
 
 
 def calibrate(task: Task, note: Callable[[str], None] = lambda _: None) -> Solution:
-    """Solves a task.
+    """Solves a calibration task.
 
     Args:
-        task: sensors and what they saw.
-        note: told in words how it goes.
+        task: sensors and observations.
+        note: called with progress messages.
 
     Raises:
-        ViewsError, MixedUpError, SquareSizeError: the usual mistakes; see `diagnoses`.
-        NotConnectedError, ContradictionError: sensors that do not belong together; see `chains`.
-        UndeterminedError: parameters that the views leave open, by name.
-        NotSolvedError: no minimum.
+        ViewsError, MixedUpError, SquareSizeError: common mistakes; see `diagnoses`.
+        NotConnectedError, ContradictionError: sensors without consistent common views; see `extrinsics_graph`.
+        UndeterminedError: parameters that the views do not determine, by name.
+        NotSolvedError: no convergence.
     """
     diagnoses.require_views(task)
-    diagnoses.require_own_names(task)
+    diagnoses.require_matching_sensors(task)
     usable, state = start(task, note)
     if diagnoses.suspect_square_size(usable, state):
         note("distances do not fit the board's size: solving with their scales free to be sure")

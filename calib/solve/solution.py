@@ -1,4 +1,4 @@
-"""What a calibration found, with deviations of everything and residuals of every view."""
+"""Result of a calibration: parameters with deviations, and residuals of every view."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from calib.solve.bundle import robust
 from calib.solve.bundle.adjustment import Adjustment
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.formulation import groups_of
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Freedom
+from calib.solve.bundle.layout import DEPTH_TERMS, POSE, FreeParameters
 from calib.solve.bundle.lens_parameters import MATRIX
 from calib.solve.bundle.state import SensorState, State
 from calib.solve.bundle.tasks import Task
@@ -22,12 +22,12 @@ from calib.solve.bundle.tasks import Task
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number that was determined.
+    """One estimated parameter.
 
     Attributes:
         name: such as `tof.fx` or `board 3.z`.
-        value: [px], 1, [m], [s]; of rotations a part of the rotation vector [rad].
-        sigma: its deviation in the same unit; of rotations that of a small turn about an axis of the rig.
+        value: [px], 1, [m], [s]; for rotations a component of the rotation vector [rad].
+        sigma: its standard deviation in the same unit; for rotations that of a small rotation about an axis of the rig.
     """
 
     name: str
@@ -37,14 +37,14 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ViewFit:
-    """How well one view is explained.
+    """Residuals of one view.
 
     Attributes:
-        sensor, shot: which.
+        sensor, shot: identify the view.
         of: "corners" or "distances".
-        pixels: where (n, 2) [px].
-        residuals: predicted less measured, (n, 2) [px] of corners, (n,) [m] of distances.
-        outliers: which of them count as such (n,).
+        pixels: positions (n, 2) [px].
+        residuals: predicted minus measured, (n, 2) [px] for corners, (n,) [m] for distances.
+        outliers: mask (n,).
     """
 
     sensor: str
@@ -56,17 +56,17 @@ class ViewFit:
 
     @property
     def rms(self) -> float:
-        """Root mean square of a corner's miss [px] or of a distance's [m]."""
+        """Root mean square reprojection error [px] or distance error [m]."""
         return float(np.sqrt(np.mean(np.sum(self.residuals.reshape(len(self.pixels), -1) ** 2, axis=1))))
 
 
 @dataclass(frozen=True)
 class Solution:
-    """A solved calibration.
+    """Solved calibration.
 
     Attributes:
-        task: what was asked, without views that could not be used.
-        adjustment: the minimum itself.
+        task: the task without unusable views.
+        adjustment: minimum and covariance.
     """
 
     task: Task
@@ -74,32 +74,32 @@ class Solution:
 
     @property
     def state(self) -> State:
-        """Everything that was determined."""
+        """Estimated state."""
         return self.adjustment.state
 
     @property
     def cameras(self) -> Mapping[str, Camera]:
-        """By sensor, with their poses in the rig."""
+        """Cameras by sensor, with their poses in the rig."""
         return {name: sensor.camera for name, sensor in self.state.sensors.items()}
 
     @property
     def boards(self) -> Mapping[int, Pose]:
-        """`T_rb` by shot."""
+        """Board poses `T_rb` by shot."""
         return self.state.boards
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Of all parameters, in the order of `parameters` (n, n)."""
+        """Covariance of all parameters, in the order of `parameters` (n, n)."""
         return self.adjustment.covariance
 
     @cached_property
     def parameters(self) -> list[Parameter]:
-        """Everything that was free, in the order of the covariance."""
+        """All free parameters, in the order of the covariance."""
         layout = self.adjustment.layout
         values = [
-            _value(self.state.sensors[sensor], freedom, name)
-            for sensor, freedom in layout.freedoms.items()
-            for name in freedom.names
+            _value(self.state.sensors[sensor], free, name)
+            for sensor, free in layout.free_parameters.items()
+            for name in free.names
         ]
         for shot in layout.shots:
             values.extend(np.concatenate(pose.to_rotation_vector(self.state.boards[shot])).tolist())
@@ -108,7 +108,7 @@ class Solution:
 
     @cached_property
     def views(self) -> list[ViewFit]:
-        """Every view, corners before distances, sensor by sensor."""
+        """Residuals of every view by sensor, corners before distances."""
         found = []
         equations = self.adjustment.equations
         named = groups_of(self.task)
@@ -126,12 +126,12 @@ class Solution:
 
     @cached_property
     def deviations(self) -> Mapping[str, float]:
-        """What one corner's coordinate [px] or one distance [m] turned out to scatter, by group: `tof corners`."""
+        """Estimated standard deviation of a corner coordinate [px] or a distance [m], by group: `tof corners`."""
         groups = self.adjustment.equations.groups
         return {group.name: float(np.median(group.measured.sigmas)) for group in groups}
 
 
-def _value(sensor: SensorState, freedom: Freedom, name: str) -> float:
+def _value(sensor: SensorState, free: FreeParameters, name: str) -> float:
     camera = sensor.camera
     if name in MATRIX:
         return float(getattr(camera, name))
@@ -139,4 +139,4 @@ def _value(sensor: SensorState, freedom: Freedom, name: str) -> float:
         return float(np.concatenate(pose.to_rotation_vector(camera.T_rs))[POSE.index(name)])
     if name in (*DEPTH_TERMS, "time_offset"):
         return float(getattr(sensor, name))
-    return float(camera.lens.coefficients[freedom.kind.coefficients.index(name)])
+    return float(camera.lens.coefficients[free.kind.coefficients.index(name)])

@@ -1,4 +1,4 @@
-"""Deviations of corners before anything is known of the lens."""
+"""Deviations of corners for the initial optimisation."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,11 +9,11 @@ from calib.views import CornerView
 
 
 def shared(views: Sequence[CornerView]) -> list[CornerView]:
-    """The views with one deviation for all of a sensor: the median of theirs.
+    """Views with a common deviation per sensor: the median of theirs.
 
-    What a view's corners scatter about a regular board is noise and distortion of the lens together, so that views at
-    the border of the image, which say most about the lens, would count least. How large the noise really is, the solve
-    finds from its residuals, for each sensor.
+    A view's scatter about a regular board contains noise and lens distortion, so that views at the border of the image,
+    which are the most informative about the lens, would get the lowest weight. The actual noise of each sensor is
+    estimated from the residuals.
     """
     sigmas: dict[str, list[float]] = {}
     for view in views:

@@ -46,8 +46,10 @@ def _published(folder: Path) -> None:
     _matrix("Azure Kinect, colour", solution, cameras["color"].matrix)
     fx, fy, cx, cy = cameras["infrared"].matrix.tolist()
     known = Camera(1024, 1024, fx, fy, cx, cy, Lens(cameras["infrared"].lens))
-    infrared = SensorTask(1024, 1024, RATIONAL, (known,), keeps_intrinsics=True)
-    both = Task({"color": SensorTask(4096, 3072, RATIONAL), "infrared": infrared}, views, (), "color", least_kept=1)
+    infrared = SensorTask(1024, 1024, RATIONAL, (known,), fixed_intrinsics=True)
+    both = Task(
+        {"color": SensorTask(4096, 3072, RATIONAL), "infrared": infrared}, views, (), "color", min_views_fixed=1
+    )
     _place("Azure Kinect, infrared to colour", calibrate(both), "infrared")
 
 

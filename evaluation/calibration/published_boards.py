@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.corners.detection import detect
-from calib.board.corners.refusal import BoardError
+from calib.board.corners.errors import BoardError
 from calib.board.target import Charuco, Chessboard, Circles, Target
 from calib.solve.weights import shared
 from calib.views import CornerView

@@ -29,7 +29,7 @@ def surprises(seed: int) -> dict[str, float]:
     heads, solution = solved(seed)
     found = {}
     for name, head in heads.items():
-        names = solution.adjustment.layout.freedoms[name].names
+        names = solution.adjustment.layout.free_parameters[name].names
         error = _intrinsics(solution.cameras[name]) - _intrinsics(head.camera)
         found[f"{name} intrinsics"] = surprise(solution, name, names[:INTRINSICS], error)
         if name != "tof":

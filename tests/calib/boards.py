@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
-from calib.board.artwork import raster
+from calib.board.artwork import rasterize
 from calib.board.target import Target
 from calib.camera import Camera
 from calib.pose import Pose
@@ -44,7 +44,7 @@ def photograph(
     over its area. A pinhole's map from a plane is a homography.
     """
     density = 3 * samples * camera.fx / T_sb[2, 3] / 4
-    print_, (x0, y0) = raster(target, density)
+    print_, (x0, y0) = rasterize(target, density)
     K = np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
     plane_to_pixel = K @ np.column_stack([T_sb[:3, 0], T_sb[:3, 1], T_sb[:3, 3]])
     texel_to_plane = np.array([[1 / density, 0, x0], [0, 1 / density, y0], [0, 0, 1]])

@@ -7,7 +7,7 @@ import pytest
 
 from calib import pose
 from calib.board import coverage
-from calib.board.board_pose_features import stance
+from calib.board.board_pose_features import board_pose_features
 from calib.board.mirrored import MirroredSensorError
 from calib.board.target import Chessboard
 from calib.views import CornerView
@@ -48,7 +48,7 @@ def test_views_that_are_all_alike_are_refused() -> None:
 
 def test_views_of_many_poses_are_enough() -> None:
     coverage.check(many())
-    assert coverage.wishes(many(), SIZES) == []
+    assert coverage.missing_views(many(), SIZES) == []
 
 
 @pytest.mark.parametrize(
@@ -58,42 +58,42 @@ def test_views_of_many_poses_are_enough() -> None:
 def test_a_tilt_that_is_missing_is_asked_for(rotation, way: str) -> None:
     without = [one for one in many() if not np.allclose(one.pixels, view(rotation, 0.45).pixels)]
     assert len(without) == 12
-    assert [wish.text for wish in coverage.wishes(without, SIZES)] == [f"tilt the board more: let it face {way}"]
+    assert [wish.text for wish in coverage.missing_views(without, SIZES)] == [f"tilt the board more: let it face {way}"]
 
 
 def test_a_corner_of_the_image_that_nobody_has_seen_is_named() -> None:
     without = [one for one in many() if coverage.counts([one], (640, 480), 3, 3)[0, 2] == 0]
-    assert "nobody has seen the top right corner of color" in [w.text for w in coverage.wishes(without, SIZES)]
+    assert "nobody has seen the top right corner of color" in [w.text for w in coverage.missing_views(without, SIZES)]
 
 
 def test_near_and_far_are_asked_for() -> None:
     far = [view(distance=1.5, shot=n) for n in range(12)]
     near = [view(distance=0.45, shot=n) for n in range(12)]
-    assert "come closer" in [wish.text for wish in coverage.wishes(far, SIZES)]
-    assert "go further away" in [wish.text for wish in coverage.wishes(near, SIZES)]
+    assert "come closer" in [wish.text for wish in coverage.missing_views(far, SIZES)]
+    assert "go further away" in [wish.text for wish in coverage.missing_views(near, SIZES)]
 
 
 def test_sensors_have_to_see_the_board_together() -> None:
     others = [view(distance=0.6, shot=100 + n, sensor="tof") for n in range(12)]
-    texts = [wish.text for wish in coverage.wishes([*many(), *others], {**SIZES, "tof": (640, 480)})]
+    texts = [wish.text for wish in coverage.missing_views([*many(), *others], {**SIZES, "tof": (640, 480)})]
     assert "show the board to color and tof at the same time (0 of 6 times)" in texts
-    texts = [wish.text for wish in coverage.wishes(many(), {**SIZES, "tof": (640, 480)})]
+    texts = [wish.text for wish in coverage.missing_views(many(), {**SIZES, "tof": (640, 480)})]
     assert texts == ["show the board to tof: it has not seen it yet"]
 
 
 def test_only_a_view_of_something_new_is_worth_keeping() -> None:
     kept = [view(), view((0.5, 0, 0))]
-    assert not coverage.adds(view((0.02, 0.0, 0.0), 0.71), kept, (640, 480))
-    assert coverage.adds(view((0.0, 0.4, 0.0)), kept, (640, 480))
-    assert coverage.adds(view(shift=(0.25, 0.0)), kept, (640, 480))
-    assert coverage.adds(view(sensor="tof"), kept, (640, 480))
+    assert not coverage.adds_information(view((0.02, 0.0, 0.0), 0.71), kept, (640, 480))
+    assert coverage.adds_information(view((0.0, 0.4, 0.0)), kept, (640, 480))
+    assert coverage.adds_information(view(shift=(0.25, 0.0)), kept, (640, 480))
+    assert coverage.adds_information(view(sensor="tof"), kept, (640, 480))
 
 
 def test_a_stance_tells_where_the_print_faces() -> None:
-    left = stance(view((0.0, 0.5, 0.0), 0.6), (640, 480))
+    left = board_pose_features(view((0.0, 0.5, 0.0), 0.6), (640, 480))
     assert left.tilt[0] == pytest.approx(-0.5, abs=0.1)
     assert left.tilt[1] == pytest.approx(0.0, abs=0.02)
-    assert stance(view((0, 0, 0.3)), (640, 480)).roll == pytest.approx(0.3, abs=0.01)
+    assert board_pose_features(view((0, 0, 0.3)), (640, 480)).roll == pytest.approx(0.3, abs=0.01)
 
 
 def rolled(sensor: str, mirror: bool, roll: float = 0.5) -> list[CornerView]:
@@ -126,4 +126,4 @@ def test_the_simulated_board_is_shown_in_all_poses_that_are_needed() -> None:
             pixels = head.camera.project(pose.transform(T_rb, target.points()))
             if (pixels > 3).all() and (pixels < np.array(sizes[name]) - 4).all():
                 views.append(CornerView(name, n, 0.0, target.points(), pixels))
-    assert coverage.wishes(views, sizes) == []
+    assert coverage.missing_views(views, sizes) == []

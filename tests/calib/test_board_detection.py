@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from calib import pose
-from calib.board.corners import refusal
+from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 from tests.calib.boards import TOF, VGA, as_bytes, centered, photograph
@@ -113,7 +113,7 @@ def test_a_view_has_the_points_of_the_board_and_the_estimated_deviation() -> Non
 
 
 def refused(target: Target, image, **settings) -> tuple[type[Exception], str]:
-    with pytest.raises(refusal.BoardError) as caught:
+    with pytest.raises(errors.BoardError) as caught:
         detect(target, image, **settings)
     return caught.type, str(caught.value)
 
@@ -123,14 +123,14 @@ def test_an_image_without_a_board_is_refused(target: Target) -> None:
     noise = np.random.default_rng(1).standard_normal((480, 640)).astype(np.float32)
     image = as_bytes(128 + 500 * cv2.GaussianBlur(noise, (0, 0), 5))
     reason, message = refused(target, image)
-    assert reason is refusal.NothingFoundError
+    assert reason is errors.NothingFoundError
     assert message.startswith("no board found")
 
 
 def test_a_mirrored_board_is_refused() -> None:
     image = as_bytes(photograph(CHARUCO, VGA, centered(CHARUCO, TILTED, 0.5)))[:, ::-1]
     reason, message = refused(CHARUCO, image)
-    assert reason is refusal.MirroredBoardError
+    assert reason is errors.MirroredBoardError
     assert "mirror" in message
 
 
@@ -139,20 +139,20 @@ def test_a_saturated_amplitude_is_refused(top: int) -> None:
     image = photograph(CHESSBOARD, VGA, centered(CHESSBOARD, TILTED, 0.6), black=0.2, white=1.2, noise=0.01)
     amplitude = np.clip(top * image, 0, top).astype(np.uint16)
     reason, message = refused(CHESSBOARD, amplitude, largest_saturated=0.1)
-    assert reason is refusal.SaturatedError
+    assert reason is errors.SaturatedError
     assert "shorter exposure" in message
     assert len(detect(CHESSBOARD, amplitude).ids) == 54, "corners themselves survive that white is saturated"
 
 
 def test_an_image_that_is_all_white_says_so() -> None:
-    assert refused(CHESSBOARD, np.full((480, 640), 255, np.uint8))[0] is refusal.SaturatedError
+    assert refused(CHESSBOARD, np.full((480, 640), 255, np.uint8))[0] is errors.SaturatedError
 
 
 @pytest.mark.parametrize("target", [CHESSBOARD, Circles(7, 5, 0.04, 0.02)])
 def test_a_board_that_is_too_far_away_is_refused(target: Target) -> None:
     image = as_bytes(photograph(target, VGA, centered(target, (0, 0, 0), 550 * target.points()[1, 0] / 4.5)))
     reason, message = refused(target, image)
-    assert reason is refusal.TooSmallError
+    assert reason is errors.TooSmallError
     assert "closer" in message
 
 
@@ -161,7 +161,7 @@ def test_a_board_that_the_image_cuts_off_is_refused(target: Target) -> None:
     T_sb = centered(target, (0.1, 0.1, 0), 0.5)
     T_sb[0, 3] += 0.2
     reason, message = refused(target, as_bytes(photograph(target, VGA, T_sb)))
-    assert reason is refusal.CutOffError
+    assert reason is errors.CutOffError
     assert "border" in message
 
 
@@ -169,5 +169,5 @@ def test_a_board_that_the_image_cuts_off_is_refused(target: Target) -> None:
 def test_a_board_that_moved_during_the_exposure_is_refused(target: Target) -> None:
     sharp = photograph(target, VGA, centered(target, (0.2, 0.1, 0), 0.6), noise=1.0)
     reason, message = refused(target, cv2.blur(as_bytes(sharp), (8, 1)))
-    assert reason is refusal.BlurredError
+    assert reason is errors.BlurredError
     assert "still" in message

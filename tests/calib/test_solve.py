@@ -48,7 +48,7 @@ def pose_error(solution: Solution, name: str, truth: Pose) -> np.ndarray:
 def surprise(solution: Solution, heads: Mapping[str, Head], name: str) -> float:
     """Probability of an error less than this one, if the covariance of a sensor's pose is right; 0…1."""
     layout = solution.adjustment.layout
-    columns = layout.columns(name, layout.freedoms[name].names[9:15])
+    columns = layout.columns(name, layout.free_parameters[name].names[9:15])
     covariance = solution.covariance[np.ix_(columns, columns)]
     error = pose_error(solution, name, heads[name].camera.T_rs)
     return float(stats.chi2(6).cdf(error @ np.linalg.solve(covariance, error)))
@@ -109,7 +109,7 @@ def test_a_depth_sensor_without_corners_is_placed_by_planes_alone() -> None:
     seen = board_views.look(heads, board_views.random_boards(16, generator), generator)
     task = task_of(heads, Seen([view for view in seen.corners if view.sensor != "light"], seen.planes))
     camera = heads["light"].camera
-    given = SensorTask(camera.width, camera.height, factory=(replace(camera, T_rs=np.eye(4)),), keeps_intrinsics=True)
+    given = SensorTask(camera.width, camera.height, factory=(replace(camera, T_rs=np.eye(4)),), fixed_intrinsics=True)
     solution = calibrate(replace(task, sensors={**task.sensors, "light": given}))
     error = pose_error(solution, "light", camera.T_rs)
     assert np.linalg.norm(error[3:]) < 2e-3
@@ -130,7 +130,7 @@ def test_a_sensor_whose_clock_is_off_is_found_from_a_board_that_moves() -> None:
             seen.corners.extend(board_views.corners(name, head, int(shot), swung(true), generator, time))
             seen.planes.extend(board_views.distances(name, head, int(shot), swung(true), generator, time))
     task = task_of(heads, seen)
-    sensors = {**task.sensors, "color": replace(task.sensors["color"], runs_free=True)}
+    sensors = {**task.sensors, "color": replace(task.sensors["color"], free_running=True)}
     solution = calibrate(replace(task, sensors=sensors))
     found = next(parameter for parameter in solution.parameters if parameter.name == "color.time_offset")
     assert found.value == pytest.approx(late, abs=max(1e-3, 4 * found.sigma))

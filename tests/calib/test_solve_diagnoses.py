@@ -21,7 +21,7 @@ SHOTS = 12
 def kept(heads: dict[str, Head]) -> dict[str, SensorTask]:
     """Factory intrinsics of all heads, kept."""
     return {
-        name: SensorTask(head.camera.width, head.camera.height, factory=(head.camera,), keeps_intrinsics=True)
+        name: SensorTask(head.camera.width, head.camera.height, factory=(head.camera,), fixed_intrinsics=True)
         for name, head in heads.items()
     }
 
@@ -116,7 +116,7 @@ def test_what_the_views_leave_open_is_named() -> None:
 
 def test_a_clock_cannot_be_found_from_boards_that_stand_still() -> None:
     _, task = scene()
-    sensors = {**task.sensors, "color": replace(task.sensors["color"], runs_free=True)}
+    sensors = {**task.sensors, "color": replace(task.sensors["color"], free_running=True)}
     with pytest.raises(UndeterminedError, match=r"color\.time_offset"):
         calibrate(replace(task, sensors=sensors))
 
@@ -137,20 +137,20 @@ def test_a_task_that_makes_no_sense_is_refused(changes: dict[str, object], messa
 
 def test_a_sensor_needs_a_calibration_to_keep_and_depth_terms_that_exist() -> None:
     with pytest.raises(TaskError, match="calibration to keep"):
-        SensorTask(320, 240, keeps_intrinsics=True)
+        SensorTask(320, 240, fixed_intrinsics=True)
     with pytest.raises(TaskError, match="depth terms must be of depth_offset, depth_scale, not bend"):
         SensorTask(320, 240, depth_terms=("bend",))
 
 
 def test_ambiguous_views_agree_on_the_true_pose_between_two_sensors() -> None:
-    from calib.solve.start.board_poses import sightings
+    from calib.solve.start.board_poses import pose_candidates
 
     heads, task = scene()
     seen = {
-        name: {view.shot: sightings(heads[name].camera, view) for view in task.corners if view.sensor == name}
+        name: {view.shot: pose_candidates(heads[name].camera, view) for view in task.corners if view.sensor == name}
         for name in ("tof", "color")
     }
     flipped = {shot: found[::-1] for shot, found in seen["tof"].items()}
     np.testing.assert_allclose(
-        extrinsics_graph.between({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
+        extrinsics_graph.relative_pose({**seen, "tof": flipped}, "tof", "color"), heads["color"].camera.T_rs, atol=0.03
     )

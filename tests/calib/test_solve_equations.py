@@ -22,7 +22,7 @@ from tests.calib import board_views
 KINDS = {"tof": BROWN_CONRADY, "light": RATIONAL, "color": FISHEYE}
 
 
-def equations(runs_free: str = "none", random: np.random.Generator | None = None) -> Equations:
+def equations(free_running: str = "none", random: np.random.Generator | None = None) -> Equations:
     """A rig with everything free, at the truth or, with a generator, beside it."""
     generator = np.random.default_rng(3)
     heads = board_views.three_heads()
@@ -36,7 +36,7 @@ def equations(runs_free: str = "none", random: np.random.Generator | None = None
             head.camera.height,
             KINDS[name],
             depth_terms=("depth_offset", "depth_scale") if head.depth_sigma else (),
-            runs_free=name == runs_free,
+            free_running=name == free_running,
         )
         for name, head in heads.items()
     }
@@ -49,9 +49,9 @@ def fisheye(camera: Camera) -> Camera:
     return replace(camera, lens=KannalaBrandt(np.array([0.02, -0.01, 0.003, -0.001])))
 
 
-@pytest.mark.parametrize("runs_free", ["none", "light", "color"])
-def test_the_sparse_jacobian_is_that_of_finite_differences(runs_free: str) -> None:
-    system = equations(runs_free)
+@pytest.mark.parametrize("free_running", ["none", "light", "color"])
+def test_the_sparse_jacobian_is_that_of_finite_differences(free_running: str) -> None:
+    system = equations(free_running)
     layout = system.layout
     here = np.random.default_rng(7).normal(0, 1e-3, layout.size)
     jacobian = system.jacobian(here).toarray()
@@ -107,13 +107,13 @@ def test_derivatives_from_image_to_image_are_those_of_finite_differences(kind: L
     system = equations()
     layout, state = system.layout, system.base
     source, target = ("tof", "light") if kind is BROWN_CONRADY else ("tof", "color")
-    changes = projection_uncertainty.pair_changes(state, layout, source, target, 1.1)
+    changes = projection_uncertainty.pair_jacobian(state, layout, source, target, 1.1)
     pixels = projection_uncertainty.grid(state.sensors[source].camera).reshape(-1, 2)
     for index, column in enumerate(projection_uncertainty.pair_columns(layout, source, target)):
         step = np.zeros(layout.size)
         step[column] = 1e-6
         ends = [
-            projection_uncertainty.mapped(layout.move(state, sign * step), source, target, pixels, 1.1)
+            projection_uncertainty.map_pixels(layout.move(state, sign * step), source, target, pixels, 1.1)
             for sign in (1, -1)
         ]
         seen = np.isfinite(ends[0]).all(axis=1) & np.isfinite(ends[1]).all(axis=1)
@@ -128,7 +128,7 @@ def test_a_turn_of_the_camera_is_no_change_of_a_projection() -> None:
     turn = pose.from_rotation_vector((1e-5, -2e-5, 3e-5), (1e-5, 2e-5, -1e-5))
     alone = replace(camera, T_rs=np.eye(4), lens=Lens())
     change = (alone.project(pose.transform(turn, points)) - alone.project(points))[:, :, None]
-    undone = projection_uncertainty.Undone(alone, points).at(points, change, change)
+    undone = projection_uncertainty.MotionCompensation(alone, points).at(points, change, change)
     assert np.abs(undone).max() < 1e-3 * np.abs(change).max()
 
 

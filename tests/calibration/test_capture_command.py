@@ -16,7 +16,7 @@ from abs_service.calibration.shots.corner_extraction import Seen, see_all
 from abs_service.calibration.shots.guide import LineGuide, coverage_map, draw
 from abs_service.calibration.shots.shot_sources import RecordingShots
 from abs_service.supervision.exit_codes import Exit
-from calib.board.corners.refusal import BlurredError, MovedError
+from calib.board.corners.errors import BlurredError, MovedError
 from drivers.replay.recording import Recording
 from drivers.simulated.shapes.printed import TARGETS
 from tests.calib.test_board_coverage import SIZES, many, view
@@ -50,7 +50,7 @@ def test_a_capture_that_ends_early_says_what_is_missing_and_can_be_read_again(
     said = json.loads(capsys.readouterr().out)
     assert code == said["exit_code"] in (1, 2)
     assert said["shots"] >= 1
-    assert {wish["sensor"] for wish in said["missing"]} == {"depth_camera", "color"}
+    assert {missing["sensor"] for missing in said["missing"]} == {"depth_camera", "color"}
     recording = Recording(tmp_path / "board.mcap")
     seen = see_all(TARGETS["chessboard"], RecordingShots(recording, every_s=0.5), recording.cameras)
     assert {name: sum(v.sensor == name for v in seen.corners) for name in said["views"]} == said["views"]
@@ -86,7 +86,7 @@ def collected() -> Collector:
 
 def test_a_collection_ends_when_nothing_is_missing() -> None:
     collector = collected()
-    assert (collector.kept, list(collector.wishes), collector.problem()) == (13, [], "")
+    assert (collector.kept, list(collector.missing_views), collector.problem()) == (13, [], "")
 
 
 def test_what_adds_nothing_and_what_moves_is_not_kept() -> None:

@@ -12,7 +12,7 @@ from abs_service.calibration.shots.live_shots import LiveShots, Wired
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Look, Shot, ShotsError
 from calib import pose
-from calib.board.corners import refusal
+from calib.board.corners import errors
 from calib.camera import Camera
 from calib.pose import Pose
 from drivers.opening import open_device
@@ -61,7 +61,7 @@ def test_a_recording_shows_corners_and_planes_where_they_truly_are(recording: Re
 
 @pytest.mark.slow
 def test_a_board_that_moves_is_refused_and_one_that_is_held_is_not(seen: Seen) -> None:
-    refused = {shot for (shot, sensor), why in seen.refused.items() if isinstance(why, refusal.MovedError)}
+    refused = {shot for (shot, sensor), why in seen.refused.items() if isinstance(why, errors.MovedError)}
     held = {view.shot for view in seen.corners if view.sensor == "color"}
     # Of every twelve exposures, the first six are still; shot n is exposure n + 1 and is compared with exposure n.
     assert held >= {0, 1, 2, 3, 4, 12, 13, 14, 15, 16, 24}
@@ -137,4 +137,4 @@ def test_a_saturated_amplitude_is_refused_although_its_corners_are_found() -> No
     amplitude = np.clip(4095 * image, 0, 4095).astype(np.uint16)
     shot = Shot(0, {"tof": Look(0, amplitude, amplitude, own_light=True)})
     (why,) = see_all(CHESSBOARD.target, [shot], {}).refused.values()
-    assert isinstance(why, refusal.SaturatedError)
+    assert isinstance(why, errors.SaturatedError)

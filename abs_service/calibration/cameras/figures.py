@@ -8,7 +8,7 @@ import numpy as np
 from abs_service.report import plots
 from calib.solve.solution import ViewFit
 from calib.solve.validation.cross_validation import Agreement
-from calib.solve.validation.projection_uncertainty import Field
+from calib.solve.validation.projection_uncertainty import UncertaintyMap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _UNSEEN = "0.8"
 
 
-def uncertainty_map(field: Field, label: str) -> "Figure":
+def uncertainty_map(field: UncertaintyMap, label: str) -> "Figure":
     """Deviation of projections over an image; hatched where no board was seen."""
     figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()

@@ -36,7 +36,7 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
             each.of: {"difference_px": each.difference_px, "predicted_px": each.predicted_px}
             for each in found.agreements
         },
-        "projection_sigma_px": {of: field.typical for of, field in {**found.images, **found.pairs}.items()},
+        "projection_sigma_px": {of: field.rms for of, field in {**found.images, **found.pairs}.items()},
         "views": [
             {"sensor": v.sensor, "shot": v.shot, "of": v.of, "rms": v.rms, "outliers": int(v.outliers.sum())}
             for v in solution.views
@@ -89,7 +89,7 @@ def _residuals(views: Sequence[ViewFit]) -> Residuals:
 def _cross_validation(found: Assessment) -> Section:
     rows = tuple((each.of, each.difference_px, each.predicted_px, each.ratio) for each in found.agreements)
     columns = (Column("projection"), Column("halves differ by", "px"), Column("predicted", "px"), Column("ratio"))
-    known = tuple((of, field.typical, 2.45 * field.typical) for of, field in {**found.images, **found.pairs}.items())
+    known = tuple((of, field.rms, 2.45 * field.rms) for of, field in {**found.images, **found.pairs}.items())
     text = (
         "The odd and the even shots were calibrated apart. If the halves differ by more than twice what their own "
         "deviations say, something is wrong that residuals do not show. All numbers are root mean squares over the "
@@ -141,7 +141,7 @@ def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Pict
         yield drawing(drawn, "Residuals of corners", f"Residuals of corners over the image of {name}")
         yield drawing(solve_figures.view_errors(corners, "px", 1), "Views", f"Residuals of every view of {name}")
     fields = {of: field for of, field in found.pairs.items() if of.startswith(f"{name} → ")}
-    if solution.adjustment.layout.freedoms[name].intrinsics:
+    if solution.adjustment.layout.free_parameters[name].intrinsics:
         fields = {name: found.images[name], **fields}
     for of, field in fields.items():
         label = f"deviation of a projection at {found.distance:g} m [px]"

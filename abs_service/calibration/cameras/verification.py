@@ -12,13 +12,13 @@ from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.calibration_check.changes import PairChange, pair_changes
 from calib.calibration_check.hypotheses import (
+    CornerFit,
     DistanceBias,
-    Explanation,
-    OwnFit,
+    MotionHypothesis,
+    corner_fit,
     distance_bias,
-    explained,
-    own_fit,
-    suspects,
+    motion_hypotheses,
+    moved_candidates,
 )
 from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.state import SensorState
@@ -59,11 +59,11 @@ class Found:
         unseen: sensors without any view.
     """
 
-    fits: Mapping[str, OwnFit]
+    fits: Mapping[str, CornerFit]
     usual_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
     changes: tuple[PairChange, ...]
-    explanations: Mapping[str, Explanation]
+    explanations: Mapping[str, MotionHypothesis]
     unseen: tuple[str, ...]
 
 
@@ -76,7 +76,7 @@ def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
         provenance: where the report comes from.
 
     Raises:
-        RecheckError: no view can be used.
+        CalibrationCheckError: no view can be used.
         NotSolvedError, UndeterminedError: the views do not place the board.
     """
     found = _found(known, seen)
@@ -119,11 +119,11 @@ def _found(known: RigCalibration, seen: Seen) -> Found:
     is_alarming = any(_level(change) > Level.GOOD and change.is_significant for change in changes)
     usual = {name: known.sensors[name].residuals.corners_px for name in seeing}
     return Found(
-        {name: own_fit(stored, views, name) for name in seeing},
+        {name: corner_fit(stored, views, name) for name in seeing},
         {name: USUAL_PX if px is None else px for name, px in usual.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
         changes,
-        explained(stored, views) if is_alarming else {},
+        motion_hypotheses(stored, views) if is_alarming else {},
         tuple(name for name in sensors if name not in views.shots),
     )
 
@@ -149,7 +149,7 @@ def _sparse(view: PlaneView) -> PlaneView:
     return replace(view, **parts)
 
 
-def _of_fit(name: str, fit: OwnFit, usual: float) -> Verdict:
+def _of_fit(name: str, fit: CornerFit, usual: float) -> Verdict:
     said = f"corners miss by {fit.rms:.2f} px; {usual:.2f} px are usual for it."
     if fit.rms <= DOUBTFUL_RATIO * usual or fit.rms < UNNOTICED_PX:
         return Verdict(Level.GOOD, f"still projects as it was calibrated: {said}", about=name)
@@ -196,7 +196,7 @@ def _moved(found: Found) -> Verdict:
     """Which sensor it was."""
     worst = max(found.changes, key=lambda change: _level(change) * change.is_significant)
     level = _level(worst)
-    able = suspects(found.explanations)
+    able = moved_candidates(found.explanations)
     if len(able) == 1:
         (name,) = able
         mine = max((one for one in found.changes if name in {one.first, one.second}), key=lambda one: one.squared)

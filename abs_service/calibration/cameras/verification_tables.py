@@ -11,10 +11,12 @@ from abs_service.calibration.shots.corner_extraction import Seen
 from abs_service.report import figures
 from abs_service.report.content import Column, Section, Table, drawing
 from calib.calibration_check.changes import PairChange
-from calib.calibration_check.hypotheses import DistanceBias, Explanation, OwnFit
+from calib.calibration_check.hypotheses import CornerFit, DistanceBias, MotionHypothesis
 
 
-def sensors(fits: Mapping[str, OwnFit], usual_px: Mapping[str, float], biases: Mapping[str, DistanceBias]) -> Section:
+def sensors(
+    fits: Mapping[str, CornerFit], usual_px: Mapping[str, float], biases: Mapping[str, DistanceBias]
+) -> Section:
     """Each sensor for itself."""
     columns = (
         Column("sensor"), Column("views"), Column("corners miss by", "px", ".3f"), Column("usual", "px", ".3f"),
@@ -25,7 +27,7 @@ def sensors(fits: Mapping[str, OwnFit], usual_px: Mapping[str, float], biases: M
     return Section("Each sensor for itself", (text, Table("What cameras make of their own corners", columns, rows)))
 
 
-def pairs(changes: Sequence[PairChange], explanations: Mapping[str, Explanation]) -> list[Section]:
+def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypothesis]) -> list[Section]:
     """Pairs of sensors, and what setting one free explains; nothing if there are no pairs."""
     if not changes:
         return []
@@ -54,7 +56,7 @@ def pairs(changes: Sequence[PairChange], explanations: Mapping[str, Explanation]
     return found
 
 
-def fields(known: RigCalibration, fits: Mapping[str, OwnFit]) -> Section:
+def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
     """What is left in the images."""
     pictures = []
     for name, fit in fits.items():
@@ -77,10 +79,10 @@ def refusals(seen: Seen) -> list[Section]:
 
 
 def values(
-    fits: Mapping[str, OwnFit],
+    fits: Mapping[str, CornerFit],
     biases: Mapping[str, DistanceBias],
     changes: Sequence[PairChange],
-    explanations: Mapping[str, Explanation],
+    explanations: Mapping[str, MotionHypothesis],
 ) -> dict[str, Any]:
     """For programs."""
     return {

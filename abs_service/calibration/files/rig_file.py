@@ -204,7 +204,7 @@ def _sensor(key: tuple[str, ...], known: SensorCalibration, sigma: Mapping[str, 
     rms = {key: getattr(known.residuals, key) for key in ("corners_px", "distances", "views")}
     left = {name: value for name, value in rms.items() if value is not None}
     if left:
-        parts.append(toml_text.table((*key, "residuals"), left, "root mean squares of what is not explained [px, m]"))
+        parts.append(toml_text.table((*key, "residuals"), left, "root mean square residuals [px, m]"))
     if sigma:
         comment = "standard deviations; rotations [rad] about the axes of the rig, x, y, z [m], fx … cy [px]"
         parts.append(toml_text.table((*key, "sigma"), sigma, comment))

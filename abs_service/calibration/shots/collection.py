@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from abs_service.calibration.shots.corner_extraction import Seen
 from calib.board import coverage
-from calib.board.corners.refusal import MovedError
-from calib.board.coverage import Wish
+from calib.board.corners.errors import MovedError
+from calib.board.coverage import MissingView
 from calib.board.mirrored import MirroredSensorError
 from calib.views import CornerView
 
@@ -29,9 +29,9 @@ class Collector:
         self.latest: dict[str, str] = {}
 
     @property
-    def wishes(self) -> Sequence[Wish]:
+    def missing_views(self) -> Sequence[MissingView]:
         """What is missing, the most important first; empty when there is enough."""
-        return coverage.wishes(self.views, self.sizes)
+        return coverage.missing_views(self.views, self.sizes)
 
     def take(self, seen: Seen) -> bool:
         """Keeps what one shot showed if it adds something, and tells whether it did.
@@ -40,7 +40,9 @@ class Collector:
         """
         self.latest = {sensor: str(error) for (_, sensor), error in seen.refused.items()}
         moved = any(isinstance(error, MovedError) for error in seen.refused.values())
-        new = {view.sensor: coverage.adds(view, self.views, self.sizes[view.sensor]) for view in seen.corners}
+        new = {
+            view.sensor: coverage.adds_information(view, self.views, self.sizes[view.sensor]) for view in seen.corners
+        }
         is_kept = any(new.values()) and not moved
         for view in seen.corners:
             self.latest[view.sensor] = "" if is_kept else "nothing new: change the pose"

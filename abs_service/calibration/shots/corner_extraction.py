@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from abs_service.calibration.shots.shots import Look, Shot
 from calib.board import plane
-from calib.board.corners import detection, quality, refusal, stillness
+from calib.board.corners import detection, errors, quality, stillness
 from calib.board.corners.detection import Detection
-from calib.board.corners.refusal import BoardError
+from calib.board.corners.errors import BoardError
 from calib.board.corners.to_8bit import grey
 from calib.board.target import Target
 from calib.camera import Camera
@@ -81,19 +81,19 @@ def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> Seen:
 
 
 def _find(target: Target, look: Look) -> Detection:
-    largest = detection.LARGEST_SATURATED_ACTIVE if look.own_light else detection.LARGEST_SATURATED
+    largest = detection.MAX_SATURATED_ACTIVE if look.own_light else detection.MAX_SATURATED
     found = detection.detect(target, look.image, largest)
     if look.before is not look.image and look.before.shape == look.image.shape:
-        change = stillness.changed(grey(look.before), grey(look.image), found.pixels)
-        if change > stillness.LARGEST_CHANGE:
-            raise refusal.MovedError("the board moved since the image before. Hold it still for a moment")
+        change = stillness.changed_fraction(grey(look.before), grey(look.image), found.pixels)
+        if change > stillness.MAX_CHANGED_FRACTION:
+            raise errors.MovedError("the board moved since the image before. Hold it still for a moment")
     return found
 
 
 def _plane(view: CornerView, look: Look) -> list[PlaneView]:
     if look.distance.shape != look.image.shape[:2]:
         return []
-    inside = plane.bright(look.image, plane.region(view.pixels, look.distance.shape))
+    inside = plane.white_pixels(look.image, plane.region(view.pixels, look.distance.shape))
     inside = inside & ~quality.is_saturated(look.image)
     found = plane.plane_view(view.sensor, view.shot, view.t_s, inside, look.distance, look.sigma)
     return [] if found is None else [found]

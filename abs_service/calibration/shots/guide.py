@@ -78,7 +78,7 @@ class LineGuide:
 
     def update(self, collector: Collector, is_kept: bool) -> None:
         """See `Guide`."""
-        next_ = "; ".join(wish.text for wish in collector.wishes[:1]) or "enough"
+        next_ = "; ".join(missing.text for missing in collector.missing_views[:1]) or "enough"
         reasons = "; ".join(f"{sensor}: {why}" for sensor, why in collector.latest.items() if why)
         line = f"kept {collector.kept}. Next: {next_}" if is_kept else reasons
         if line and (is_kept or line != self._said):
@@ -89,11 +89,13 @@ class LineGuide:
 def draw(collector: Collector) -> RenderableType:
     """The state of a collection: a map for each sensor, what became of the last shot, what is missing."""
     maps = [_panel(sensor, size, collector) for sensor, size in collector.sizes.items()]
-    wishes = collector.wishes
+    missing_views = collector.missing_views
     lines = [Text(f"{collector.kept} shots kept", style="bold")]
-    lines += [Text(f"→ {_with_sensor(wish.sensor, wish.text)}", style="cyan") for wish in wishes[:_SHOWN]]
-    if len(wishes) > _SHOWN:
-        lines.append(Text(f"  and {len(wishes) - _SHOWN} more", style="dim"))
+    lines += [
+        Text(f"→ {_with_sensor(missing.sensor, missing.text)}", style="cyan") for missing in missing_views[:_SHOWN]
+    ]
+    if len(missing_views) > _SHOWN:
+        lines.append(Text(f"  and {len(missing_views) - _SHOWN} more", style="dim"))
     return Group(Columns(maps), *lines)
 
 
@@ -117,7 +119,7 @@ def coverage_map(image: Image, views: Sequence[CornerView]) -> NDArray[np.uint8]
     size = (levels.shape[1], levels.shape[0])
     picture = np.repeat(levels[..., None], 3, axis=2)
     seen = coverage.counts(views, size, 3, 3)
-    for row, column in np.argwhere(seen < coverage.LEAST_POINTS):
+    for row, column in np.argwhere(seen < coverage.MIN_POINTS):
         part = (
             slice(row * size[1] // 3, (row + 1) * size[1] // 3),
             slice(column * size[0] // 3, (column + 1) * size[0] // 3),

@@ -118,7 +118,7 @@ def _collect(
             recording.write(shot)
             _picture(shot, collector, out)
         guide.update(collector, is_kept)
-        if not collector.wishes:
+        if not collector.missing_views:
             return
 
 
@@ -146,11 +146,11 @@ def _picture_path(out: Path, sensor: str) -> Path:
 
 
 def _conclude(collector: Collector, arguments: argparse.Namespace) -> int:
-    problem, wishes = collector.problem(), collector.wishes
-    level = Level.BAD if problem else Level.DOUBTFUL if wishes else Level.GOOD
+    problem, missing_views = collector.problem(), collector.missing_views
+    level = Level.BAD if problem else Level.DOUBTFUL if missing_views else Level.GOOD
     views = {s: sum(view.sensor == s for view in collector.views) for s in collector.sizes}
     if arguments.json:
-        missing = [{"sensor": wish.sensor, "text": wish.text} for wish in wishes]
+        missing = [{"sensor": missing.sensor, "text": missing.text} for missing in missing_views]
         found = {"verdict": str(level), "exit_code": int(level), "shots": collector.kept, "views": views}
         print(json.dumps({**found, "problem": problem, "missing": missing, "recording": str(arguments.out)}))
         return int(level)
@@ -158,6 +158,6 @@ def _conclude(collector: Collector, arguments: argparse.Namespace) -> int:
     print(f"{arguments.out}: {collector.kept} shots; views: {counts}")
     if problem:
         print(f"No calibration can be made of this. {problem}", file=sys.stderr)
-    for wish in wishes:
-        print(f"missing: {wish.sensor}: {wish.text}", file=sys.stderr)
+    for missing in missing_views:
+        print(f"missing: {missing.sensor}: {missing.text}", file=sys.stderr)
     return int(level)

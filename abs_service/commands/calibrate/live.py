@@ -44,7 +44,7 @@ def streaming(
 
 def adds(new: Seen, seen: Seen) -> bool:
     """Whether a shot shows some sensor a view that is unlike all before: a board that is held says nothing twice."""
-    return any(coverage.adds(view, seen.corners, new.sizes[view.sensor]) for view in new.corners)
+    return any(coverage.adds_information(view, seen.corners, new.sizes[view.sensor]) for view in new.corners)
 
 
 def views(seen: Seen) -> int:

@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
             found,
             keeps=name in arguments.keep or name not in with_corners,
             depth_terms=TERMS[terms[name]] if name in terms else (),
-            runs_free=name in arguments.free_running,
+            free_running=name in arguments.free_running,
         )
         for name in there
     }

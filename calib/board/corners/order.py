@@ -1,4 +1,4 @@
-"""Which of the points that were found is which, for the kinds of boards that look the same when turned."""
+"""Assignment of detected points to board points, for boards with rotational symmetry."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,18 +10,18 @@ from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, 
 Lattice = NDArray[np.float64]
 
 
-def ordered(target: Target, pixels: NDArray[np.float64], levels: Grey) -> NDArray[np.float64]:
-    """All points (n, 2) of a board in the order of `target.points()`, from an order that OpenCV chose.
+def canonical_order(target: Target, pixels: NDArray[np.float64], levels: Grey) -> NDArray[np.float64]:
+    """All points (n, 2) of a board in the order of `target.points()`, from OpenCV's order.
 
-    x × y points into the image as it does on the board. Of the ways to turn a board that this leaves, squares decide
-    by their colours, and otherwise x points as far to the right as it can.
+    x × y points into the image as on the board. Remaining rotations are resolved by the colours of the squares, or else
+    by the direction of x, which points to the right.
     """
     if isinstance(target, Charuco):
         return pixels
     lattice = pixels.reshape(target.grid[1], target.grid[0], 2)
     match target:
         case AsymmetricCircles():
-            # Rows counted from the other end are the same pattern; columns are not.
+            # The pattern is invariant to a reversal of its rows, but not of its columns.
             return (lattice if is_right_handed(lattice) else lattice[::-1]).reshape(-1, 2)
         case Circles():
             ways = _ways(lattice)
@@ -31,25 +31,25 @@ def ordered(target: Target, pixels: NDArray[np.float64], levels: Grey) -> NDArra
 
 
 def is_right_handed(lattice: Lattice) -> bool:
-    """Whether points (rows, columns, 2) are arranged in the image as on a board that is seen from its printed side."""
+    """True if points (rows, columns, 2) have the orientation of a board seen from its printed side."""
     along, down = lattice[0, -1] - lattice[0, 0], lattice[-1, 0] - lattice[0, 0]
     return bool(along[0] * down[1] - along[1] * down[0] > 0)
 
 
 def cells(lattice: Lattice) -> Lattice:
-    """Centres (rows - 1, columns - 1, 2) of the squares between four corners each."""
+    """Centres (rows - 1, columns - 1, 2) of the cells between four corners each."""
     return 0.25 * (lattice[1:, 1:] + lattice[:-1, 1:] + lattice[1:, :-1] + lattice[:-1, :-1])
 
 
 def _ways(lattice: Lattice) -> list[Lattice]:
-    """The orders that a board of this size may have been found in, all right-handed."""
+    """Possible orders of the points, all right-handed."""
     seen = lattice if is_right_handed(lattice) else lattice[:, ::-1]
     square = seen.shape[0] == seen.shape[1]
     return [np.rot90(seen, quarter) for quarter in (range(4) if square else (0, 2))]
 
 
 def _first_is_black(lattice: Lattice, levels: Grey) -> bool:
-    """Whether the square after the first corner is black, as is the one in the board's corner, diagonally before it."""
+    """True if the square after the first corner is black, like the one in the board's corner."""
     u, v = np.moveaxis(cells(lattice), -1, 0)
     brightness = map_coordinates(levels.astype(np.float32), [v, u], order=1, mode="nearest")
     black = np.indices(brightness.shape).sum(axis=0) % 2 == 0

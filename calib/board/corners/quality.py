@@ -1,4 +1,4 @@
-"""How well an image shows the points of a board: what they scatter by, how sharp edges are, what is saturated."""
+"""Quality of a detection: corner noise, sharpness of edges, saturation."""
 
 import cv2
 import numpy as np
@@ -9,20 +9,20 @@ from calib.board.corners.order import cells
 from calib.board.corners.to_8bit import Grey, Image
 from calib.board.target import AsymmetricCircles, Charuco, Circles, Target, outline
 
-#: Deviation of a corner that fewer points than can tell it are given [px].
-USUAL_SIGMA_PX = 0.15
-#: No estimate from a few dozen points is better than this [px].
-_LEAST_SIGMA_PX = 0.02
+#: Deviation of a corner if too few points allow an estimate [px].
+DEFAULT_SIGMA_PX = 0.15
+#: Lower bound of the estimate [px].
+_MIN_SIGMA_PX = 0.02
 
-#: Values that an analogue-to-digital converter of 10, 12, 14 or 16 bits ends at.
+#: Full scales of analogue-to-digital converters with 10, 12, 14 and 16 bits.
 _FULL_SCALES = (1023, 4095, 16383, 65535)
 
-#: Samples of the brightness across an edge.
+#: Number of brightness samples across an edge.
 _SAMPLES = 33
 
 
 def lattice(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (rows, columns, 2) where they belong on the board, NaN where none was found."""
+    """Points as a grid (rows, columns, 2), NaN where not detected."""
     columns, rows = target.grid
     whole = np.full((rows * columns, 2), np.nan)
     whole[ids] = pixels
@@ -30,7 +30,7 @@ def lattice(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64]) 
 
 
 def spacing_px(points: NDArray[np.float64]) -> float:
-    """Median distance of neighbours in the direction in which they are closer (rows, columns, 2) [px]; NaN if none."""
+    """Median distance of neighbours (rows, columns, 2) along the axis with the smaller one [px]; NaN without any."""
     steps = [np.linalg.norm(np.diff(points, axis=axis), axis=-1) for axis in (0, 1)]
     known = [float(np.median(step[~np.isnan(step)])) for step in steps if not np.isnan(step).all()]
     return min(known, default=float("nan"))
@@ -39,27 +39,27 @@ def spacing_px(points: NDArray[np.float64]) -> float:
 def sigma_px(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64]) -> float:
     """Standard deviation of one coordinate of a point [px], estimated from the points themselves.
 
-    What a homography leaves is lens distortion, which is smooth, and noise, which is not. Third differences along rows
-    and columns, x₃ − 3 x₂ + 3 x₁ − x₀, cancel what is smooth and have √20 times the deviation of the noise. With fewer
-    than ten of them it is `USUAL_SIGMA_PX`.
+    Residuals from a homography consist of smooth lens distortion and noise. Third differences along rows and columns,
+    x₃ − 3 x₂ + 3 x₁ − x₀, cancel smooth terms and have √20 times the deviation of the noise. With fewer than ten of
+    them the result is `DEFAULT_SIGMA_PX`.
     """
     board = target.points()[ids, :2]
     H, _ = cv2.findHomography(board, pixels)
     if H is None:
-        return USUAL_SIGMA_PX
+        return DEFAULT_SIGMA_PX
     residual = lattice(target, ids, pixels - cv2.perspectiveTransform(board[:, None], H)[:, 0])
     differences = np.concatenate([np.diff(residual, n=3, axis=axis).ravel() for axis in (0, 1)])
     differences = differences[~np.isnan(differences)]
     if len(differences) < 20:
-        return USUAL_SIGMA_PX
-    return max(float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20)), _LEAST_SIGMA_PX)
+        return DEFAULT_SIGMA_PX
+    return max(float(1.4826 * np.median(np.abs(differences)) / np.sqrt(20)), _MIN_SIGMA_PX)
 
 
-def saturated_share(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64], image: Image) -> float:
-    """Part of the board's pixels that are as bright as the sensor can tell, 0 to 1.
+def saturated_fraction(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.float64], image: Image) -> float:
+    """Fraction of the board's pixels at full scale, 0 to 1.
 
-    That is 255 in 8 bits, and in 16 bits the largest number of 10, 12, 14 or 16 bits if it is the image's largest.
-    Other types have no largest number and are never saturated.
+    Full scale is 255 in 8 bits; in 16 bits it is that of 10, 12, 14 or 16 bits if the image's maximum equals it. Other
+    types have no full scale and are never saturated.
     """
     full = full_scale(image)
     H, _ = cv2.findHomography(target.points()[ids, :2], pixels)
@@ -72,7 +72,7 @@ def saturated_share(target: Target, ids: NDArray[np.intp], pixels: NDArray[np.fl
 
 
 def full_scale(image: Image) -> float:
-    """The number at which a sensor saturates, NaN if it is not known."""
+    """Value at which a sensor saturates, NaN if unknown."""
     if image.dtype == np.uint8:
         return 255.0
     largest = float(np.max(image)) if image.dtype == np.uint16 else np.nan
@@ -80,15 +80,15 @@ def full_scale(image: Image) -> float:
 
 
 def is_saturated(image: Image) -> NDArray[np.bool_]:
-    """Which pixels (height, width) are as bright as the sensor can tell; of colours all channels."""
+    """Mask (height, width) of pixels at full scale; for colours, in all channels."""
     full = np.asarray(np.greater_equal(image, full_scale(image)), np.bool_)
     return np.asarray(full.all(axis=2) if full.ndim == 3 else full)
 
 
 def edge_px(target: Target, points: NDArray[np.float64], levels: Grey) -> float:
-    """Distance over which edges rise from 10 to 90 % [px], in the direction in which it is longer; NaN without edges.
+    """Width of edges from 10 to 90 % [px], along the axis with the wider ones; NaN without edges.
 
-    Brightness is read along lines across all edges of one direction and averaged. A Gaussian blur of deviation σ has
+    Brightness is sampled along lines across all edges of one direction and averaged. A Gaussian blur of deviation σ has
     its steepest slope, contrast / (σ √2π), at the edge, and rises from 10 to 90 % within 2.563 σ.
     """
     rises = [_rise(*_lines(target, points, axis), levels) for axis in (0, 1)]
@@ -97,7 +97,7 @@ def edge_px(target: Target, points: NDArray[np.float64], levels: Grey) -> float:
 
 
 def _rise(start: NDArray[np.float64], end: NDArray[np.float64], levels: Grey) -> float:
-    """The rise of an edge that all lines from `start` to `end` (n, 2) cross half way [px]."""
+    """Edge width [px] from lines `start` to `end` (n, 2) that cross an edge at their midpoint."""
     seen = ~np.isnan(start + end).any(axis=1)
     start, end = start[seen], end[seen]
     if not len(start):
@@ -112,7 +112,7 @@ def _rise(start: NDArray[np.float64], end: NDArray[np.float64], levels: Grey) ->
 
 
 def _lines(target: Target, points: NDArray[np.float64], axis: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Ends (n, 2) of lines across edges: from disc half way to the next, or from square to square across their edge.
+    """Ends (n, 2) of lines across edges: from a disc half way to the next, or between the centres of adjacent squares.
 
     A ChArUco's white squares are white only near their edges, so lines end before the marker begins.
     """

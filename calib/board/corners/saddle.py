@@ -1,4 +1,4 @@
-"""Corners to a few hundredths of a pixel: around one, brightness is a saddle."""
+"""Subpixel corner refinement: a corner is a saddle point of the brightness."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,21 +6,21 @@ from scipy.ndimage import map_coordinates, spline_filter
 
 from calib.board.corners.to_8bit import Grey
 
-#: Steps of the iteration; each halves what is left at the very least.
+#: Newton steps; each at least halves the error.
 _STEPS = 5
 
 
 def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
-    """Corners (n, 2) where a paraboloid fitted to the brightness around each has its saddle.
+    """Corners (n, 2) at the saddle of a paraboloid fitted to the brightness around each.
 
     L. Lucchese and S. K. Mitra, Using saddle points for subpixel feature detection in camera calibration targets,
-    APCCAS 2002. On rendered boards its errors are a third of those of OpenCV's corners. Where the fit is no saddle
-    within `radius` of the corner, the corner stays as it is.
+    APCCAS 2002. On rendered boards the errors are a third of those of OpenCV's refinement. Corners without a saddle
+    within `radius` are returned unchanged.
 
     Args:
         levels: the image.
-        pixels: corners to begin with [px].
-        radius: of the neighbourhood that is fitted [px].
+        pixels: initial corners [px].
+        radius: radius of the fitted neighbourhood [px].
     """
     v, u = (part.ravel() for part in np.mgrid[-radius : radius + 1, -radius : radius + 1])
     weight = 1 - (u**2 + v**2) / (radius + 1) ** 2
@@ -43,7 +43,7 @@ def refine(levels: Grey, pixels: NDArray[np.float64], radius: int) -> NDArray[np
 
 
 def _around(levels: Grey, pixels: NDArray[np.float64], radius: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Spline coefficients of the part of the image around all corners, and the corners in it."""
+    """Spline coefficients of the image region around all corners, and the corners' coordinates in it."""
     margin = 2 * radius + 12
     low = np.maximum(np.floor(pixels.min(axis=0)).astype(int) - margin, 0)
     high = np.ceil(pixels.max(axis=0)).astype(int) + margin

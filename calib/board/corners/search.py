@@ -1,4 +1,4 @@
-"""Where OpenCV finds the points of a board, before anything is checked or put in order."""
+"""Raw detection of board points by OpenCV, without checks and ordering."""
 
 from collections.abc import Iterator
 
@@ -11,21 +11,21 @@ from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, 
 
 Found = tuple[NDArray[np.intp], NDArray[np.float64]]
 
-#: Larger images are searched at half, a third … of their size [px]; what is found is refined later.
+#: Images above this size are searched at an integer fraction of their size [px]; corners are refined later.
 _LARGEST = 2000
-#: Smaller ones are enlarged if nothing is found: squares, and discs, have to have some ten pixels [px].
+#: Images below this size are enlarged if nothing is found, because squares and discs need about ten pixels [px].
 _SMALLEST, _SMALLEST_OF_DISCS = 400, 1000
 
-#: Blobs per disc of the board above which the search for a grid among them would take minutes.
-_MOST_BLOBS = 3
+#: Largest number of blobs per disc; the grid search takes minutes above it.
+_MAX_BLOBS = 3
 
 _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 
 
 def find(target: Target, levels: Grey) -> Found:
-    """Numbers (n,) of the points that are seen and their pixels (n, 2), in the order that OpenCV counts them.
+    """Indices (n,) and pixels (n, 2) of the detected points, in OpenCV's order.
 
-    All kinds but ChArUco are found whole or not at all; then n is 0.
+    All boards but ChArUco are detected completely or not at all; then n is 0.
     """
     for attempt in (levels, local_contrast(levels)):
         for scale in _scales(target, levels):
@@ -69,7 +69,7 @@ def _find(target: Target, levels: Grey) -> Found:
 
 
 def is_cut_off(target: Target, levels: Grey) -> bool:
-    """Whether an image in which the board was not found shows a part of one that goes on beyond the image's end."""
+    """True if an image without a detection shows part of a board that continues beyond the border."""
     match target:
         case Chessboard():
             flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
@@ -80,12 +80,12 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
         case _:
             blobs = _disc_detector(target, levels).detect(levels)
             part = np.array([blob.pt for blob in blobs]).reshape(-1, 2)
-    if not 9 <= len(part) <= _MOST_BLOBS * len(target.points()):
+    if not 9 <= len(part) <= _MAX_BLOBS * len(target.points()):
         return False
     between = np.linalg.norm(part[:, None] - part[None], axis=-1)
     between[np.diag_indices(len(part))] = np.inf
     closest = between.min(axis=1)
-    regular = closest.std() < 0.3 * np.median(closest)  # what looks like discs may be anything
+    regular = closest.std() < 0.3 * np.median(closest)  # rejects clutter that resembles discs
     to_end = np.minimum(part, np.array(levels.shape[::-1]) - 1 - part).min()
     return bool(regular and to_end < 1.5 * np.median(closest))
 
@@ -94,7 +94,7 @@ def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) 
     nothing = False, np.zeros((0, 2))
     discs = target.columns * target.rows
     detector = _disc_detector(target, levels)
-    if not discs <= len(detector.detect(levels)) <= _MOST_BLOBS * discs:
+    if not discs <= len(detector.detect(levels)) <= _MAX_BLOBS * discs:
         return nothing
     for how in (kind, kind | cv2.CALIB_CB_CLUSTERING):
         found, centers = cv2.findCirclesGrid(levels, target.grid, flags=how, blobDetector=detector)
@@ -105,7 +105,7 @@ def _find_circles(target: Circles | AsymmetricCircles, levels: Grey, kind: int) 
 
 def _disc_detector(target: Circles | AsymmetricCircles, levels: Grey) -> cv2.SimpleBlobDetector:
     parameters = cv2.SimpleBlobDetector.Params()
-    # The default takes nothing above 5000 pixels, and thresholds so far apart that centres jump.
+    # The defaults limit blobs to 5000 pixels and use threshold steps so large that centres jump.
     parameters.maxArea = levels.size / (target.columns * target.rows)
     parameters.minArea = 12
     parameters.minDistBetweenBlobs = 4

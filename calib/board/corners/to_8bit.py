@@ -1,4 +1,4 @@
-"""Images of any depth as grey levels of 8 bits, which is what OpenCV finds boards in."""
+"""Conversion of images of any depth to 8-bit grey levels for OpenCV."""
 
 import cv2
 import numpy as np
@@ -7,16 +7,16 @@ from numpy.typing import NDArray
 Image = NDArray[np.integer | np.floating]
 Grey = NDArray[np.uint8]
 
-#: What becomes black and white, in percent of the pixels: a few of them are dead, or a lamp.
+#: Percentiles mapped to black and white; excludes dead pixels and lamps.
 _BLACK, _WHITE = 0.5, 99.5
 
 
 def grey(image: Image) -> Grey:
-    """The image (height, width) as 8 bits.
+    """Image (height, width) as 8 bits.
 
-    Colour (height, width, 3) becomes the mean of its channels, so that red, green, blue and blue, green, red are the
-    same. 8 bits stay as they are. Numbers of any other type are the square root of what they are between two
-    percentiles: light that a sensor sends out itself falls with the square of the distance. NaN is black.
+    Colour (height, width, 3) becomes the mean of its channels, independent of their order. 8 bits are unchanged. Other
+    types are scaled between two percentiles and mapped by a square root, because active illumination falls with the
+    square of the distance. NaN becomes black.
     """
     if image.ndim == 3:
         image = cv2.transform(np.ascontiguousarray(image[..., :3]), np.full((1, 3), 1 / 3))
@@ -29,5 +29,5 @@ def grey(image: Image) -> Grey:
 
 
 def local_contrast(levels: Grey) -> Grey:
-    """The same with the contrast of each region stretched, for boards that are lit unevenly."""
+    """Image with local contrast enhancement (CLAHE), for uneven lighting."""
     return cv2.createCLAHE(clipLimit=4.0, tileGridSize=(8, 8)).apply(levels).astype(np.uint8, copy=False)

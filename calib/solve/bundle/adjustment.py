@@ -1,8 +1,8 @@
-"""Robust least squares on a calibration's equations, deviations of the groups included.
+"""Robust nonlinear least squares with estimated variance components.
 
-SciPy's trust region runs in the metric of the curvature where it starts (as the tracker's search does, docs/decisions):
-focal lengths in pixels, coefficients of a lens and metres then are all of the same size and nearly independent, and the
-inner solver needs a dozen products with the sparse Jacobian instead of thousands.
+SciPy's trust-region solver runs in coordinates scaled by the curvature at its start (as in the tracker's search, see
+docs/decisions): focal lengths in pixels, lens coefficients and metres then have similar scale and are nearly
+uncorrelated, and the inner solver needs a dozen products with the sparse Jacobian instead of thousands.
 """
 
 from collections.abc import Callable
@@ -22,39 +22,40 @@ from calib.solve.bundle.layout import Layout
 from calib.solve.bundle.observability import require_determined, require_touched
 from calib.solve.bundle.state import State
 
-#: Given the equations at a state, with the deviations found so far.
+#: Builds the equations about a state, given the deviations estimated so far.
 Formulate = Callable[[State, tuple[float, ...]], Equations]
 
-#: Searches with deviations of the groups estimated in between.
+#: Optimisations, with the deviations of the groups re-estimated in between.
 ROUNDS = 3
 
-#: Steps until the metric is taken anew, and how often that is done: far from the minimum its metric is another.
+#: Steps per stage, and maximum number of stages; the curvature is recomputed for every stage.
 STEPS = 25
 STAGES = 12
 
-#: A stage that lowers the cost by less than this was the last: a tenth of a deviation of the least known parameter.
-LEAST_GAIN = 0.005
+#: Convergence: smallest decrease of the cost in a stage, a tenth of a deviation of the worst determined parameter.
+MIN_GAIN = 0.005
 
-#: Added to the metric, as a share of each parameter's own: a rational lens without distortion is no direction twice.
+#: Damping relative to the diagonal of the curvature, for the redundant parameters of a rational lens without
+#: distortion.
 DAMPING = 1e-10
 
-#: A factor of a deviation is not believed to be smaller: no detector is a hundred times better than it says.
-LEAST_FACTOR = 0.01
+#: Lower bound of a group's deviation factor.
+MIN_FACTOR = 0.01
 
 
 class NotSolvedError(ValueError):
-    """The search found no minimum."""
+    """The optimisation did not converge."""
 
 
 @dataclass(frozen=True)
 class Adjustment:
-    """The minimum and what is known of it.
+    """Minimum of the cost with its covariance.
 
     Attributes:
-        equations: at the minimum: its `base` is the solution, and the deviations in it are the estimated ones.
-        factors: by which the deviations of every group were multiplied.
+        equations: at the minimum: `base` is the solution; deviations are the estimated ones.
+        factors: estimated factor on the deviations of every group.
         covariance: of increments of the parameters (size, size).
-        residuals: in estimated deviations (n,).
+        residuals: normalised by the estimated deviations (n,).
     """
 
     equations: Equations
@@ -64,33 +65,33 @@ class Adjustment:
 
     @property
     def state(self) -> State:
-        """The solution."""
+        """Solution."""
         return self.equations.base
 
     @property
     def layout(self) -> Layout:
-        """Its parameters."""
+        """Parameter vector."""
         return self.equations.layout
 
 
 def adjust(formulate: Formulate, start: State, groups: int, note: Callable[[str], None]) -> Adjustment:
-    """Finds the state that explains the measurements best.
+    """State that minimises the robust cost.
 
     Args:
         formulate: builds the equations about a state.
-        start: state to begin with.
+        start: initial state.
         groups: number of groups of measurements.
-        note: told in words how it goes.
+        note: called with progress messages.
 
     Raises:
-        UndeterminedError: if the measurements leave some parameter open.
-        NotSolvedError: if the search did not end, or the start explains nothing.
+        UndeterminedError: the measurements do not determine some parameters.
+        NotSolvedError: no convergence, or the initial state is infeasible.
     """
     factors = (1.0,) * groups
     found = _round(formulate, start, factors)
     for number in range(1, ROUNDS):
         note(f"round {number} of {ROUNDS}: {_rms(found.residuals):.2f} deviations rms")
-        found = _round(formulate, found.state, _rescaled(found))
+        found = _round(formulate, found.state, _updated_factors(found))
     note(f"round {ROUNDS} of {ROUNDS}: {_rms(found.residuals):.2f} deviations rms")
     return found
 
@@ -101,10 +102,10 @@ def _round(formulate: Formulate, start: State, factors: tuple[float, ...]) -> Ad
 
 
 def search(equations: Equations) -> State:
-    """The state that explains the measurements of some equations best.
+    """State that minimises the robust cost of the equations.
 
     Raises:
-        UndeterminedError, NotSolvedError: as `adjust`.
+        UndeterminedError, NotSolvedError: as in `adjust`.
     """
     if not np.all(np.isfinite(equations.residuals(np.zeros(equations.layout.size)))):
         raise NotSolvedError("the first guess puts a board behind a camera that saw it; check the given calibration")
@@ -119,16 +120,16 @@ def search(equations: Equations) -> State:
 
 
 def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
-    """Increments after some steps in the metric of the curvature at their start, and whether that is the minimum."""
+    """Increments after at most `STEPS` steps in coordinates scaled by the curvature; True if converged."""
     start = np.zeros(equations.layout.size)
     residuals = equations.residuals(start)
-    # Weighted as the loss weighs the residuals there, so that a few gross errors do not shape the metric.
+    # Weighted like the robust loss, so that a few gross errors do not dominate the curvature.
     weights = sparse.diags_array(np.sqrt(robust.influence(residuals) / np.where(residuals == 0, 1, residuals)))
     curvature = require_touched(_normal(weights @ equations.jacobian(start)), equations.layout.names)
     factor = linalg.cholesky(curvature + DAMPING * np.diag(np.diag(curvature)), lower=True)
     metric = linalg.solve_triangular(factor.T, np.eye(len(factor)))
 
-    def derivatives(steps: NDArray[np.float64]) -> Any:  # SciPy's product of operators is no public type
+    def derivatives(steps: NDArray[np.float64]) -> Any:  # SciPy's operator product has no public type
         return aslinearoperator(equations.jacobian(metric @ steps)) @ aslinearoperator(metric)
 
     found = least_squares(
@@ -139,42 +140,42 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
         tr_solver="lsmr",
         loss="soft_l1",
         f_scale=robust.SOFT_L1_SCALE,
-        ftol=1e-8,  # a cost of n / 2 then ends within a hundredth of a deviation
+        ftol=1e-8,  # relative to a cost of n / 2: about a hundredth of a deviation
         xtol=1e-10,
-        gtol=1e-3,  # of a deviation, since the metric is that of the curvature
+        gtol=1e-3,  # in deviations, because the coordinates are scaled by the curvature
         max_nfev=STEPS,
     )
     gained = _cost(residuals) - float(found.cost)
-    return metric @ found.x, found.status > 0 or gained < LEAST_GAIN
+    return metric @ found.x, found.status > 0 or gained < MIN_GAIN
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:
-    """Half the sum of the loss, as SciPy counts it."""
+    """Robust cost as defined by SciPy: half the sum of the loss."""
     scale = robust.SOFT_L1_SCALE
     return float(np.sum(scale**2 * (np.sqrt(1 + (residuals / scale) ** 2) - 1)))
 
 
 def _covariance(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Covariance of the increments and whitened residuals at the equations' base."""
+    """Covariance of the increments, and normalised residuals, at the equations' base."""
     zero = np.zeros(equations.layout.size)
     residuals = equations.residuals(zero)
     curvature = require_determined(_normal(equations.jacobian(zero)), equations.layout.names)
     size = np.sqrt(np.diag(curvature))
     inverse = linalg.inv(curvature / np.outer(size, size)) / np.outer(size, size)
-    return _widening(equations, residuals) * (inverse + inverse.T) / 2, residuals
+    return _covariance_inflation(equations, residuals) * (inverse + inverse.T) / 2, residuals
 
 
-def _widening(equations: Equations, residuals: NDArray[np.float64]) -> float:
-    """By how much the robust loss widens the covariance: the mean over the groups, each with unit deviations."""
+def _covariance_inflation(equations: Equations, residuals: NDArray[np.float64]) -> float:
+    """Inflation of the covariance by the robust loss: mean over the groups, each scaled to unit deviation."""
     unit = []
     for rows in equations.slices():
         own = residuals[rows]
         unit.append(own / max(robust.scale(own, own.size), 1e-12))
-    return robust.widening(np.concatenate(unit))
+    return robust.covariance_inflation(np.concatenate(unit))
 
 
-def _rescaled(solved: Adjustment) -> tuple[float, ...]:
-    """Deviations of the groups as their residuals show them (estimation of variance components)."""
+def _updated_factors(solved: Adjustment) -> tuple[float, ...]:
+    """Updated deviation factors of the groups, from their residuals (variance component estimation)."""
     equations = solved.equations
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
     found = []
@@ -184,16 +185,16 @@ def _rescaled(solved: Adjustment) -> tuple[float, ...]:
         redundancy = own.size - taken
         grown = 1.0
         if redundancy > 0.2 * own.size:
-            grown = robust.scale(own, redundancy) * _shared(group, own)
-        found.append(max(factor * grown, LEAST_FACTOR))
+            grown = robust.scale(own, redundancy) * _correlation_inflation(group, own)
+        found.append(max(factor * grown, MIN_FACTOR))
     return tuple(found)
 
 
-def _shared(group: Group, residuals: NDArray[np.float64]) -> float:
-    """By how much errors that a view's distances share widen their deviation.
+def _correlation_inflation(group: Group, residuals: NDArray[np.float64]) -> float:
+    """Inflation of the deviation by errors that the distances of a view have in common.
 
-    Neighbouring pixels of a depth sensor err together, so that a thousand of them say less than a thousand would: what
-    counts is how far the means of views scatter.
+    Errors of neighbouring pixels of a depth sensor are correlated, so a thousand distances carry less information than
+    a thousand independent ones. The inflation follows from the scatter of the views' means.
     """
     if not isinstance(group.measured, Planes):
         return 1.0
@@ -215,6 +216,6 @@ def _rms(residuals: NDArray[np.float64]) -> float:
 
 
 def rescale(equations: Equations, factors: tuple[float, ...]) -> Equations:
-    """The same equations with the deviations of every group multiplied."""
+    """Equations with the deviations of every group scaled."""
     groups = [group.rescaled(factor) for group, factor in zip(equations.groups, factors, strict=True)]
     return replace(equations, groups=groups)

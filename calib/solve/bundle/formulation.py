@@ -1,4 +1,4 @@
-"""From a task to equations about a state: groups of measurements, numbered shots, times."""
+"""Conversion of a task to equations about a state."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from calib.views import CornerView, PlaneView
 
 @dataclass(frozen=True)
 class Formulation:
-    """A task as equations; called with a state and factors of deviations.
+    """Task as a function from a state and deviation factors to equations.
 
     Attributes:
-        task: what is asked.
-        layout: the parameters.
-        shot_times: of the layout's shots on the rig's clock (shots,) [s].
+        task: the calibration task.
+        layout: parameter vector.
+        shot_times: times of the layout's shots on the rig's clock (shots,) [s].
     """
 
     task: Task
@@ -31,14 +31,14 @@ class Formulation:
     shot_times: NDArray[np.float64]
 
     def __call__(self, state: State, factors: tuple[float, ...]) -> Equations:
-        """The equations about a state, with the deviations of every group times its factor."""
+        """Equations about a state, with the deviations of every group multiplied by its factor."""
         groups = [self._group(sensor, views, state) for sensor, views in groups_of(self.task)]
         return rescale(Equations(self.layout, state, groups, self.shot_times), factors)
 
     def _group(self, sensor: str, views: Sequence[CornerView | PlaneView], state: State) -> Group:
         shots = [view.shot for view in views]
         times = np.array([view.t_s for view in views])
-        if self.task.sensors[sensor].runs_free:
+        if self.task.sensors[sensor].free_running:
             on_rig = times + state.sensors[sensor].time_offset
             rows = motion.neighbours(on_rig, self.shot_times, self.task.longest_gap)
             for index in np.flatnonzero(rows[:, 0] < 0):
@@ -48,18 +48,18 @@ class Formulation:
         return Group(sensor, _measured(views), rows, times)
 
     def _still(self, shot: int, time: float) -> int:
-        """Row of the shot, of a board that stood still, or of the nearest if others have taken its place."""
+        """Row of the shot if it has a pose of its own, as for a static board; otherwise of the nearest in time."""
         if shot in self.layout.shots:
             return self.layout.shots.index(shot)
         return int(np.abs(self.shot_times - time).argmin())
 
 
 def formulate(task: Task) -> Formulation:
-    """The equations of a task."""
+    """Equations of a task."""
     times = _shot_times(task)
     order = sorted(times, key=lambda shot: (times[shot], shot))
-    freedoms = {name: sensor.freedom(name != task.reference) for name, sensor in task.sensors.items()}
-    return Formulation(task, Layout(freedoms, order), np.array([times[shot] for shot in order]))
+    free_parameters = {name: sensor.free_parameters(name != task.reference) for name, sensor in task.sensors.items()}
+    return Formulation(task, Layout(free_parameters, order), np.array([times[shot] for shot in order]))
 
 
 def groups_of(task: Task) -> list[tuple[str, Sequence[CornerView | PlaneView]]]:
@@ -73,14 +73,14 @@ def groups_of(task: Task) -> list[tuple[str, Sequence[CornerView | PlaneView]]]:
 
 
 def _shot_times(task: Task) -> Mapping[int, float]:
-    """When each shot was, as the sensors on the rig's clock say.
+    """Mean time of each shot on the rig's clock.
 
-    A shot that none of them saw counts only if they saw no motion around it, from which its board could be had.
+    A shot without synchronised views is omitted if its board pose can be interpolated between shots around it.
     """
     synchronised: dict[int, list[float]] = {}
     free: dict[int, list[float]] = {}
     for view in (*task.corners, *task.planes):
-        times = free if task.sensors[view.sensor].runs_free else synchronised
+        times = free if task.sensors[view.sensor].free_running else synchronised
         times.setdefault(view.shot, []).append(view.t_s)
     means = {shot: float(np.mean(times)) for shot, times in synchronised.items()}
     lonely = {shot: float(np.mean(times)) for shot, times in free.items() if shot not in synchronised}

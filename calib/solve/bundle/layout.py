@@ -1,7 +1,7 @@
-"""Which numbers of a state are free, what they are called, and how increments of them change it.
+"""Free parameters of a state: names, columns, and application of increments.
 
-Every parameter is an increment on the state that the search started from. Poses are turned about the axes of the rig:
-R ← exp(δ) R, t ← t + δt, so that no rotation is near a singularity and deviations read as angles about those axes.
+Every parameter is an increment on the initial state. Poses rotate about the axes of the rig: R ← exp(δ) R, t ← t + δt,
+so that no rotation is near a singularity and deviations are angles about those axes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,59 +22,62 @@ DEPTH_TERMS = ("depth_offset", "depth_scale")
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """What is free of one sensor.
+class FreeParameters:
+    """Free parameters of one sensor.
 
     Attributes:
-        kind: of its lens.
-        intrinsics: names of the free intrinsics, a leading part of the camera matrix and the kind's coefficients.
-        moves: whether its pose is free; that of the rig's reference is not.
+        kind: kind of its lens.
+        intrinsics: names of the free intrinsics: camera matrix and lens coefficients, or none.
+        moves: True if its pose is free; false for the reference sensor.
         depth: free ones of `DEPTH_TERMS`.
-        runs_free: whether its clock has an unknown offset.
+        free_running: True if its clock has an unknown offset (free-running sensor).
     """
 
     kind: LensKind
     intrinsics: tuple[str, ...] = ()
     moves: bool = True
     depth: tuple[str, ...] = ()
-    runs_free: bool = False
+    free_running: bool = False
 
     @property
-    def held(self) -> tuple[str, ...]:
-        """Free parameters that are held near zero."""
-        return tuple(name for name in self.kind.held if name in self.intrinsics)
+    def regularized(self) -> tuple[str, ...]:
+        """Free parameters with a prior around zero."""
+        return tuple(name for name in self.kind.regularized if name in self.intrinsics)
 
     @property
     def names(self) -> tuple[str, ...]:
         """All free parameters of the sensor, in the order of the vector."""
         return (
-            self.intrinsics + (POSE if self.moves else ()) + self.depth + (("time_offset",) if self.runs_free else ())
+            self.intrinsics
+            + (POSE if self.moves else ())
+            + self.depth
+            + (("time_offset",) if self.free_running else ())
         )
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The vector of parameters: sensors first, each with its free parameters, then six of every shot's board."""
+    """Parameter vector: the free parameters of each sensor, then six for the board pose of every shot."""
 
-    freedoms: Mapping[str, Freedom]
+    free_parameters: Mapping[str, FreeParameters]
     shots: Sequence[int]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Name of every parameter, such as `tof.fx`, `color.rotation_x` or `board 3.z`."""
-        sensors = [f"{sensor}.{name}" for sensor, freedom in self.freedoms.items() for name in freedom.names]
+        sensors = [f"{sensor}.{name}" for sensor, free in self.free_parameters.items() for name in free.names]
         return (*sensors, *(f"board {shot}.{name}" for shot in self.shots for name in POSE))
 
     @cached_property
     def starts(self) -> Mapping[str, int]:
         """First column of every sensor."""
-        counts = [len(freedom.names) for freedom in self.freedoms.values()]
-        return dict(zip(self.freedoms, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
+        counts = [len(free.names) for free in self.free_parameters.values()]
+        return dict(zip(self.free_parameters, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
 
     @property
     def board_start(self) -> int:
-        """First column of the boards."""
-        return sum(len(freedom.names) for freedom in self.freedoms.values())
+        """First column of the board poses."""
+        return sum(len(free.names) for free in self.free_parameters.values())
 
     @property
     def size(self) -> int:
@@ -83,11 +86,11 @@ class Layout:
 
     def columns(self, sensor: str, names: Sequence[str]) -> NDArray[np.intp]:
         """Columns of some free parameters of a sensor."""
-        own = self.freedoms[sensor].names
+        own = self.free_parameters[sensor].names
         return np.array([self.starts[sensor] + own.index(name) for name in names], np.intp)
 
     def move(self, state: State, increments: NDArray[np.float64]) -> State:
-        """The state after increments (size,)."""
+        """State after increments (size,)."""
         boards = increments[self.board_start :].reshape(-1, 6)
         return State(
             {name: self._moved(name, sensor, increments) for name, sensor in state.sensors.items()},
@@ -95,11 +98,11 @@ class Layout:
         )
 
     def _moved(self, name: str, sensor: SensorState, increments: NDArray[np.float64]) -> SensorState:
-        freedom = self.freedoms[name]
+        free = self.free_parameters[name]
         start = self.starts[name]
-        steps = dict(zip(freedom.names, increments[start : start + len(freedom.names)].tolist(), strict=True))
-        camera = _refitted(sensor.camera, freedom.kind, steps)
-        if freedom.moves:
+        steps = dict(zip(free.names, increments[start : start + len(free.names)].tolist(), strict=True))
+        camera = _refitted(sensor.camera, free.kind, steps)
+        if free.moves:
             camera = replace(camera, T_rs=turned(camera.T_rs, np.array([steps[name] for name in POSE])))
         return SensorState(
             camera,
@@ -110,7 +113,7 @@ class Layout:
 
 
 def turned(T_ab: Pose, increments: NDArray[np.float64]) -> Pose:
-    """A pose after increments (6,): turned by the first three about the axes of a, moved by the others."""
+    """Pose after increments (6,): rotation about the axes of a by the first three, translation by the others."""
     turn = pose.from_rotation_vector(increments[:3], np.zeros(3))
     moved = T_ab.copy()
     moved[:3, :3] = turn[:3, :3] @ T_ab[:3, :3]

@@ -1,4 +1,4 @@
-"""The kinds of lenses that can be fitted: which coefficients each has, and how a lens is made of them."""
+"""Lens models that can be fitted, with their coefficients."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,33 +10,33 @@ from calib import fisheye, lens
 from calib.fisheye import KannalaBrandt
 from calib.lens import Lens, LensModel
 
-#: The camera matrix, in the order of the parameters; the lens follows.
+#: Parameters of the camera matrix; lens coefficients follow.
 MATRIX = ("fx", "fy", "cx", "cy")
 
 
-#: Deviation of coefficients that are held near zero. Numerator and denominator of a rational lens may share a factor,
-#: which says nothing and can be anything; without this the search wanders along it for ever.
-HELD = 2.0
+#: Standard deviation of the prior on regularised coefficients. Numerator and denominator of a rational lens may share a
+#: common factor, which is unobservable; without a prior the search drifts along it.
+PRIOR_SIGMA = 2.0
 
 
 @dataclass(frozen=True)
 class LensKind:
-    """A family of lenses.
+    """Family of lenses.
 
     Attributes:
-        name: what the command line and reports call it.
-        every: names of all coefficients of such a lens.
-        coefficients: names of those that are fitted, the first of all; the others stay as they are.
-        make: the lens with given coefficients.
-        held: names of coefficients that are held near zero; what they should be is known to about `HELD`.
-        simpler: kinds to begin the search with, at most one.
+        name: on the command line and in reports.
+        every: names of all coefficients.
+        coefficients: names of the fitted coefficients, a prefix of `every`; the others stay constant.
+        make: constructs a lens from coefficients.
+        regularized: names of coefficients with a prior of deviation `PRIOR_SIGMA` around zero.
+        simpler: kind to initialise with; at most one.
     """
 
     name: str
     every: tuple[str, ...]
     coefficients: tuple[str, ...]
     make: Callable[[NDArray[np.float64]], LensModel]
-    held: tuple[str, ...] = ()
+    regularized: tuple[str, ...] = ()
     simpler: tuple["LensKind", ...] = ()
 
 
@@ -49,7 +49,7 @@ KINDS: Mapping[str, LensKind] = {kind.name: kind for kind in (PINHOLE, BROWN_CON
 
 
 def kind_of(fitted: LensModel) -> LensKind:
-    """The kind that a given lens is of: the one with the fewest coefficients that can express it."""
+    """Kind of a given lens with the fewest coefficients."""
     if isinstance(fitted, KannalaBrandt):
         return FISHEYE
     return RATIONAL if np.any(fitted.coefficients[len(BROWN_CONRADY.coefficients) :]) else BROWN_CONRADY

@@ -1,18 +1,18 @@
-"""Says by name which parameters the measurements leave open, before anything is divided by zero."""
+"""Detection of parameters that the measurements do not determine, by name."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-#: Least eigenvalue of the correlation form of the curvature; less is rounding.
-LEAST_EIGENVALUE = 1e-13
+#: Smallest eigenvalue of the correlation form of the curvature; smaller ones are rounding errors.
+MIN_EIGENVALUE = 1e-13
 
-#: Parameters with at least this share of the direction that is open are named.
+#: Parameters with at least this share of the null direction are named.
 SHARE = 0.2
 
 
 class UndeterminedError(ValueError):
-    """Measurements that leave parameters open; `names` are theirs."""
+    """Parameters that the measurements do not determine; `names` are theirs."""
 
     def __init__(self, names: list[str]) -> None:
         self.names = names
@@ -24,10 +24,10 @@ class UndeterminedError(ValueError):
 
 
 def require_touched(curvature: NDArray[np.float64], names: tuple[str, ...]) -> NDArray[np.float64]:
-    """The curvature (n, n), if every parameter changes some residual: enough to begin a search with.
+    """Curvature (n, n), checked for parameters that change no residual.
 
     Raises:
-        UndeterminedError: with the names of those that change none.
+        UndeterminedError: with the names of those parameters.
     """
     untouched = [name for name, value in zip(names, np.diag(curvature), strict=True) if not value > 0]
     if untouched:
@@ -36,14 +36,14 @@ def require_touched(curvature: NDArray[np.float64], names: tuple[str, ...]) -> N
 
 
 def require_determined(curvature: NDArray[np.float64], names: tuple[str, ...]) -> NDArray[np.float64]:
-    """The curvature (n, n) of the whitened residuals, if it determines all parameters.
+    """Curvature (n, n) of the normalised residuals, checked for full rank.
 
     Raises:
-        UndeterminedError: with the names of those that it does not.
+        UndeterminedError: with the names of the undetermined parameters.
     """
     size = np.sqrt(np.diag(require_touched(curvature, names)))
     values, directions = linalg.eigh(curvature / np.outer(size, size))
-    if values[0] < LEAST_EIGENVALUE:
+    if values[0] < MIN_EIGENVALUE:
         shares = np.abs(directions[:, 0]) / np.abs(directions[:, 0]).max()
         order = np.argsort(-shares)
         raise UndeterminedError([names[index] for index in order if shares[index] >= SHARE])

@@ -1,4 +1,4 @@
-"""Rotations in bulk: exponential, logarithm and left Jacobian of stacks of rotation vectors.
+"""Vectorised rotations: exponential, logarithm and left Jacobian of arrays of rotation vectors.
 
 T. D. Barfoot, State Estimation for Robotics, chapter 7.
 """
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-#: Below this angle [rad] the closed forms lose digits and series take over.
+#: Below this angle [rad] the series replace the closed forms, which lose digits.
 SMALL = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Everything that a calibration determines, at one moment of the search or at its end."""
+"""Values determined by a calibration, during or after the optimisation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,12 +9,12 @@ from calib.pose import Pose
 
 @dataclass(frozen=True, slots=True)
 class SensorState:
-    """One optical head.
+    """State of one optical head.
 
     Attributes:
         camera: projection with its pose in the rig.
         depth_offset, depth_scale: measured distance = (1 + scale) · distance + offset [m, 1].
-        time_offset: what has to be added to the sensor's times to get the rig's [s].
+        time_offset: offset from the sensor's clock to the rig's [s]; added to the sensor's times.
     """
 
     camera: Camera
@@ -25,7 +25,7 @@ class SensorState:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """All heads by name, and the poses `T_rb` of the board by number of the shot."""
+    """All heads by name, and the board poses `T_rb` by number of the shot."""
 
     sensors: Mapping[str, SensorState]
     boards: Mapping[int, Pose]

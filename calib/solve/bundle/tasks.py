@@ -1,41 +1,41 @@
-"""What a calibration is asked: the sensors with what is known of them, and what they saw."""
+"""Calibration task: sensors with prior knowledge, and their observations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS, Freedom
+from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters
 from calib.solve.bundle.lens_parameters import BROWN_CONRADY, MATRIX, LensKind
 from calib.views import CornerView, PlaneView
 
 
 class TaskError(ValueError):
-    """A calibration that cannot be asked for."""
+    """Invalid calibration task."""
 
 
 @dataclass(frozen=True)
 class SensorTask:
-    """One optical head: what is known of it and what is wanted.
+    """One optical head: known values and parameters to estimate.
 
     Attributes:
         width, height: of its images [px].
         lens: kind of lens to fit.
-        factory: cameras to start from, or to keep; empty if nothing is known, otherwise one.
-        keeps_intrinsics: whether the intrinsics are known and stay as they are.
-        depth_terms: those of `DEPTH_TERMS` that are fitted.
-        runs_free: whether its clock has an unknown offset to the others'.
+        factory: initial or fixed camera; empty if unknown, otherwise one.
+        fixed_intrinsics: True if the intrinsics are fixed.
+        depth_terms: those of `DEPTH_TERMS` that are estimated.
+        free_running: True if its clock has an unknown offset (free-running sensor).
     """
 
     width: int
     height: int
     lens: LensKind = BROWN_CONRADY
     factory: tuple[Camera, ...] = ()
-    keeps_intrinsics: bool = False
+    fixed_intrinsics: bool = False
     depth_terms: tuple[str, ...] = ()
-    runs_free: bool = False
+    free_running: bool = False
 
     def __post_init__(self) -> None:
-        if self.keeps_intrinsics and not self.factory:
+        if self.fixed_intrinsics and not self.factory:
             raise TaskError("intrinsics can be kept only where a calibration to keep is given")
         unknown = set(self.depth_terms) - set(DEPTH_TERMS)
         if unknown:
@@ -47,22 +47,22 @@ class SensorTask:
                     f"{self.width} × {self.height}"
                 )
 
-    def freedom(self, moves: bool) -> Freedom:
-        """What the solve is free to change."""
-        intrinsics = () if self.keeps_intrinsics else (*MATRIX, *self.lens.coefficients)
-        return Freedom(self.lens, intrinsics, moves, self.depth_terms, self.runs_free)
+    def free_parameters(self, moves: bool) -> FreeParameters:
+        """Free parameters of the sensor."""
+        intrinsics = () if self.fixed_intrinsics else (*MATRIX, *self.lens.coefficients)
+        return FreeParameters(self.lens, intrinsics, moves, self.depth_terms, self.free_running)
 
 
 @dataclass(frozen=True)
 class Task:
-    """A whole calibration.
+    """Complete calibration task.
 
     Attributes:
         sensors: by name.
-        corners, planes: what they saw.
-        reference: sensor whose pose in the rig is not free: the rig's frame, or fixed in it by its `factory` pose.
-        longest_gap: between two shots of one motion of the board [s]; for sensors that run freely.
-        least_kept: fewest views of a sensor whose intrinsics are kept.
+        corners, planes: observations.
+        reference: sensor with a fixed pose: the rig's frame, or its `factory` pose in the rig.
+        longest_gap: largest gap between two shots of one motion of the board [s]; for free-running sensors.
+        min_views_fixed: minimum number of views of a sensor with fixed intrinsics.
     """
 
     sensors: Mapping[str, SensorTask]
@@ -70,7 +70,7 @@ class Task:
     planes: Sequence[PlaneView]
     reference: str
     longest_gap: float = 0.5
-    least_kept: int = 3
+    min_views_fixed: int = 3
 
     def __post_init__(self) -> None:
         if self.reference not in self.sensors:
@@ -78,7 +78,7 @@ class Task:
         strangers = {view.sensor for view in (*self.corners, *self.planes)} - set(self.sensors)
         if strangers:
             raise TaskError(f"views of {', '.join(sorted(strangers))}, which are no sensors of this calibration")
-        if self.sensors[self.reference].runs_free:
+        if self.sensors[self.reference].free_running:
             raise TaskError(f'the reference "{self.reference}" keeps the time: another sensor has to run freely')
         if not self.corners:
             raise TaskError("no view shows any corner of the board")
@@ -89,7 +89,7 @@ class Task:
         return sorted({view.shot for view in (*self.corners, *self.planes)})
 
     def of_shots(self, shots: Sequence[int]) -> "Task":
-        """The same with the views of some shots only."""
+        """Task restricted to some shots."""
         wanted = set(shots)
         return replace(
             self,

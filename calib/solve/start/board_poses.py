@@ -1,4 +1,4 @@
-"""Where the board is in front of one camera: both answers that a flat board allows; a focal length to begin with."""
+"""Initial board pose in one camera, with both solutions of a planar target, and an initial focal length."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,31 +14,31 @@ from calib.pose import Pose
 from calib.solve.bundle.lens_parameters import LensKind
 from calib.views import CornerView
 
-#: Focal lengths that are tried, as shares of the image's width: from a wide fisheye to a telephoto.
+#: Candidate focal lengths, relative to the image's width: from a wide fisheye to a telephoto lens.
 FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)
 
-#: Views that focal lengths are tried on.
+#: Number of views to try focal lengths on.
 TRIED = 6
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """A board seen by a camera.
+class PoseCandidate:
+    """Candidate pose of the board in one view.
 
     Attributes:
         T_sb: pose of the board in the camera's frame.
-        rms_px: of the corners' distances from where they should be [px].
+        rms_px: root mean square reprojection error [px].
     """
 
     T_sb: Pose
     rms_px: float
 
 
-def sightings(camera: Camera, view: CornerView) -> list[Sighting]:
-    """Poses of the board that may explain a view, best first.
+def pose_candidates(camera: Camera, view: CornerView) -> list[PoseCandidate]:
+    """Candidate poses of the board in a view, best first.
 
-    A small or distant board looks nearly the same tilted one way and the other, so there may be two.
-    Source: T. Collins, A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 2014 (OpenCV's IPPE).
+    A small or distant board looks nearly the same under two tilts, so there may be two candidates. Source: T. Collins,
+    A. Bartoli, Infinitesimal plane-based pose estimation, IJCV 2014 (OpenCV's IPPE).
     """
     alone = Camera(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
     try:
@@ -50,18 +50,18 @@ def sightings(camera: Camera, view: CornerView) -> list[Sighting]:
         view.points_b.astype(float), ideal, np.eye(3), np.zeros(4), flags=cv2.SOLVEPNP_IPPE
     )
     poses = [pose.from_rotation_vector(turn[:, 0], move[:, 0]) for turn, move in zip(turns, moves, strict=True)]
-    found = [Sighting(T_sb, _rms(alone, view, T_sb)) for T_sb in poses]
+    found = [PoseCandidate(T_sb, _rms(alone, view, T_sb)) for T_sb in poses]
     return sorted((each for each in found if np.isfinite(each.rms_px)), key=lambda each: each.rms_px)
 
 
-def guess(width: int, height: int, kind: LensKind, views: Sequence[CornerView]) -> Camera:
-    """A camera with no distortion and the focal length for which the boards look most like boards.
+def initial_camera(width: int, height: int, kind: LensKind, views: Sequence[CornerView]) -> Camera:
+    """Distortion-free camera with the focal length of least reprojection error on some views.
 
-    Each focal length is tried on some views. It need not be exact, since the solve begins with every camera alone.
+    The accuracy is low but sufficient, since each camera is optimised separately afterwards.
     """
     tried = views[:: max(1, len(views) // TRIED)]
     cameras = [_plain(width, height, kind, share * width) for share in FOCAL_LENGTHS]
-    return min(cameras, key=lambda camera: _badness(camera, tried))
+    return min(cameras, key=lambda camera: _typical_error(camera, tried))
 
 
 def _plain(width: int, height: int, kind: LensKind, focal: float) -> Camera:
@@ -69,9 +69,9 @@ def _plain(width: int, height: int, kind: LensKind, focal: float) -> Camera:
     return Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, lens)
 
 
-def _badness(camera: Camera, views: Sequence[CornerView]) -> float:
-    """Root mean square over the views, without those that fit worst."""
-    squares = [found[0].rms_px ** 2 if (found := sightings(camera, view)) else np.inf for view in views]
+def _typical_error(camera: Camera, views: Sequence[CornerView]) -> float:
+    """Root mean square over the views, without the worst quarter."""
+    squares = [found[0].rms_px ** 2 if (found := pose_candidates(camera, view)) else np.inf for view in views]
     kept = np.sort(squares)[: max(1, 3 * len(squares) // 4)]
     return float(np.mean(kept))
 

@@ -1,4 +1,4 @@
-"""How sensors stand to each other, from shots that two of them share: a spanning tree from the reference."""
+"""Initial extrinsics: maximum spanning tree of sensors over common shots, from the reference."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,34 +7,34 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.pose import Pose
-from calib.solve.start.board_poses import Sighting
+from calib.solve.start.board_poses import PoseCandidate
 
-#: Answers of two shots count as the same within this angle [rad] and this share of the distance to the board.
+#: Relative poses from two shots agree within this angle [rad] and this share of the distance to the board.
 SAME_ANGLE = 0.15
 SAME_SHARE = 0.15
 
-#: Sightings of all sensors: by name and shot, best first.
-Sightings = Mapping[str, Mapping[int, Sequence[Sighting]]]
+#: Pose candidates of all sensors: by name and shot, best first.
+PoseCandidates = Mapping[str, Mapping[int, Sequence[PoseCandidate]]]
 
 
 class NotConnectedError(ValueError):
-    """Sensors of which no chain of common shots leads to the reference."""
+    """Sensors that are not connected to the reference by common shots."""
 
 
 class ContradictionError(ValueError):
-    """Two sensors whose common shots say different things about where they stand."""
+    """Two sensors whose common shots give inconsistent relative poses."""
 
 
-def poses(seen: Sightings, reference: str) -> dict[str, Pose]:
+def poses(seen: PoseCandidates, reference: str) -> dict[str, Pose]:
     """Pose `T_0s` of every sensor in the frame of the reference.
 
     Args:
-        seen: sightings of the sensors that see corners, none of them empty.
+        seen: pose candidates of the sensors that detected corners, none of them empty.
         reference: name of one of them.
 
     Raises:
-        NotConnectedError: naming the sensors that share no shot with the others.
-        ContradictionError: if two sensors' shots do not belong together.
+        NotConnectedError: sensors that share no shot with the others; names them.
+        ContradictionError: inconsistent common shots of two sensors.
     """
     found = {reference: pose.identity()}
     while len(found) < len(seen):
@@ -46,17 +46,17 @@ def poses(seen: Sightings, reference: str) -> dict[str, Pose]:
                 f"{lost}: no shot shows the board to one of them and to one of {', '.join(found)} at the same time; "
                 "take shots in which both see it, or calibrate them apart"
             )
-        found[new] = found[old] @ between(seen, old, new)
+        found[new] = found[old] @ relative_pose(seen, old, new)
     return found
 
 
-def between(seen: Sightings, a: str, b: str) -> Pose:
-    """The pose `T_ab` that most of the shots of both agree on.
+def relative_pose(seen: PoseCandidates, a: str, b: str) -> Pose:
+    """Pose `T_ab` consistent with most of the common shots.
 
-    A flat board allows two poses in each image; of the four combinations only the true one repeats from shot to shot.
+    A planar board allows two poses in each image; of the four combinations only the true one is the same in all shots.
 
     Raises:
-        ContradictionError: if fewer than half of the shots agree.
+        ContradictionError: fewer than half of the shots agree.
     """
     shots = sorted(set(seen[a]) & set(seen[b]))
     candidates = np.stack(
@@ -78,7 +78,7 @@ def between(seen: Sightings, a: str, b: str) -> Pose:
 def _costs(
     candidate: Pose, candidates: NDArray[np.float64], owners: NDArray[np.intp], reach: float
 ) -> NDArray[np.float64]:
-    """How far each shot (shots,) is from agreeing with a candidate, at most 1."""
+    """Disagreement of each shot (shots,) with a candidate, clipped at 1."""
     cosines = (np.einsum("nij,ij->n", candidates[:, :3, :3], candidate[:3, :3]) - 1) / 2
     angles = np.arccos(np.clip(cosines, -1, 1)) / SAME_ANGLE
     moves = np.linalg.norm(candidates[:, :3, 3] - candidate[:3, 3], axis=1) / (SAME_SHARE * reach)

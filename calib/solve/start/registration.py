@@ -1,4 +1,4 @@
-"""Where a depth sensor stands that saw the board's plane, but no corner of it."""
+"""Initial pose of a depth sensor that measured only the board's plane."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,17 +10,17 @@ from calib.pose import Pose
 from calib.solve.start.extrinsics_graph import NotConnectedError
 from calib.views import PlaneView
 
-#: Normals whose least singular value, over the largest, is below this span no space.
+#: Normals span the space if their smallest singular value, relative to the largest, is above this.
 SPANNING = 0.03
 
 
-def plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
+def fit_plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
     """Normal n (3,), away from the sensor, and distance h [m] of the plane n · p = h, in the sensor's frame."""
     points = camera.directions(view.pixels) * view.distances[:, None]
     center = np.median(points, axis=0)
     kept = np.ones(len(points), np.bool_)
     normal = center
-    for _ in range(3):  # without what is not on the board
+    for _ in range(3):  # refitted without outliers
         _, _, axes = np.linalg.svd(points[kept] - points[kept].mean(axis=0), full_matrices=False)
         normal, center = axes[2], points[kept].mean(axis=0)
         away = np.abs((points - center) @ normal)
@@ -30,17 +30,17 @@ def plane(camera: Camera, view: PlaneView) -> tuple[NDArray[np.float64], float]:
 
 
 def register(name: str, camera: Camera, views: Sequence[PlaneView], boards: Mapping[int, Pose]) -> Pose:
-    """The pose `T_rs` of a sensor whose planes are those of boards at known poses: normals first, then distances.
+    """Pose `T_rs` that aligns a sensor's planes with boards at known poses: rotation from normals, then translation.
 
     Raises:
-        NotConnectedError: if the boards' normals do not span the space.
+        NotConnectedError: fewer than three planes, or their normals do not span the space.
     """
     shared = [view for view in views if view.shot in boards]
     if len(shared) < 3:
         raise NotConnectedError(
             f"{name}: sees no corners, and the board's plane in {len(shared)} shots; at least 3 needed"
         )
-    found = [plane(camera, view) for view in shared]
+    found = [fit_plane(camera, view) for view in shared]
     normals_s = np.stack([normal for normal, _ in found])
     normals_r = np.stack([boards[view.shot][:3, 2] for view in shared])
     left, strengths, right = np.linalg.svd(normals_r.T @ normals_s)

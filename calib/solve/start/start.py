@@ -1,4 +1,4 @@
-"""A first guess of everything: every camera alone, then the chains between them, then the boards."""
+"""Initial state: each camera separately, then extrinsics, then board poses."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -13,26 +13,26 @@ from calib.solve.bundle.formulation import formulate
 from calib.solve.bundle.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, registration
-from calib.solve.start.board_poses import Sighting, guess, sightings
+from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates
 from calib.views import CornerView
 
-#: Misses of a corner beyond this [px] count no more when poses of a board are compared.
+#: Reprojection errors are clipped here [px] when board poses are compared.
 FAR_PX = 20.0
 
 
 def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
-    """A state to begin with, and the task without views that say nothing or that no pose explains.
+    """Initial state, and the task without views that have no valid board pose.
 
     Raises:
-        NotConnectedError, ContradictionError: see `chains`.
-        NotSolvedError: if a sensor's views show no board that its camera could have seen.
+        NotConnectedError, ContradictionError: see `extrinsics_graph`.
+        NotSolvedError: no view of a sensor has a valid board pose.
     """
     cameras: dict[str, Camera] = {}
-    seen: dict[str, dict[int, list[Sighting]]] = {}
+    seen: dict[str, dict[int, list[PoseCandidate]]] = {}
     for name, sensor in task.sensors.items():
         views = [view for view in task.corners if view.sensor == name]
         cameras[name] = _camera(name, sensor, views, note)
-        found = {view.shot: sightings(cameras[name], view) for view in views}
+        found = {view.shot: pose_candidates(cameras[name], view) for view in views}
         if views and not any(found.values()):
             raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
         if views:
@@ -42,38 +42,38 @@ def start(task: Task, note: Callable[[str], None]) -> tuple[Task, State]:
 
 
 def _camera(name: str, sensor: SensorTask, views: Sequence[CornerView], note: Callable[[str], None]) -> Camera:
-    if sensor.keeps_intrinsics or (sensor.factory and not views):
+    if sensor.fixed_intrinsics or (sensor.factory and not views):
         return sensor.factory[0]
     if not views:
         raise NotSolvedError(f"{name}: sees no corners, so its intrinsics have to be given and kept")
-    known = sensor.factory or (guess(sensor.width, sensor.height, sensor.lens, views),)
+    known = sensor.factory or (initial_camera(sensor.width, sensor.height, sensor.lens, views),)
     note(f"{name}: {len(views)} views, focal length about {known[0].fx:.0f} px to begin with")
-    return alone(name, sensor, views, known[0])
+    return fit_camera(name, sensor, views, known[0])
 
 
-def alone(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:
-    """The camera that explains a sensor's corners best, whatever was asked to be kept; in its own frame.
+def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first: Camera) -> Camera:
+    """Camera fitted to the corners of one sensor alone, with free intrinsics, in its own frame.
 
     Args:
-        name, sensor, views: whose.
-        first: camera to begin with.
+        name, sensor, views: the sensor and its views.
+        first: initial camera.
 
     Raises:
-        NotSolvedError: if no view shows a board that such a camera could have seen.
+        NotSolvedError: no view has a valid board pose.
     """
-    for simpler in sensor.lens.simpler:  # a rational lens without distortion says everything twice
+    for simpler in sensor.lens.simpler:  # numerator and denominator of a rational lens are redundant without distortion
         if first.lens.is_pinhole:
-            first = alone(name, replace(sensor, lens=simpler), views, first)
-    boards = {view.shot: found[0].T_sb for view in views if (found := sightings(first, view))}
+            first = fit_camera(name, replace(sensor, lens=simpler), views, first)
+    boards = {view.shot: found[0].T_sb for view in views if (found := pose_candidates(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
-    free = replace(sensor, keeps_intrinsics=False, runs_free=False, depth_terms=())
+    free = replace(sensor, fixed_intrinsics=False, free_running=False, depth_terms=())
     task = Task({name: free}, views, (), name).of_shots([*boards])
     state = State({name: SensorState(replace(first, T_rs=pose.identity()))}, boards)
     return search(formulate(task)(state, (1.0,))).sensors[name].camera
 
 
-def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.Sightings) -> State:
+def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.PoseCandidates) -> State:
     T_r0 = pose.identity()
     if task.sensors[task.reference].factory:
         T_r0 = task.sensors[task.reference].factory[0].T_rs
@@ -84,16 +84,20 @@ def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.Si
         if name not in poses:
             views = [view for view in task.planes if view.sensor == name]
             poses[name] = registration.register(name, cameras[name], views, boards)
-    # Until here everything is in the frame of a sensor that sees corners.
+    # Up to here the frame is that of a sensor with corners.
     T_rx = T_r0 @ pose.inverse(poses[task.reference])
     sensors = {name: SensorState(replace(cameras[name], T_rs=T_rx @ poses[name])) for name in task.sensors}
     return State(sensors, {shot: T_rx @ board for shot, board in boards.items()})
 
 
 def _board(
-    shot: int, task: Task, cameras: Mapping[str, Camera], poses: Mapping[str, Pose], seen: extrinsics_graph.Sightings
+    shot: int,
+    task: Task,
+    cameras: Mapping[str, Camera],
+    poses: Mapping[str, Pose],
+    seen: extrinsics_graph.PoseCandidates,
 ) -> Pose:
-    """Of all poses that some sensor would allow, the one with which all agree best."""
+    """Pose candidate with the smallest reprojection error over all sensors."""
     allowed = [poses[name] @ each.T_sb for name in seen for each in seen[name].get(shot, ())]
     views = [view for view in task.corners if view.shot == shot]
     placed = {view.sensor: replace(cameras[view.sensor], T_rs=poses[view.sensor]) for view in views}
@@ -108,12 +112,12 @@ def _board(
     return min(allowed, key=misfit)
 
 
-def _shots(seen: extrinsics_graph.Sightings) -> list[int]:
+def _shots(seen: extrinsics_graph.PoseCandidates) -> list[int]:
     return sorted({shot for found in seen.values() for shot in found})
 
 
-def _usable(task: Task, seen: extrinsics_graph.Sightings) -> Task:
-    """The task without views of corners that no pose explains, and without planes in shots that show no corners."""
+def _usable(task: Task, seen: extrinsics_graph.PoseCandidates) -> Task:
+    """Task without corner views that have no valid pose, and without planes of shots without corners."""
     shots = set(_shots(seen))
     return replace(
         task,

@@ -1,8 +1,8 @@
-"""Two-halves cross-validation: the odd and the even shots calibrated apart, and how far the answers lie apart.
+"""Two-fold cross-validation: calibrations from odd and even shots, and their difference.
 
-Small residuals prove nothing: a lens that does not fit, a bent board or too few views hide in them. Two halves of the
-shots that disagree by more than their own deviations say do prove something (J. Chen, mrcal). Each sensor's projection
-is compared without what a small motion of the camera undoes, and each pair of sensors from image to image.
+Small residuals are no evidence: a wrong lens model, a bent board or too few views do not show in them. Two halves of
+    the shots that differ by more than their covariances predict are evidence (J. Chen, mrcal). Each sensor's projection
+    is compared up to a small motion of the camera, and each pair of sensors from image to image.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,23 +20,23 @@ from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
 
-#: Fewest shots in a half.
-LEAST_SHOTS = 4
+#: Minimum number of shots in a half.
+MIN_SHOTS = 4
 
 
 class TooFewToSplitError(ValueError):
-    """Shots of which two halves cannot be calibrated."""
+    """Shots that cannot be split into two solvable halves."""
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How the halves agree on one projection.
+    """Difference between the halves in one projection.
 
     Attributes:
-        of: "tof", the sensor's own, or "tof → color".
+        of: "tof" for a sensor alone, "tof → color" for a pair.
         difference_px: root mean square where boards were seen.
-        predicted_px: what it should be by the halves' own covariances.
-        pixels, differences: over the image, for pictures (rows, columns, 2) [px] both; NaN where no board was seen.
+        predicted_px: expected value by the halves' covariances.
+        pixels, differences: over the image, for plots (rows, columns, 2) [px] both; NaN where no board was seen.
     """
 
     of: str
@@ -47,21 +47,21 @@ class Agreement:
 
     @property
     def ratio(self) -> float:
-        """Difference over prediction."""
+        """Observed over predicted difference."""
         return self.difference_px / max(self.predicted_px, 1e-12)
 
 
 def cross_validate(solution: Solution, distance: float, note: Callable[[str], None]) -> list[Agreement]:
-    """Calibrates the odd and the even shots apart and compares their projections at a distance [m].
+    """Calibrates odd and even shots separately and compares their projections at a distance [m].
 
     Raises:
-        TooFewToSplitError: if a half cannot be calibrated.
+        TooFewToSplitError: a half cannot be calibrated.
     """
     first, second = (_half(solution, shots, note) for shots in _split(solution.task))
     found = [
         _image(solution, first, second, name, distance)
         for name in solution.task.sensors
-        if solution.adjustment.layout.freedoms[name].intrinsics
+        if solution.adjustment.layout.free_parameters[name].intrinsics
     ]
     depth = {view.sensor for view in solution.task.planes}
     for source, target in permutations(solution.task.sensors, 2):
@@ -74,14 +74,14 @@ def cross_validate(solution: Solution, distance: float, note: Callable[[str], No
 
 
 def _split(task: Task) -> tuple[Sequence[int], Sequence[int]]:
-    """Every other shot; of a moving board, stretches of it, since neighbours place the board between them."""
+    """Alternating shots; blocks of consecutive shots of a moving board, because board poses are interpolated."""
     shots = task.shots
-    if len(shots) < 2 * LEAST_SHOTS:
+    if len(shots) < 2 * MIN_SHOTS:
         raise TooFewToSplitError(
-            f"{len(shots)} shots are too few for two halves; take {2 * LEAST_SHOTS} or more, better 30"
+            f"{len(shots)} shots are too few for two halves; take {2 * MIN_SHOTS} or more, better 30"
         )
     length = 1
-    if any(sensor.runs_free for sensor in task.sensors.values()):
+    if any(sensor.free_running for sensor in task.sensors.values()):
         length = max(3, len(shots) // 8)
     return (
         [shot for index, shot in enumerate(shots) if index // length % 2 == 0],
@@ -92,7 +92,7 @@ def _split(task: Task) -> tuple[Sequence[int], Sequence[int]]:
 def _half(solution: Solution, shots: Sequence[int], note: Callable[[str], None]) -> Solution:
     task = solution.task.of_shots(shots)
     formulation = formulate(task)
-    known = solution.boards  # of views that lay between shots there is none; the nearest will do to begin with
+    known = solution.boards  # interpolated views have no pose of their own; the nearest is a sufficient start
     boards = {shot: known[min(known, key=lambda each: abs(each - shot))] for shot in formulation.layout.shots}
     state = State(solution.state.sensors, boards)
     if len(groups_of(task)) < len(groups_of(solution.task)):
@@ -108,8 +108,8 @@ def _half(solution: Solution, shots: Sequence[int], note: Callable[[str], None])
 def _image(solution: Solution, first: Solution, second: Solution, name: str, distance: float) -> Agreement:
     camera = solution.cameras[name]
     layout = solution.adjustment.layout
-    changes = projection_uncertainty.implied_changes(solution, name, distance)
-    columns = layout.columns(name, layout.freedoms[name].intrinsics)
+    changes = projection_uncertainty.implied_jacobian(solution, name, distance)
+    columns = layout.columns(name, layout.free_parameters[name].intrinsics)
     pixels = projection_uncertainty.grid(camera)
     inside = supported(solution, name, pixels.reshape(-1, 2))
     differences = changes @ (_intrinsics(first, name) - _intrinsics(second, name))
@@ -117,7 +117,7 @@ def _image(solution: Solution, first: Solution, second: Solution, name: str, dis
 
 
 def _intrinsics(half: Solution, name: str) -> NDArray[np.float64]:
-    wanted = [f"{name}.{each}" for each in half.adjustment.layout.freedoms[name].intrinsics]
+    wanted = [f"{name}.{each}" for each in half.adjustment.layout.free_parameters[name].intrinsics]
     values = {parameter.name: parameter.value for parameter in half.parameters}
     return np.array([values[each] for each in wanted])
 
@@ -126,11 +126,11 @@ def _pair(
     solution: Solution, first: Solution, second: Solution, source: str, target: str, distance: float
 ) -> Agreement:
     layout = solution.adjustment.layout
-    changes = projection_uncertainty.pair_changes(solution.state, layout, source, target, distance)
+    changes = projection_uncertainty.pair_jacobian(solution.state, layout, source, target, distance)
     columns = projection_uncertainty.pair_columns(layout, source, target)
     pixels = projection_uncertainty.grid(solution.cameras[source])
     flat = pixels.reshape(-1, 2)
-    ends = [projection_uncertainty.mapped(half.state, source, target, flat, distance) for half in (first, second)]
+    ends = [projection_uncertainty.map_pixels(half.state, source, target, flat, distance) for half in (first, second)]
     inside = projection_uncertainty.pair_support(solution, source, target, distance).ravel()
     return _agreement(f"{source} → {target}", pixels, ends[0] - ends[1], changes, columns, (first, second), inside)
 
@@ -145,7 +145,7 @@ def _agreement(
     inside: NDArray[np.bool_],
 ) -> Agreement:
     covariance = sum((half.covariance[np.ix_(columns, columns)] for half in halves), np.zeros((columns.size,) * 2))
-    expected = projection_uncertainty.total_spread(changes, covariance)
+    expected = projection_uncertainty.total_deviation(changes, covariance)
     lengths = np.linalg.norm(differences, axis=1)
     both = inside & np.isfinite(lengths) & np.isfinite(expected)
     return Agreement(

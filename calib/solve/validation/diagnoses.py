@@ -1,4 +1,4 @@
-"""What usually goes wrong with a calibration, recognised before a number is believed, each with its own message."""
+"""Detection of common calibration mistakes, each with its own message."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -12,32 +12,32 @@ from calib.solve.bundle.layout import DEPTH_TERMS
 from calib.solve.bundle.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Parameter
-from calib.solve.start.board_poses import sightings
-from calib.solve.start.registration import plane
-from calib.solve.start.start import alone
+from calib.solve.start.board_poses import pose_candidates
+from calib.solve.start.registration import fit_plane
+from calib.solve.start.start import fit_camera
 from calib.views import CornerView
 
-#: Fewest views of a sensor whose intrinsics are free.
-LEAST_VIEWS = 6
+#: Minimum number of views of a sensor with free intrinsics.
+MIN_VIEWS = 6
 
-#: A board whose squares are this much larger or smaller than said is noticed.
+#: Relative error of the square size that is reported.
 SCALE_TOLERANCE = 0.02
 
-#: Views explained this many times better by another sensor's camera are another sensor's views.
+#: Views that another sensor's camera explains this many times better belong to that sensor.
 BETTER = 3.0
 
-#: What kept intrinsics miss corners by at most, over what fitted ones do, and if it is more than so many pixels of an
-#: image of 1000 pixels across.
+#: Fixed intrinsics are rejected if their reprojection error is larger than this ratio to that of fitted ones, and
+#: larger than this many pixels in an image of 1000 pixels across.
 FACTORY_RATIO = 4.0
 FACTORY_MISS = 0.5
 
 
 class ViewsError(ValueError):
-    """Views of which no calibration can be made: too few."""
+    """Too few views for a calibration."""
 
 
 class SquareSizeError(ValueError):
-    """A board whose squares are not of the size that was said; `scale` is true size over said."""
+    """Square size different from the board's description; `scale` is true over described size."""
 
     def __init__(self, message: str, scale: float) -> None:
         self.scale = scale
@@ -45,30 +45,30 @@ class SquareSizeError(ValueError):
 
 
 class MixedUpError(ValueError):
-    """Views or cameras under the wrong sensor's name."""
+    """Views or cameras assigned to the wrong sensor."""
 
 
 def require_views(task: Task) -> None:
-    """Every sensor has enough views.
+    """Checks that every sensor has enough views.
 
     Raises:
-        ViewsError: one has too few.
+        ViewsError: a sensor has too few.
     """
     for name, sensor in task.sensors.items():
         corners = sum(view.sensor == name for view in task.corners)
         planes = sum(view.sensor == name for view in task.planes)
-        least = task.least_kept if sensor.keeps_intrinsics else LEAST_VIEWS
-        count = max(corners, planes) if sensor.keeps_intrinsics else corners
+        least = task.min_views_fixed if sensor.fixed_intrinsics else MIN_VIEWS
+        count = max(corners, planes) if sensor.fixed_intrinsics else corners
         if count < least:
-            why = "to be placed in the rig" if sensor.keeps_intrinsics else "to find its intrinsics"
+            why = "to be placed in the rig" if sensor.fixed_intrinsics else "to find its intrinsics"
             raise ViewsError(f"{name}: {count} views of the board; at least {least} are needed {why}, better 30")
 
 
-def require_own_names(task: Task) -> None:
-    """All views and cameras are under the name of their own sensor.
+def require_matching_sensors(task: Task) -> None:
+    """Checks that views and cameras are assigned to the right sensor.
 
     Raises:
-        MixedUpError: views lie outside their sensor's image, or fit another camera better, or not the one to keep.
+        MixedUpError: views outside their sensor's image, better explained by another camera, or not by the fixed one.
     """
     for view in task.corners:
         sensor = task.sensors[view.sensor]
@@ -103,11 +103,11 @@ def _require_not_swapped(a: str, b: str, factory: Mapping[str, Camera], task: Ta
 
 
 def _require_factory_fits(name: str, camera: Camera, task: Task) -> None:
-    """Compares kept intrinsics with those that the same views would ask for."""
+    """Compares the reprojection error of fixed intrinsics with that of fitted ones."""
     views = [view for view in task.corners if view.sensor == name]
-    if not task.sensors[name].keeps_intrinsics or len(views) < LEAST_VIEWS:
+    if not task.sensors[name].fixed_intrinsics or len(views) < MIN_VIEWS:
         return
-    given, own = _miss(camera, name, task), _miss(alone(name, task.sensors[name], views, camera), name, task)
+    given, own = _miss(camera, name, task), _miss(fit_camera(name, task.sensors[name], views, camera), name, task)
     if given > FACTORY_RATIO * own and given > FACTORY_MISS * camera.width / 1000:
         raise MixedUpError(
             f"{name}: with the given intrinsics the corners miss by {given:.2g} px, with intrinsics of their own by "
@@ -117,21 +117,21 @@ def _require_factory_fits(name: str, camera: Camera, task: Task) -> None:
 
 
 def _miss(camera: Camera, name: str, task: Task) -> float:
-    """Median over a sensor's views of the corners' root mean square miss [px]; NaN if it has none."""
+    """Median root mean square reprojection error over a sensor's views [px]; NaN without views."""
     views = [view for view in task.corners if view.sensor == name][:20]
-    misses = [found[0].rms_px for view in views if (found := sightings(camera, view))]
+    misses = [found[0].rms_px for view in views if (found := pose_candidates(camera, view))]
     return float(np.median(misses)) if misses else float("nan")
 
 
 def suspect_square_size(task: Task, state: State) -> bool:
-    """Whether all depth sensors seem to measure boards that are larger or smaller than said.
+    """True if all depth sensors measure boards that are larger or smaller than described.
 
-    All that corners say of distances grows with the size of the squares, what a depth sensor says does not. A constant
-    offset of its distances is allowed for where the boards' distances differ enough to tell it from a factor. From the
-    first guess of the cameras this is a suspicion only; `require_square_size` decides.
+    Distances derived from corners scale with the square size, those of a depth sensor do not. An offset of the
+    distances is estimated as well if they vary enough. At the initial state this is only a suspicion;
+    `require_square_size` decides.
 
     Args:
-        task: its depth sensors.
+        task: with the planes of its depth sensors.
         state: cameras and boards from corners alone.
     """
     scales = [scale for name in task.sensors if (scale := _scale(name, task, state)) is not None]
@@ -139,7 +139,7 @@ def suspect_square_size(task: Task, state: State) -> bool:
 
 
 def with_free_scales(task: Task) -> Task:
-    """The task with offset and scale of all distances free."""
+    """Task with free offset and scale of all distances."""
     depth = {view.sensor for view in task.planes}
     sensors = {
         name: replace(sensor, depth_terms=DEPTH_TERMS) if name in depth else sensor
@@ -149,10 +149,10 @@ def with_free_scales(task: Task) -> Task:
 
 
 def require_square_size(parameters: Sequence[Parameter]) -> None:
-    """Judges the scales of a solution in which they were free.
+    """Checks the depth scales of a solution in which they were free.
 
     Raises:
-        SquareSizeError: the depth sensors agree that the squares are of another size.
+        SquareSizeError: the depth sensors agree on another square size.
     """
     scales = [each for each in parameters if each.name.endswith(".depth_scale")]
     if not all(abs(each.value) > max(SCALE_TOLERANCE, 4 * each.sigma) for each in scales):
@@ -169,23 +169,23 @@ def require_square_size(parameters: Sequence[Parameter]) -> None:
 
 
 def _scale(name: str, task: Task, state: State) -> float | None:
-    """Factor between distances measured and those that corners say; None if a sensor cannot tell 2 %."""
+    """Ratio of measured distances to those derived from corners; None for a sensor with too few views."""
     camera = state.sensors[name].camera
     views = [view for view in task.planes if view.sensor == name and view.shot in state.boards]
     own = {view.shot for view in task.corners if view.sensor == name}
     views = [view for view in views if view.shot in own]
-    if len(views) < LEAST_VIEWS:
+    if len(views) < MIN_VIEWS:
         return None
     said, measured = np.empty(len(views)), np.empty(len(views))
     for index, view in enumerate(views):
         board = camera.T_sr @ state.boards[view.shot]
         said[index] = board[:3, 2] @ board[:3, 3]
-        measured[index] = plane(camera, view)[1]
+        measured[index] = fit_plane(camera, view)[1]
     return _factor(said, measured)
 
 
 def _factor(said: NDArray[np.float64], measured: NDArray[np.float64]) -> float | None:
-    """Slope of measured over said distances, with an offset if they spread enough to tell the two apart."""
+    """Robust slope of measured over described distances, with an offset if their range suffices."""
     spread = float(np.ptp(said) / np.median(said))
     terms = np.stack([said, np.ones_like(said)], axis=1)
     if spread < 0.3:

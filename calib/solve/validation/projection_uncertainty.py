@@ -1,10 +1,10 @@
-"""How well a calibration knows where a point appears: in one sensor's image, and from one sensor's image to another's.
+"""Uncertainty of projections: in one sensor's image, and from one sensor's image to another's.
 
-Intrinsics alone say little about projections, since a shift of the principal point is nearly a turn of the camera, and
-a longer focal length nearly a greater distance: a calibration determines the sum, and whoever uses it needs the sum.
-What a small turn and displacement of the whole camera can undo is therefore taken out of every change of a projection:
-the one that fits best over the volume in which the boards were (J. Chen's mrcal calls it the implied transformation).
-From one sensor to another nothing is taken out; the poses between them are what is asked there.
+Covariances of intrinsics alone say little about projections, because a shift of the principal point is nearly a
+rotation of the camera, and a longer focal length nearly a greater distance; only their sum is determined. Therefore the
+small rigid motion of the camera that best compensates a change of projection over the volume of the boards is
+subtracted (the implied transformation of J. Chen's mrcal). Between sensors nothing is subtracted, because their
+relative pose is part of the result.
 """
 
 from collections.abc import Sequence
@@ -23,18 +23,18 @@ from calib.solve.bundle.state import State
 from calib.solve.solution import Solution
 from calib.solve.validation.support import supported
 
-#: Points across and down the image at which projections are compared.
+#: Grid points across and down the image.
 GRID = (15, 11)
 
 
 @dataclass(frozen=True)
-class Field:
-    """Deviation of projections over an image.
+class UncertaintyMap:
+    """Standard deviation of projections over an image.
 
     Attributes:
-        pixels: where (rows, columns, 2) [px].
-        deviations: in the direction in which it is largest (rows, columns) [px]; NaN where nothing can be projected.
-        inside: where boards were seen (rows, columns); elsewhere lenses are extrapolated.
+        pixels: grid points (rows, columns, 2) [px].
+        deviations: along the worst direction (rows, columns) [px]; NaN where nothing can be projected.
+        inside: True where boards were seen (rows, columns); elsewhere the lens is extrapolated.
     """
 
     pixels: NDArray[np.float64]
@@ -42,20 +42,20 @@ class Field:
     inside: NDArray[np.bool_]
 
     @property
-    def typical(self) -> float:
-        """Root mean square where boards were seen [px]; NaN if no point can be projected there."""
+    def rms(self) -> float:
+        """Root mean square where boards were seen [px]; NaN without such points."""
         return rms(self.deviations[self.inside])
 
 
 def grid(camera: Camera, shape: tuple[int, int] = GRID) -> NDArray[np.float64]:
-    """Pixels evenly over an image, its border included (rows, columns, 2)."""
+    """Regular grid of pixels including the border (rows, columns, 2)."""
     columns = np.linspace(0, camera.width - 1, shape[0])
     rows = np.linspace(0, camera.height - 1, shape[1])
     return np.stack(np.meshgrid(columns, rows), axis=-1)
 
 
 def reach(solution: Solution, sensor: str) -> tuple[float, float]:
-    """Distances between which nine of ten boards were from a sensor [m]."""
+    """5th and 95th percentile of the boards' distances from a sensor [m]."""
     camera = solution.cameras[sensor]
     seen = {view.shot for view in (*solution.task.corners, *solution.task.planes) if view.sensor == sensor}
     boards = [solution.boards[shot] for shot in seen if shot in solution.boards] or list(solution.boards.values())
@@ -64,24 +64,24 @@ def reach(solution: Solution, sensor: str) -> tuple[float, float]:
     return near, far
 
 
-def in_image(solution: Solution, sensor: str, distance: float) -> Field:
-    """How well a sensor's projection is known at a distance [m]."""
+def image_uncertainty(solution: Solution, sensor: str, distance: float) -> UncertaintyMap:
+    """Uncertainty of a sensor's projection at a distance [m]."""
     camera = solution.cameras[sensor]
     pixels = grid(camera)
     layout = solution.adjustment.layout
-    changes = implied_changes(solution, sensor, distance)
+    changes = implied_jacobian(solution, sensor, distance)
     inside = supported(solution, sensor, pixels.reshape(-1, 2)).reshape(pixels.shape[:2])
-    columns = layout.columns(sensor, layout.freedoms[sensor].intrinsics)
-    deviations = spread(changes, solution.covariance[np.ix_(columns, columns)])
-    return Field(pixels, deviations.reshape(inside.shape), inside)
+    columns = layout.columns(sensor, layout.free_parameters[sensor].intrinsics)
+    deviations = max_deviation(changes, solution.covariance[np.ix_(columns, columns)])
+    return UncertaintyMap(pixels, deviations.reshape(inside.shape), inside)
 
 
-def implied_changes(solution: Solution, sensor: str, distance: float) -> NDArray[np.float64]:
-    """Derivatives (n, 2, k) of projections on the grid, at a distance [m], by a sensor's free intrinsics."""
+def implied_jacobian(solution: Solution, sensor: str, distance: float) -> NDArray[np.float64]:
+    """Compensated Jacobian (n, 2, k) of the grid at a distance [m] with respect to the free intrinsics of a sensor."""
     camera = solution.cameras[sensor]
-    freedom = solution.adjustment.layout.freedoms[sensor]
-    order = [*MATRIX, *freedom.kind.coefficients]
-    wanted = [order.index(name) for name in freedom.intrinsics]
+    free = solution.adjustment.layout.free_parameters[sensor]
+    order = [*MATRIX, *free.kind.coefficients]
+    wanted = [order.index(name) for name in free.intrinsics]
     near, far = reach(solution, sensor)
     volume = _points(camera, (near, 0.5 * (near + far), far))
     seen = np.tile(supported(solution, sensor, grid(camera).reshape(-1, 2)), 3)
@@ -89,16 +89,16 @@ def implied_changes(solution: Solution, sensor: str, distance: float) -> NDArray
     changes = by_intrinsics(camera, volume[:, :2] / volume[:, 2:])[:, :, wanted]
     points = _points(camera, (distance,))
     own = by_intrinsics(camera, points[:, :2] / points[:, 2:])[:, :, wanted]
-    return Undone(camera, volume).at(points, changes, own)
+    return MotionCompensation(camera, volume).at(points, changes, own)
 
 
 @dataclass(frozen=True)
-class Undone:
-    """Takes out of changes of a projection what a small motion of the camera can undo.
+class MotionCompensation:
+    """Subtracts the best compensating rigid motion of the camera from changes of a projection.
 
     Attributes:
-        camera: whose.
-        volume: points that decide which motion (m, 3) [m], in the sensor's frame.
+        camera: the camera.
+        volume: points that determine the motion (m, 3) [m], in the sensor's frame.
     """
 
     camera: Camera
@@ -107,7 +107,7 @@ class Undone:
     def at(
         self, points: NDArray[np.float64], in_volume: NDArray[np.float64], changes: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Changes (n, 2, k) at points (n, 3), given those in the volume (m, 2, k)."""
+        """Compensated changes (n, 2, k) at points (n, 3), given the changes in the volume (m, 2, k)."""
         count = in_volume.shape[-1]
         motions, *_ = np.linalg.lstsq(
             self._by_motion(self.volume), in_volume.reshape(2 * len(self.volume), count), rcond=None
@@ -115,39 +115,39 @@ class Undone:
         return changes - (self._by_motion(points) @ motions).reshape(len(points), 2, count)
 
     def _by_motion(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (2 n, 6) of projections by a small turn and displacement of the points."""
+        """Jacobian (2 n, 6) of projections with respect to a small rotation and translation of the points."""
         alone = replace(self.camera, T_rs=pose.identity())
         by_point = alone.projection_jacobian(points)
         return np.concatenate([by_point @ -rotations.cross(points), by_point], axis=-1).reshape(-1, 6)
 
 
-def between(solution: Solution, source: str, target: str, distance: float) -> Field:
-    """How well is known where a depth sensor's point at a distance [m] appears in another sensor's image [px there]."""
+def pair_uncertainty(solution: Solution, source: str, target: str, distance: float) -> UncertaintyMap:
+    """Uncertainty [px] in the target's image of points that a depth sensor measures at a distance [m]."""
     pixels = grid(solution.cameras[source])
-    changes = pair_changes(solution.state, solution.adjustment.layout, source, target, distance)
+    changes = pair_jacobian(solution.state, solution.adjustment.layout, source, target, distance)
     columns = pair_columns(solution.adjustment.layout, source, target)
-    deviations = spread(changes, solution.covariance[np.ix_(columns, columns)])
+    deviations = max_deviation(changes, solution.covariance[np.ix_(columns, columns)])
     inside = pair_support(solution, source, target, distance)
-    return Field(pixels, deviations.reshape(inside.shape), inside)
+    return UncertaintyMap(pixels, deviations.reshape(inside.shape), inside)
 
 
 def pair_support(solution: Solution, source: str, target: str, distance: float) -> NDArray[np.bool_]:
-    """Where on the source's grid (rows, columns) both sensors saw boards."""
+    """Mask on the source's grid (rows, columns) of points where both sensors saw boards."""
     pixels = grid(solution.cameras[source])
     flat = pixels.reshape(-1, 2)
-    there = mapped(solution.state, source, target, flat, distance)
+    there = map_pixels(solution.state, source, target, flat, distance)
     return (supported(solution, source, flat) & supported(solution, target, there)).reshape(pixels.shape[:2])
 
 
 def pair_columns(layout: Layout, source: str, target: str) -> NDArray[np.intp]:
-    """Parameters that say where a point of one sensor appears in another."""
-    return np.concatenate([layout.columns(name, layout.freedoms[name].names) for name in (source, target)])
+    """Columns of the parameters on which the mapping between two sensors depends."""
+    return np.concatenate([layout.columns(name, layout.free_parameters[name].names) for name in (source, target)])
 
 
-def pair_changes(state: State, layout: Layout, source: str, target: str, distance: float) -> NDArray[np.float64]:
-    """Derivatives (n, 2, k) of `mapped` on the source's grid by the parameters of `pair_columns`."""
+def pair_jacobian(state: State, layout: Layout, source: str, target: str, distance: float) -> NDArray[np.float64]:
+    """Jacobian (n, 2, k) of `map_pixels` on the source's grid with respect to the parameters of `pair_columns`."""
     sensor, camera = state.sensors[source], state.sensors[target].camera
-    directions = sight(sensor.camera, grid(sensor.camera).reshape(-1, 2))
+    directions = viewing_directions(sensor.camera, grid(sensor.camera).reshape(-1, 2))
     true = (distance - sensor.depth_offset) / (1 + sensor.depth_scale)
     points_r = pose.transform(sensor.camera.T_rs, directions * true)
     points_t = pose.transform(camera.T_sr, points_r)
@@ -178,54 +178,56 @@ def pair_changes(state: State, layout: Layout, source: str, target: str, distanc
 
 
 def _order(layout: Layout, sensor: str) -> list[int]:
-    """Where a sensor's free parameters are in the list of all that a sensor may have."""
-    freedom = layout.freedoms[sensor]
-    every = [*MATRIX, *freedom.kind.every, *POSE, *DEPTH_TERMS, "time_offset"]
-    return [every.index(name) for name in freedom.names]
+    """Positions of a sensor's free parameters in the list of all possible ones."""
+    free = layout.free_parameters[sensor]
+    every = [*MATRIX, *free.kind.every, *POSE, *DEPTH_TERMS, "time_offset"]
+    return [every.index(name) for name in free.names]
 
 
-def mapped(state: State, source: str, target: str, pixels: NDArray[np.float64], distance: float) -> NDArray[np.float64]:
-    """Where points that a sensor measures at pixels (n, 2) and a radial distance [m] appear in another sensor (n, 2).
+def map_pixels(
+    state: State, source: str, target: str, pixels: NDArray[np.float64], distance: float
+) -> NDArray[np.float64]:
+    """Pixels (n, 2) in the target of points that the source measures at pixels (n, 2) and a radial distance [m].
 
-    NaN for those that are not in front of it, or not within half an image of its image.
+    NaN for points behind the target or more than half an image outside its image.
     """
     sensor = state.sensors[source]
     true = (distance - sensor.depth_offset) / (1 + sensor.depth_scale)
     camera = state.sensors[target].camera
-    found = camera.project(pose.transform(sensor.camera.T_rs, sight(sensor.camera, pixels) * true))
+    found = camera.project(pose.transform(sensor.camera.T_rs, viewing_directions(sensor.camera, pixels) * true))
     size = np.array([camera.width, camera.height])
     with np.errstate(invalid="ignore"):
         found[np.any((found < -0.5 * size) | (found > 1.5 * size), axis=1)] = np.nan
     return found
 
 
-def sight(camera: Camera, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit directions (n, 3) behind pixels (n, 2); NaN where the fitted lens has none, as in a corner nobody saw."""
+def viewing_directions(camera: Camera, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit viewing directions (n, 3) of pixels (n, 2); NaN where the fitted lens has no inverse."""
     ideal = camera.lens.inverse((pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy))
     directions = np.concatenate([ideal, np.ones((len(pixels), 1))], axis=1)
     return directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def spread(changes: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest deviation (n,) of points whose derivatives by the parameters are (n, 2, k)."""
+def max_deviation(changes: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest standard deviation over directions (n,) of points with Jacobians (n, 2, k)."""
     blocks = changes @ covariance @ changes.transpose(0, 2, 1)
     half = (blocks[:, 0, 0] + blocks[:, 1, 1]) / 2
     swing = np.hypot((blocks[:, 0, 0] - blocks[:, 1, 1]) / 2, blocks[:, 0, 1])
     return np.sqrt(np.maximum(half + swing, 0))
 
 
-def total_spread(changes: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Root of the summed variances of both coordinates (n,): the expected length of an error."""
+def total_deviation(changes: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Root of the summed variances of both coordinates (n,): expected length of an error."""
     return np.sqrt(np.maximum(np.einsum("nik,kl,nil->n", changes, covariance, changes), 0))
 
 
 def rms(values: NDArray[np.float64]) -> float:
-    """Root mean square of what is a number; NaN if nothing is."""
+    """Root mean square of the finite values; NaN without any."""
     finite = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
 def _points(camera: Camera, distances: Sequence[float]) -> NDArray[np.float64]:
-    """Points (n, 3) [m] in the sensor's frame behind the grid's pixels, at each distance."""
-    directions = sight(camera, grid(camera).reshape(-1, 2))
+    """Points (n, 3) [m] in the sensor's frame on the rays of the grid, at each distance."""
+    directions = viewing_directions(camera, grid(camera).reshape(-1, 2))
     return np.concatenate([directions * distance for distance in distances])

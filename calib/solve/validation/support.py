@@ -1,4 +1,4 @@
-"""Where in an image a calibration is supported by corners; elsewhere its lens is extrapolated."""
+"""Image region supported by corners; outside it the lens is extrapolated."""
 
 import cv2
 import numpy as np
@@ -9,8 +9,8 @@ from calib.solve.solution import Solution
 
 
 def supported(solution: Solution, sensor: str, pixels: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which pixels (n, 2) lie in the convex hull of all corners that the sensor saw; all if its intrinsics are kept."""
-    if not solution.adjustment.layout.freedoms[sensor].intrinsics:
+    """Mask (n,) of pixels (n, 2) in the hull of the sensor's corners, or in the image if its intrinsics are fixed."""
+    if not solution.adjustment.layout.free_parameters[sensor].intrinsics:
         camera = solution.cameras[sensor]
         with np.errstate(invalid="ignore"):
             return np.all((pixels >= -0.5) & (pixels <= (camera.width - 0.5, camera.height - 0.5)), axis=1)
@@ -20,8 +20,8 @@ def supported(solution: Solution, sensor: str, pixels: NDArray[np.float64]) -> N
 
 
 def coverage(solution: Solution, sensor: str) -> float:
-    """Share of the image that the hull of the corners covers; 1 if nothing of it had to be found."""
-    if not solution.adjustment.layout.freedoms[sensor].intrinsics:
+    """Fraction of the image that the hull of the corners covers; 1 for fixed intrinsics."""
+    if not solution.adjustment.layout.free_parameters[sensor].intrinsics:
         return 1.0
     camera: Camera = solution.cameras[sensor]
     return float(cv2.contourArea(_hull(solution, sensor))) / (camera.width * camera.height)

@@ -1,4 +1,4 @@
-"""Whether a calibration can be trusted, in words."""
+"""Verdict on a calibration, in words."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -8,58 +8,60 @@ import numpy as np
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
-from calib.solve.validation.projection_uncertainty import Field
+from calib.solve.validation.projection_uncertainty import UncertaintyMap
 
-#: Halves may lie this much further apart than predicted; by chance alone they do in about one of a hundred cases.
-MOST_RATIO = 2.0
+#: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
+MAX_RATIO = 2.0
 
-#: Ninety-five of a hundred errors in two dimensions are shorter than this many deviations.
-NINETY_FIVE = 2.45
+#: Radius of the 95 % confidence circle in two dimensions, in deviations.
+RADIUS_95 = 2.45
 
-#: Differences of the halves below this share of what is needed harm nobody, whatever was predicted.
+#: Differences of the halves below this share of the required accuracy are harmless.
 HARMLESS = 0.25
 
-#: Share of outliers beyond which something else is wrong.
-MOST_OUTLIERS = 0.1
+#: Largest fraction of outliers.
+MAX_OUTLIERS = 0.1
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """What is to be thought of a solution.
+    """Assessment of a solution.
 
     Attributes:
-        trusted: whether it may be used.
+        trusted: True if the solution is fit for use.
         verdict: one line that begins with "Trust it" or "Do not trust it yet".
-        reasons: what speaks against it, each with what to do; empty if it is trusted.
-        agreements: of the two halves; empty if there were too few shots.
-        images: how well each sensor's projection is known, by name.
-        pairs: how well each depth sensor's points are known in the other images, by "tof → color".
-        distance: that all this is for [m].
+        reasons: objections, each with a remedy; empty if trusted.
+        agreements: of the two halves; empty with too few shots.
+        images: uncertainty of each sensor's projection, by name.
+        pairs: uncertainty of each depth sensor's points in the other images, by "tof → color".
+        distance: of the scene [m].
     """
 
     trusted: bool
     verdict: str
     reasons: Sequence[str]
     agreements: Sequence[Agreement]
-    images: dict[str, Field]
-    pairs: dict[str, Field]
+    images: dict[str, UncertaintyMap]
+    pairs: dict[str, UncertaintyMap]
     distance: float
 
 
 def assess(
     solution: Solution, distance: float, needed_px: float, note: Callable[[str], None] = lambda _: None
 ) -> Assessment:
-    """Cross-validates a solution and says whether it can be trusted.
+    """Cross-validates and judges a solution.
 
     Args:
-        solution: of all shots.
-        distance: of what will be looked at [m].
-        needed_px: projections have to be known this well, 95 % of the time [px].
-        note: told in words how it goes.
+        solution: from all shots.
+        distance: of the scene [m].
+        needed_px: required accuracy of projections, 95 % of the time [px].
+        note: called with progress messages.
     """
-    images = {name: projection_uncertainty.in_image(solution, name, distance) for name in solution.task.sensors}
+    images = {
+        name: projection_uncertainty.image_uncertainty(solution, name, distance) for name in solution.task.sensors
+    }
     pairs = {
-        f"{source} → {target}": projection_uncertainty.between(solution, source, target, distance)
+        f"{source} → {target}": projection_uncertainty.pair_uncertainty(solution, source, target, distance)
         for source in dict.fromkeys(view.sensor for view in solution.task.planes)
         for target in solution.task.sensors
         if target != source
@@ -75,8 +77,8 @@ def assess(
     return Assessment(not reasons, verdict, reasons, agreements, images, pairs, distance)
 
 
-def _praise(agreements: Sequence[Agreement], fields: dict[str, Field], distance: float) -> str:
-    known = max((field.typical * NINETY_FIVE for field in fields.values() if not np.isnan(field.typical)), default=0)
+def _praise(agreements: Sequence[Agreement], fields: dict[str, UncertaintyMap], distance: float) -> str:
+    known = max((field.rms * RADIUS_95 for field in fields.values() if not np.isnan(field.rms)), default=0)
     text = f"Trust it: projections at {distance:.2g} m are known to {known:.2g} px (95 %)"
     if agreements:
         worst = max(agreements, key=lambda each: each.ratio)
@@ -88,7 +90,7 @@ def _praise(agreements: Sequence[Agreement], fields: dict[str, Field], distance:
 
 
 def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]:
-    bad = [each for each in agreements if each.ratio > MOST_RATIO and each.difference_px > HARMLESS * needed_px]
+    bad = [each for each in agreements if each.ratio > MAX_RATIO and each.difference_px > HARMLESS * needed_px]
     return [
         f"{each.of}: the halves of the shots differ by {each.difference_px:.2g} px where {each.predicted_px:.2g} px "
         "were predicted; the kind of lens does not fit, the board is not flat, or something moved: take more tilted "
@@ -97,10 +99,10 @@ def _disagreeing(agreements: Sequence[Agreement], needed_px: float) -> list[str]
     ]
 
 
-def _uncertain(fields: dict[str, Field], needed_px: float) -> list[str]:
+def _uncertain(fields: dict[str, UncertaintyMap], needed_px: float) -> list[str]:
     found = []
     for of, field in fields.items():
-        known = field.typical * NINETY_FIVE
+        known = field.rms * RADIUS_95
         if known > needed_px:
             found.append(
                 f"{of}: projections are known to {known:.2g} px only (95 %) where {needed_px:.2g} px are needed; take "
@@ -112,13 +114,13 @@ def _uncertain(fields: dict[str, Field], needed_px: float) -> list[str]:
 
 
 def _outliers(solution: Solution) -> list[str]:
-    """Groups in which many measurements are explained by nothing."""
+    """Groups with too many outliers."""
     found = []
     for sensor, of in dict.fromkeys((view.sensor, view.of) for view in solution.views):
         views = [view for view in solution.views if (view.sensor, view.of) == (sensor, of)]
         far = sum(int(view.outliers.sum()) for view in views)
         every = sum(len(view.outliers) for view in views)
-        if far > MOST_OUTLIERS * every:
+        if far > MAX_OUTLIERS * every:
             worst = max(views, key=lambda view: view.outliers.mean())
             found.append(
                 f"{sensor}: {far} of {every} {of} are outliers, most in shot {worst.shot}; look at its picture, "

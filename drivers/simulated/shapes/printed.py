@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from calib.board.artwork import raster
+from calib.board.artwork import rasterize
 from calib.board.target import Charuco, Chessboard, Circles, Target
 from calib.pose import Pose
 from drivers.simulated.scene.body import Surface
@@ -26,14 +26,14 @@ _INK, _PAPER = 0.15, 0.85
 
 def print_texture(target: Target) -> Texture:
     """Texture of a board with its white margin, centred on the paper."""
-    white = gaussian_filter(raster(target, _DENSITY)[0], _BLUR * _DENSITY, mode="nearest")
+    white = gaussian_filter(rasterize(target, _DENSITY)[0], _BLUR * _DENSITY, mode="nearest")
     texels = np.repeat((_INK + (_PAPER - _INK) * white)[..., None], 4, axis=-1)
     return Texture(texels.astype(np.float32), _DENSITY)
 
 
 def paper_size(target: Target) -> tuple[float, float]:
     """Width and height of the paper [m]."""
-    rows, columns = raster(target, _DENSITY)[0].shape
+    rows, columns = rasterize(target, _DENSITY)[0].shape
     return columns / _DENSITY, rows / _DENSITY
 
 

@@ -49,9 +49,9 @@ def test_a_stereo_pair_stands_where_opencv_says(shared_data: Path) -> None:
 @pytest.mark.slow
 def test_an_azure_kinect_is_as_published_and_as_well_as_its_halves_agree(shared_data: Path) -> None:
     views, published = published_boards.azure(folder(shared_data, "calib_azure_charuco"))
-    infrared = SensorTask(1024, 1024, RATIONAL, (_camera(published["infrared"], 1024, 1024),), keeps_intrinsics=True)
+    infrared = SensorTask(1024, 1024, RATIONAL, (_camera(published["infrared"], 1024, 1024),), fixed_intrinsics=True)
     color = SensorTask(4096, 3072, RATIONAL)
-    pair = calibrate(Task({"color": color, "infrared": infrared}, views, (), "color", least_kept=1))
+    pair = calibrate(Task({"color": color, "infrared": infrared}, views, (), "color", min_views_fixed=1))
     expected = pose.from_rotation_vector(np.radians((-5.06, 0, 0)), (-0.0325, -0.0017, 0.0044))
     T_ci = pair.cameras["infrared"].T_rs
     assert np.linalg.norm(T_ci[:3, 3] - expected[:3, 3]) < 0.005
@@ -61,9 +61,11 @@ def test_an_azure_kinect_is_as_published_and_as_well_as_its_halves_agree(shared_
     assessment = assess(alone, 1.0, 1.0)
     camera = alone.cameras["color"]
     pixels = projection_uncertainty.grid(camera).reshape(-1, 2)
-    rays = projection_uncertainty.sight(camera, pixels)[supported(alone, "color", pixels)]
+    rays = projection_uncertainty.viewing_directions(camera, pixels)[supported(alone, "color", pixels)]
     change = (_camera(published["color"], 4096, 3072).project(rays) - camera.project(rays))[:, :, None]
-    difference = projection_uncertainty.Undone(replace(camera, T_rs=np.eye(4)), rays).at(rays, change, change)[:, :, 0]
+    difference = projection_uncertainty.MotionCompensation(replace(camera, T_rs=np.eye(4)), rays).at(
+        rays, change, change
+    )[:, :, 0]
     assert projection_uncertainty.rms(np.linalg.norm(difference, axis=1)) < assessment.agreements[0].difference_px
     assert "Do not trust it yet: color: the halves" in assessment.verdict  # ten of thirty images are too few
 

@@ -7,8 +7,14 @@ import pytest
 
 from calib import pose
 from calib.calibration_check.changes import pair_changes
-from calib.calibration_check.hypotheses import Explanation, distance_bias, explained, own_fit, suspects
-from calib.calibration_check.stored import RecheckError, Stored, Views, usable
+from calib.calibration_check.hypotheses import (
+    MotionHypothesis,
+    corner_fit,
+    distance_bias,
+    motion_hypotheses,
+    moved_candidates,
+)
+from calib.calibration_check.stored import CalibrationCheckError, Stored, Views, usable
 from calib.camera import Camera
 from calib.solve.bundle.layout import POSE
 from calib.solve.bundle.state import SensorState
@@ -57,8 +63,8 @@ def test_the_sensor_that_moved_is_named_with_how_far(sensor: str) -> None:
         if one.second == sensor:
             np.testing.assert_allclose(one.turn, turn, atol=6e-4)
             np.testing.assert_allclose(one.move, move, atol=1e-3)
-    explanations = explained(before, views)
-    assert suspects(explanations) == [sensor]
+    explanations = motion_hypotheses(before, views)
+    assert moved_candidates(explanations) == [sensor]
     assert explanations[sensor].share > 0.95
 
 
@@ -66,8 +72,8 @@ def test_two_sensors_cannot_tell_which_of_them_moved() -> None:
     heads = {name: head for name, head in three_heads().items() if name != "tof"}
     before = Stored({name: SensorState(head.camera) for name, head in heads.items()})
     heads["color"] = replace(heads["color"], camera=moved(heads["color"].camera, (0, 0, 0), (0.01, 0, 0)))
-    assert suspects(explained(before, seen(heads, 12))) == ["light", "color"]
-    assert suspects({"a": Explanation(0.5, 1e4), "b": Explanation(0.6, 9e3)}) == []
+    assert moved_candidates(motion_hypotheses(before, seen(heads, 12))) == ["light", "color"]
+    assert moved_candidates({"a": MotionHypothesis(0.5, 1e4), "b": MotionHypothesis(0.6, 9e3)}) == []
 
 
 def test_a_stored_calibration_that_was_uncertain_does_not_count_as_moved() -> None:
@@ -87,11 +93,11 @@ def test_a_stored_calibration_that_was_uncertain_does_not_count_as_moved() -> No
 def test_a_lens_that_was_turned_shows_in_the_camera_s_own_corners() -> None:
     heads = three_heads()
     before = stored(heads)
-    sharp = own_fit(before, seen(heads, 9), "color")
+    sharp = corner_fit(before, seen(heads, 9), "color")
     assert sharp.rms == pytest.approx(0.1 * np.sqrt(2), rel=0.2)
     camera = heads["color"].camera
     heads["color"] = replace(heads["color"], camera=replace(camera, fx=0.9 * camera.fx))
-    assert own_fit(before, seen(heads, 9), "color").rms > 5 * sharp.rms
+    assert corner_fit(before, seen(heads, 9), "color").rms > 5 * sharp.rms
 
 
 def test_a_sensor_of_distances_only_is_compared_too() -> None:
@@ -121,5 +127,5 @@ def test_distances_that_are_off_are_told_from_corners() -> None:
 
 def test_views_that_show_no_board_are_refused() -> None:
     heads = three_heads()
-    with pytest.raises(RecheckError, match="no view shows"):
+    with pytest.raises(CalibrationCheckError, match="no view shows"):
         usable(stored(heads), Views([], seen(heads, 1).planes))
