@@ -37,9 +37,10 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
             f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
             f'the sensor of the tracker\'s reference, "{reference}"'
         )
-    if table.relief.drift and not isinstance(table.model, nurbs.Settings):
+    if table.vertex_offsets.random_walk and not isinstance(table.model, nurbs.Settings):
         raise PlanError(
-            f"trackers.{tracker}.relief.drift = {table.relief.drift:g} needs a model whose vertices have offsets: "
+            f"trackers.{tracker}.vertex_offsets.random_walk = {table.vertex_offsets.random_walk:g} "
+            f"needs a model whose vertices have offsets: "
             f'"nurbs", not "{model_name(config, tracker)}"; leave it out or set it to 0'
         )
     return Plan(
@@ -54,7 +55,7 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         priors=table.priors,
         status=table.status,
         reinitialization=table.reinitialization,
-        relief=table.relief,
+        vertex_offsets=table.vertex_offsets,
     )
 
 

@@ -47,8 +47,8 @@ class Tracker:
         outlier_share: share of the depths that come from anywhere.
         vertices: about how many vertices the mesh has.
         region: where the object is in the first frame, unless `track` is given a mask.
-        synthesis, objective, optimizer, priors, relief, status, reinitialization: tables like those of a tracker in a
-            rig file, as is `region`: `priors={"stretch": 0.1}`.
+        synthesis, objective, optimizer, priors, vertex_offsets, status, reinitialization: tables like those of a
+            tracker in a rig file, as is `region`: `priors={"stretch": 0.1}`.
         budget_evaluations: how often a search may compute the cost of a candidate per frame.
         budget_ms: time that a search may take [ms]; None: as long as it needs, with equal results from equal images.
         geometry: length in depth images: "z" along the optical axis, or "radial" from the camera centre.
@@ -77,7 +77,7 @@ class Tracker:
         objective: Table | None = None,
         optimizer: Table | None = None,
         priors: Table | None = None,
-        relief: Table | None = None,
+        vertex_offsets: Table | None = None,
         status: Table | None = None,
         reinitialization: Table | None = None,
         budget_evaluations: int | None = None,
@@ -90,7 +90,7 @@ class Tracker:
         noise = noise_models.StructuredLight() if noise is None else noise
         sensor = {"noise": noise, "texture": texture, "range_m": range_m, "outlier_share": outlier_share}
         parts = {"model": model, "region": region, "synthesis": synthesis, "objective": objective}
-        parts |= {"optimizer": optimizer, "priors": priors, "relief": relief, "status": status}
+        parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}
         cameras = {arguments.DEPTH: depth}
         if color is not None:

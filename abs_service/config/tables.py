@@ -89,7 +89,7 @@ class TrackerTable(Table):
         reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
         model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
         mesh: the triangle mesh.
-        priors, relief: `Settings` of `abs_service.tracker.posterior.priors` and `.relief`.
+        priors, vertex_offsets: `Settings` of `tracker.posterior.priors` and `tracking.vertex_offsets`.
         status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
         budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
@@ -103,7 +103,7 @@ class TrackerTable(Table):
     synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
     priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors")] = Field(default={})
-    relief: Annotated[Any, SettingsOf("abs_service.tracking.vertex_offsets")] = Field(default={})
+    vertex_offsets: Annotated[Any, SettingsOf("abs_service.tracking.vertex_offsets")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
     reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.loss_monitor")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})

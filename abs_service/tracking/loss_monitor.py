@@ -1,4 +1,4 @@
-"""When a lost object is looked for anew, and when one that is back counts as tracked again."""
+"""Reinitialization of a lost object: when to attempt it, and hysteresis of the status after it."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -14,14 +14,14 @@ class Settings:
     """TOML keys of `reinitialization`.
 
     Attributes:
-        after_s: time that the object must be LOST before it is looked for anew [s]. Until then, and between the
-            attempts, the search goes on from the last estimate, so that what was hidden for a moment keeps its mesh.
-        keep_s: so long after the loss, the old mesh is laid over what is found, so that its vertices stay the same
-            material; then a new mesh is made [s]. It is for objects that nothing else in sight is mistaken for.
+        after_s: time that the object must be LOST before the first attempt [s]. Until then, and between attempts, the
+            search continues from the last estimate, so that a briefly occluded object keeps its mesh.
+        keep_s: time after the loss in which the old mesh is relocated onto the detected object, so that its vertices
+            keep their material points; later, a new mesh is made [s]. For scenes without similar objects.
         every_s: time between two attempts [s].
-        confirm: so many estimates in a row must be good before the first says TRACKING; until then it is DEGRADED.
-        size_ratio: what is found must not be larger or smaller than the lost object by more than this factor of its
-            area: an empty scene has surfaces, too.
+        confirm: number of consecutive good estimates from which on the status is TRACKING; before, it is DEGRADED.
+        size_ratio: largest ratio between the areas of the detected and the lost object; others are rejected, because
+            an empty scene has surfaces, too.
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -31,8 +31,8 @@ class Settings:
     size_ratio: Annotated[float, Gt(1)] = 2.0
 
 
-class LossWatch:
-    """Follows the verdicts of one tracker."""
+class LossMonitor:
+    """Status of one tracker over time."""
 
     def __init__(self, settings: Settings):
         self._settings = settings
@@ -40,8 +40,8 @@ class LossWatch:
         self._tried_ns: int | None = None
         self._good = settings.confirm
 
-    def overdue(self, t_ns: int) -> bool:
-        """Whether the object has been lost for so long at `t_ns` [ns] that an attempt is due; counts it as made."""
+    def attempt_due(self, t_ns: int) -> bool:
+        """True if an attempt is due at `t_ns` [ns]; it then counts as made."""
         if self._lost_ns is None or t_ns - self._lost_ns < self._settings.after_s * 1e9:
             return False
         if self._tried_ns is not None and t_ns - self._tried_ns < self._settings.every_s * 1e9:
@@ -50,11 +50,11 @@ class LossWatch:
         return True
 
     def keeps_mesh(self, t_ns: int) -> bool:
-        """Whether the old mesh is still to be laid over what is found at `t_ns` [ns]."""
+        """True if an object detected at `t_ns` [ns] gets the old mesh."""
         return self._lost_ns is not None and t_ns - self._lost_ns < self._settings.keep_s * 1e9
 
-    def judge(self, estimate: Estimate) -> Estimate:
-        """The estimate with hysteresis: after a loss the first good ones are DEGRADED."""
+    def with_hysteresis(self, estimate: Estimate) -> Estimate:
+        """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
             self._good = 0
@@ -66,7 +66,7 @@ class LossWatch:
         reason = f"found again {self._good} of {self._settings.confirm} estimates ago"
         return replace(estimate, status=Status.DEGRADED, reasons=(*estimate.reasons, reason))
 
-    def is_another(self, found: Mesh, lost: Mesh) -> bool:
-        """Whether what was found is of quite another size than what was lost."""
+    def differs_in_size(self, found: Mesh, lost: Mesh) -> bool:
+        """True if the areas of the detected and the lost object differ by more than `size_ratio`."""
         ratio = found.area / lost.area
         return not 1 / self._settings.size_ratio < ratio < self._settings.size_ratio

@@ -25,8 +25,8 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.photometric.appearance import dressed
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
-from abs_service.tracking.vertex_offsets import FixedRelief, Relief
-from abs_service.tracking.vertex_offsets import Settings as ReliefSettings
+from abs_service.tracking.vertex_offsets import FixedOffsets, VertexOffsets
+from abs_service.tracking.vertex_offsets import Settings as VertexOffsetSettings
 from calib.rig import ImageNoise, Rig, Sensor
 from drivers.contract.frame import FrameSet
 
@@ -85,7 +85,7 @@ class Plan:
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: how often a frame may compute the cost of a candidate.
         vertices: about how many vertices the mesh is to have.
-        priors, status, reinitialization, relief: settings of the fixed parts.
+        priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
         seed: of the search's random numbers; equal seeds and frame sets give equal estimates.
     """
 
@@ -100,7 +100,7 @@ class Plan:
     priors: priors.Settings
     status: status.Settings
     reinitialization: loss_monitor.Settings
-    relief: ReliefSettings = field(default_factory=ReliefSettings)
+    vertex_offsets: VertexOffsetSettings = field(default_factory=VertexOffsetSettings)
     seed: int = 0
 
 
@@ -122,8 +122,8 @@ class Tracking:
         self._region = plan.region.build()
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
-        self._relief: Relief = FixedRelief()
-        self._watch = loss_monitor.LossWatch(plan.reinitialization)
+        self._vertex_offsets: VertexOffsets = FixedOffsets()
+        self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization)
         self._told = False
         self._unseen: frozenset[str] = frozenset()
 
@@ -147,16 +147,20 @@ class Tracking:
         try:
             if self._tracker is None:
                 self._adopt(*self._begin(observation), observation)
-            elif told or self._watch.overdue(observation.t_host_ns) or self._unseen.difference(observation.missing):
+            elif (
+                told
+                or self._loss_monitor.attempt_due(observation.t_host_ns)
+                or self._unseen.difference(observation.missing)
+            ):
                 self._look_again(self._tracker, told, observation)
         except (DetectionError, ModelError) as error:
             notes = (str(error),)
         if self._tracker is None:
             return _initializing(observation, notes)
-        estimate = self._watch.judge(self._tracker.track(observation, in_time))
+        estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
         if estimate.status == Status.TRACKING:
             surface = self._tracker.model.deform(estimate.theta[None])
-            self._relief.learn(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
+            self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
         reasons = estimate.reasons + tuple(f"looked for the object again: {note}" for note in notes)
         return estimate if estimate.status == Status.TRACKING else replace(estimate, reasons=reasons)
 
@@ -166,18 +170,18 @@ class Tracking:
 
     def _look_again(self, tracker: Tracker, told: bool, observation: Observation) -> None:
         """Begins anew if the object is in sight; DetectionError or ModelError if it is not, or not the lost one."""
-        if not told and self._watch.keeps_mesh(observation.t_host_ns):
+        if not told and self._loss_monitor.keeps_mesh(observation.t_host_ns):
             tracker.relocate(self._detect(observation).points)
             return
         lost = tracker.model.mesh
         begun, mesh = self._begin(observation)
-        if not told and self._watch.is_another(mesh, lost):
+        if not told and self._loss_monitor.differs_in_size(mesh, lost):
             raise DetectionError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
         self._adopt(begun, mesh, observation)
 
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
         self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
-        self._relief = self._plan.relief.build(tracker.model, self._rig.sensors[self._plan.reference])
+        self._vertex_offsets = self._plan.vertex_offsets.build(tracker.model, self._rig.sensors[self._plan.reference])
         # What these see of the surface is not known: as soon as one of them delivers, it is time to begin anew.
         sensors = self._rig.sensors
         self._unseen = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))

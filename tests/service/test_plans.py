@@ -43,10 +43,10 @@ def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_p
         wiring.rig(config.loads(toml, "maps.toml", tmp_path), "sheet", {"tof": TOF, "color": COLOR})
 
 
-def test_a_relief_that_is_to_be_learnt_needs_a_model_with_offsets():
+def test_vertex_offsets_need_a_model_with_offsets():
     demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
-    own = demo.rstrip() + "\n\n[trackers.sheet.relief]\ndrift = 1e-4\n"
-    assert wiring.plan(config.loads(own, "own.toml", Path()), "sheet").relief.drift == 1e-4
+    own = demo.rstrip() + "\n\n[trackers.sheet.vertex_offsets]\nrandom_walk = 1e-4\n"
+    assert wiring.plan(config.loads(own, "own.toml", Path()), "sheet").vertex_offsets.random_walk == 1e-4
     stiff = own.replace('type = "nurbs"\ncontrol_points = [4, 4]\ndegree = 2\n', 'type = "rigid"\n')
-    with pytest.raises(wiring.PlanError, match=r'relief\.drift = 0\.0001 needs .*"nurbs", not "rigid"'):
+    with pytest.raises(wiring.PlanError, match=r'vertex_offsets\.random_walk = 0\.0001 needs .*"nurbs", not "rigid"'):
         wiring.plan(config.loads(stiff, "own.toml", Path()), "sheet")

@@ -5,12 +5,12 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from abs_service.tracker.detection.segmentation import detect_object
 from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import gravity, posed

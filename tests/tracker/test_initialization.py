@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from abs_service.tracker.detection.segmentation import detect_object
 
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.regions import nearest
+from abs_service.tracker.detection.segmentation import detect_object
 from calib import pose
 from calib.camera import Camera
 from calib.noise.color import GaussianColor

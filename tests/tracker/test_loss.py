@@ -1,4 +1,4 @@
-"""A lost object is looked for anew, and one that is back is believed only after a while."""
+"""Reinitialization of a lost object, and hysteresis until it counts as tracked again."""
 
 import dataclasses
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracking.loss_monitor import LossWatch, Settings
+from abs_service.tracking.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import Tracking
 from drivers.contract.frame import Frame, Kind
 from tests.tracker.driving import default_plan, drive, rig_of, simulate
@@ -22,47 +22,47 @@ def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
     return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons)
 
 
-def test_a_tracked_object_is_never_overdue():
-    watch = LossWatch(Settings())
-    assert [watch.judge(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
-    assert not watch.overdue(10**12)
+def test_a_tracked_object_needs_no_attempt():
+    monitor = LossMonitor(Settings())
+    assert [monitor.with_hysteresis(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
+    assert not monitor.attempt_due(10**12)
 
 
-def test_a_lost_object_is_overdue_after_a_while_and_then_now_and_then():
-    watch = LossWatch(Settings(after_s=0.2, every_s=0.1))
+def test_attempts_are_due_after_a_delay_and_then_periodically():
+    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1))
     tries = []
     for k in range(1, 16):
-        if watch.overdue(k * FRAME_NS):
+        if monitor.attempt_due(k * FRAME_NS):
             tries.append(k)
-        watch.judge(estimate(k, Status.LOST))
+        monitor.with_hysteresis(estimate(k, Status.LOST))
     assert tries == [8, 12]  # 0.2 s after frame 1, then every 0.1 s
 
 
-def test_being_seen_once_ends_the_waiting():
-    watch = LossWatch(Settings(after_s=0.1))
-    watch.judge(estimate(0, Status.LOST))
-    watch.judge(estimate(1, Status.DEGRADED, ("no frame from color",)))
-    watch.judge(estimate(9, Status.LOST))
-    assert not watch.overdue(10 * FRAME_NS)
-    assert watch.overdue(13 * FRAME_NS)
+def test_a_good_estimate_restarts_the_delay():
+    monitor = LossMonitor(Settings(after_s=0.1))
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    monitor.with_hysteresis(estimate(1, Status.DEGRADED, ("no frame from color",)))
+    monitor.with_hysteresis(estimate(9, Status.LOST))
+    assert not monitor.attempt_due(10 * FRAME_NS)
+    assert monitor.attempt_due(13 * FRAME_NS)
 
 
 def test_after_a_loss_the_first_good_estimates_are_degraded():
-    watch = LossWatch(Settings(confirm=3))
-    watch.judge(estimate(0, Status.LOST))
-    after = [watch.judge(estimate(k, Status.TRACKING)) for k in range(1, 5)]
+    monitor = LossMonitor(Settings(confirm=3))
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    after = [monitor.with_hysteresis(estimate(k, Status.TRACKING)) for k in range(1, 5)]
     assert [e.status for e in after] == [Status.DEGRADED, Status.DEGRADED, Status.TRACKING, Status.TRACKING]
     assert after[1].reasons == ("found again 2 of 3 estimates ago",)
     assert after[2].reasons == ()
 
 
-def test_an_empty_scene_is_not_the_lost_object():
-    watch = LossWatch(Settings(size_ratio=2.0))
+def test_objects_of_another_size_are_rejected():
+    monitor = LossMonitor(Settings(size_ratio=2.0))
     lost = sheet(size=(0.3, 0.2))
     assert lost.area == pytest.approx(0.06, rel=0.05)
-    assert not watch.is_another(sheet(size=(0.25, 0.2)), lost)
-    assert watch.is_another(sheet(size=(1.5, 1.0)), lost)
-    assert watch.is_another(sheet(size=(0.1, 0.1)), lost)
+    assert not monitor.differs_in_size(sheet(size=(0.25, 0.2)), lost)
+    assert monitor.differs_in_size(sheet(size=(1.5, 1.0)), lost)
+    assert monitor.differs_in_size(sheet(size=(0.1, 0.1)), lost)
 
 
 def without_object(k: int, frames: list[Frame]) -> list[Frame]:
@@ -73,7 +73,7 @@ def without_object(k: int, frames: list[Frame]) -> list[Frame]:
     return [dataclasses.replace(frame, data=np.full_like(frame.data, plain[frame.kind])) for frame in frames]
 
 
-def test_an_object_that_comes_back_is_found_again_with_a_new_mesh():
+def test_a_returning_object_is_reinitialized_with_a_new_mesh():
     plan = dataclasses.replace(default_plan(), reinitialization=Settings(after_s=0.3, every_s=0.1))
     tracking = Tracking(rig_of(SHEET), plan)
     # In between it has moved for three seconds, so that the last estimate is no good start.
@@ -92,7 +92,7 @@ def test_an_object_that_comes_back_is_found_again_with_a_new_mesh():
     assert max(errors) < 3
 
 
-def test_a_tracker_that_is_told_to_begins_anew_at_once():
+def test_reinitialize_makes_a_new_mesh_in_the_next_frame():
     tracking = Tracking(rig_of(SHEET), default_plan())
     versions = []
     for k, step in enumerate(drive(tracking, SHEET, range(6))):
@@ -103,12 +103,12 @@ def test_a_tracker_that_is_told_to_begins_anew_at_once():
     assert versions == [1, 1, 1, 2, 2, 2]
 
 
-def test_a_mesh_is_kept_for_a_while():
-    watch = LossWatch(Settings(keep_s=1.0))
-    assert not watch.keeps_mesh(0)
-    watch.judge(estimate(0, Status.LOST))
-    assert watch.keeps_mesh(FRAME_NS)
-    assert not watch.keeps_mesh(1_100_000_000)
-    lost_for_good = LossWatch(Settings())
-    lost_for_good.judge(estimate(0, Status.LOST))
+def test_the_mesh_is_kept_for_keep_s_after_the_loss():
+    monitor = LossMonitor(Settings(keep_s=1.0))
+    assert not monitor.keeps_mesh(0)
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    assert monitor.keeps_mesh(FRAME_NS)
+    assert not monitor.keeps_mesh(1_100_000_000)
+    lost_for_good = LossMonitor(Settings())
+    lost_for_good.with_hysteresis(estimate(0, Status.LOST))
     assert not lost_for_good.keeps_mesh(FRAME_NS)

@@ -124,10 +124,10 @@ class Nurbs:
         """The same for a chain."""
         return self._patches.step()
 
-    def raise_vertices(self, by: NDArray[np.float64]) -> None:
+    def add_offsets(self, by: NDArray[np.float64]) -> None:
         """Adds lengths (n,) [m] to the offsets of the vertices along their normals, at rest and deformed."""
         self._offset += by.astype(np.float32)
-        self._patches.raise_vertices(by)
+        self._patches.add_offsets(by)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""

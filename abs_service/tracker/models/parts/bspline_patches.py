@@ -65,7 +65,7 @@ class Patches:
     def _arguments(self) -> tuple[NDArray[np.generic], ...]:
         return self._control, self._powers, self._start, self._vertices
 
-    def raise_vertices(self, by: NDArray[np.float64]) -> None:
+    def add_offsets(self, by: NDArray[np.float64]) -> None:
         """Adds lengths (n,) [m] to the offsets."""
         self._vertices[2, : len(by)] += by.astype(np.float32)
 

@@ -1,4 +1,4 @@
-"""Offsets of vertices are learnt as a Kalman filter would, and a toy tracker's mesh gets nearer to the truth by it."""
+"""Vertex offsets follow a Kalman filter per vertex and reduce the surface error of a simulated sheet."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracking.vertex_offsets import FixedRelief, LearntRelief, Settings
+from abs_service.tracking.vertex_offsets import FilteredOffsets, FixedOffsets, Settings
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from calib.rig import Sensor
@@ -31,7 +31,7 @@ class Flat:
         self.mesh = Mesh(self.sight, empty, np.zeros((n, 3), np.float32), np.zeros((n, 2)), {}, np.full(n, deviation))
         self.offset = np.zeros(n)
 
-    def raise_vertices(self, by: np.ndarray) -> None:
+    def add_offsets(self, by: np.ndarray) -> None:
         self.offset += by
 
     @property
@@ -46,57 +46,59 @@ class Flat:
         return DepthImage(distance, np.full_like(distance, np.nan))
 
 
-def learnt(model: Flat, drift: float) -> LearntRelief:
+def filtered(model: Flat, random_walk: float) -> FilteredOffsets:
     noise = Constant(SIGMA)
-    return LearntRelief(model, Sensor("depth", CAMERA, noise), noise, drift)
+    return FilteredOffsets(model, Sensor("depth", CAMERA, noise), noise, random_walk)
 
 
 @settings(max_examples=20)
 @given(st.floats(1e-4, 5e-3), st.floats(1e-4, 1e-2), st.integers(0, 2**32))
-def test_every_offset_is_what_its_own_kalman_filter_says(deviation, drift, seed):
+def test_each_offset_follows_its_own_kalman_filter(deviation, random_walk, seed):
     model, generator = Flat(deviation), np.random.default_rng(seed)
-    relief = learnt(model, drift)
+    offsets = filtered(model, random_walk)
     offset, variance = np.zeros(len(model.offset)), np.full(len(model.offset), deviation**2)
     for k in range(5):
         measured = 1 - 1e-3 * generator.standard_normal(len(offset))
-        measured[k] = np.nan  # nothing is learnt without a return
-        relief.learn(model.image(measured), model.surface, k * 50_000_000)
-        variance += drift**2 * (1 / 30 if k == 0 else 0.05)
+        measured[k] = np.nan  # no return, no update
+        offsets.update(model.image(measured), model.surface, k * 50_000_000)
+        variance += random_walk**2 * (1 / 30 if k == 0 else 0.05)
         gain = np.where(np.isnan(measured), 0, variance / (variance + SIGMA**2))
         innovation = np.nan_to_num((1 - measured) - offset)
         gain[innovation**2 > 9 * (variance + SIGMA**2)] = 0
         offset, variance = offset + gain * innovation, (1 - gain) * variance
     np.testing.assert_allclose(model.offset, offset, atol=2e-6)
-    np.testing.assert_allclose(relief.variance, variance, rtol=1e-6)
+    np.testing.assert_allclose(offsets.variance, variance, rtol=1e-6)
 
 
-def test_what_is_something_else_teaches_nothing():
+def test_outliers_and_missing_images_leave_the_offsets_unchanged():
     model = Flat(1e-3)
-    relief = learnt(model, 1e-3)
-    relief.learn(model.image(np.full(len(model.offset), 0.9)), model.surface, 0)
-    relief.learn(None, model.surface, 1)
+    offsets = filtered(model, 1e-3)
+    offsets.update(model.image(np.full(len(model.offset), 0.9)), model.surface, 0)
+    offsets.update(None, model.surface, 1)
     assert not model.offset.any()
 
 
-def test_without_drift_or_offsets_nothing_is_learnt():
+def test_without_random_walk_or_model_offsets_the_offsets_are_fixed():
     model, sensor = Flat(1e-3), Sensor("depth", CAMERA, Constant(SIGMA))
-    assert isinstance(Settings().build(model, sensor), FixedRelief)
-    assert isinstance(Settings(1e-3).build(object(), sensor), FixedRelief)
-    assert isinstance(Settings(1e-3).build(model, sensor), LearntRelief)
+    assert isinstance(Settings().build(model, sensor), FixedOffsets)
+    assert isinstance(Settings(1e-3).build(object(), sensor), FixedOffsets)
+    assert isinstance(Settings(1e-3).build(model, sensor), FilteredOffsets)
 
 
 @pytest.mark.slow
-def test_a_simulated_sheet_s_surface_is_known_better():
+def test_filtered_offsets_reduce_the_surface_error_of_a_simulated_sheet():
     from abs_service.tracking.session import Tracking
     from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 
     simulation = simulate("simulated://sheet?seed=1")
     fixed, adaptive = (
         mean_errors(
-            list(drive(Tracking(rig_of(simulation), replace(default_plan(), relief=relief)), simulation, range(90)))[
-                30:
-            ]
+            list(
+                drive(
+                    Tracking(rig_of(simulation), replace(default_plan(), vertex_offsets=offsets)), simulation, range(90)
+                )
+            )[30:]
         )
-        for relief in (Settings(), Settings(1e-4))
+        for offsets in (Settings(), Settings(1e-4))
     )
     assert adaptive[1] < 0.85 * fixed[1]
