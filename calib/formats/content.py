@@ -1,4 +1,4 @@
-"""What all formats have in common: cameras by name, what got lost, and numbers that make them."""
+"""Common types of all formats: cameras by name, list of losses, and conversion of numbers to cameras."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ from calib.pose import Pose
 
 
 class FormatError(ValueError):
-    """A text that is not of its format, or a camera that a format cannot express."""
+    """Invalid text, or a camera that a format cannot express."""
 
 
 @dataclass(frozen=True)
 class Hints:
-    """What some formats leave open.
+    """Values that some formats omit.
 
     Attributes:
-        name: of the camera where the text has only one and no name for it.
-        size: width and height [px] where the text has none; None if nobody knows.
-        unit: length of the unit of translations where the format does not fix it [m].
+        name: of the camera, for a format without names.
+        size: width and height [px], for a format without image sizes; None if unknown.
+        unit: length of the unit of translations [m], for a format without fixed units.
     """
 
     name: str = "camera"
@@ -35,7 +35,7 @@ class Hints:
 
 @dataclass(frozen=True)
 class Content:
-    """Cameras that a text describes, by name, and what else it says that has no place in them, in words."""
+    """Cameras of a text by name, and descriptions of what was lost in reading."""
 
     cameras: Mapping[str, Camera]
     lost: tuple[str, ...] = ()
@@ -43,17 +43,17 @@ class Content:
 
 @dataclass(frozen=True)
 class Written:
-    """A text, and what it does not say of the cameras, in words."""
+    """Written text, and descriptions of what was lost in writing."""
 
     text: str
     lost: tuple[str, ...] = ()
 
 
 def rigid(matrix: ArrayLike) -> Pose:
-    """The pose of 3 × 4 or 4 × 4 numbers; a rotation that was rounded is made orthonormal again.
+    """Pose from 3 × 4 or 4 × 4 numbers; the rotation is orthonormalised.
 
     Raises:
-        FormatError: they are no pose.
+        FormatError: the numbers are not a pose.
     """
     given = np.asarray(matrix, np.float64)
     if given.shape not in {(3, 4), (4, 4)}:
@@ -65,10 +65,10 @@ def rigid(matrix: ArrayLike) -> Pose:
 
 
 def brown_conrady(coefficients: ArrayLike) -> Lens:
-    """The lens of 4, 5, 8, 12 or 14 coefficients of OpenCV.
+    """Lens from 4, 5, 8, 12 or 14 coefficients of OpenCV.
 
     Raises:
-        FormatError: thin prism or tilted sensor, which have no place here.
+        FormatError: thin prism or tilted sensor, which are not supported.
     """
     given = np.ravel(np.asarray(coefficients, np.float64))
     if np.any(given[8:]):
@@ -77,10 +77,10 @@ def brown_conrady(coefficients: ArrayLike) -> Lens:
 
 
 def fisheye(coefficients: ArrayLike) -> KannalaBrandt:
-    """The lens of up to four coefficients of `cv2.fisheye`, which others call equidistant; further ones must be zero.
+    """Lens from up to four coefficients of `cv2.fisheye` (equidistant); further ones must be zero.
 
     Raises:
-        FormatError: they are not.
+        FormatError: more than four nonzero coefficients.
     """
     given = np.ravel(np.asarray(coefficients, np.float64))
     if np.any(given[4:]):
@@ -96,10 +96,10 @@ def _lens(model: Any, coefficients: Any) -> Any:
 
 
 def camera(size: Sequence[Any], matrix: Sequence[Any], lens: LensModel, T_rs: Pose | None = None) -> Camera:
-    """A camera of (width, height) and (fx, fy, cx, cy).
+    """Camera from (width, height) and (fx, fy, cx, cy).
 
     Raises:
-        FormatError: the numbers describe none.
+        FormatError: the numbers are not a camera.
     """
     try:
         width, height = (int(float(number)) for number in size)
@@ -110,10 +110,10 @@ def camera(size: Sequence[Any], matrix: Sequence[Any], lens: LensModel, T_rs: Po
 
 
 def only(cameras: Mapping[str, Camera], what: str) -> tuple[str, Camera]:
-    """The one camera that a format has room for.
+    """The only camera, for formats of a single camera.
 
     Raises:
-        FormatError: there are several; names them.
+        FormatError: several cameras; names them.
     """
     if len(cameras) != 1:
         raise FormatError(f"{what} describes one camera; choose one of {', '.join(cameras)}")
@@ -121,18 +121,18 @@ def only(cameras: Mapping[str, Camera], what: str) -> tuple[str, Camera]:
 
 
 def relative(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
-    """What gets lost where poses are relative to the first camera."""
+    """Losses of a format with poses relative to the first camera."""
     name, first = next(iter(cameras.items()))
     at_origin = np.array_equal(first.T_rs, np.eye(4))
     return () if at_origin else (f"where {name} is in the rig: poses are relative to it",)
 
 
 def placed(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
-    """What gets lost where there are no poses."""
+    """Losses of a format without poses."""
     return tuple(f"the pose of {name}" for name, one in cameras.items() if not np.array_equal(one.T_rs, np.eye(4)))
 
 
 def extra(name: str, table: Mapping[str, Any], known: Sequence[str]) -> tuple[str, ...]:
-    """Keys of a table that have no place in a camera."""
+    """Unused keys of a table."""
     unknown = [str(key) for key in table if key not in known]
     return (f"{name}: {', '.join(unknown)}",) if unknown else ()

@@ -1,6 +1,6 @@
 """DepthAI's calibration, the JSON of `CalibrationHandler.eepromToJsonFile`: lengths in centimetres, cameras by socket.
 
-Each camera may say where it is relative to one other: `extrinsics` map its coordinates to those of `toCameraSocket`.
+A camera may have a pose relative to one other: `extrinsics` map its coordinates to those of `toCameraSocket`.
 """
 
 import json
@@ -16,7 +16,7 @@ from calib.formats.content import Content, FormatError, Hints, Written, brown_co
 from calib.lens import LensModel
 from calib.pose import Pose
 
-#: Metres per numbered length unit: metre, centimetre (when it is not said), millimetre, inch, foot.
+#: Metres per numbered length unit: metre, centimetre (the default), millimetre, inch, foot.
 UNITS = (1.0, 0.01, 0.001, 0.0254, 0.3048)
 
 _NOWHERE = -1
@@ -25,10 +25,10 @@ _COEFFICIENTS = 14
 
 
 def read(text: str, hints: Hints) -> Content:
-    """The calibrated cameras by socket, `cam_a` for 0, in a rig whose frame is that of the camera all lead to.
+    """Cameras by socket, `cam_a` for 0, in the frame of the camera at the root of all extrinsics.
 
     Raises:
-        FormatError: the text is no such calibration, or a lens in it cannot be expressed.
+        FormatError: invalid text, or a lens that cannot be expressed.
     """
     try:
         eeprom = json.loads(text)
@@ -55,7 +55,7 @@ def read(text: str, hints: Hints) -> Content:
 
 
 def write(cameras: Mapping[str, Camera]) -> Written:
-    """A calibration in which the first camera is at socket 0, the second at socket 1, …, and all lead to the first."""
+    """Calibration with the first camera at socket 0, the second at socket 1, …, all linked to the first."""
     first = next(iter(cameras.values()))
     data: list[list[Any]] = []
     for socket, one in enumerate(cameras.values()):
@@ -108,7 +108,7 @@ def _link(extrinsics: Mapping[str, Any]) -> tuple[int, Pose]:
 
 
 def _to_root(socket: int, links: Mapping[int, tuple[int, Pose]]) -> tuple[int, Pose]:
-    """The camera that the links of one lead to, and the pose of the one in it."""
+    """Root camera of a chain of extrinsics, and the pose of the socket in it."""
     T, seen = pose.identity(), {socket}
     while socket in links and links[socket][0] != _NOWHERE:
         to, T_to_s = links[socket]

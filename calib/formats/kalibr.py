@@ -1,6 +1,6 @@
 """Kalibr's camera chain (`camchain.yaml`). Source: its wiki, page "yaml formats".
 
-`cam0` is the origin, and `T_cn_cnm1` of every other camera maps the coordinates of the one before it to its own.
+`cam0` is the origin; `T_cn_cnm1` of every other camera maps the previous camera's coordinates to its own.
 """
 
 from collections.abc import Mapping
@@ -33,10 +33,10 @@ _KNOWN = (
 
 
 def read(text: str, hints: Hints) -> Content:
-    """The cameras of a chain, named by the first part of their ROS topics if those differ, by `cam0` … otherwise.
+    """Cameras of a chain, named by the first part of their ROS topics if unique, otherwise `cam0` ….
 
     Raises:
-        FormatError: the text is no chain of pinhole cameras.
+        FormatError: not a chain of pinhole cameras.
     """
     try:
         chain = yaml.safe_load(text)
@@ -65,7 +65,7 @@ def read(text: str, hints: Hints) -> Content:
 
 
 def write(cameras: Mapping[str, Camera]) -> Written:
-    """The chain of all cameras in their order.
+    """Chain of all cameras in their order.
 
     Raises:
         FormatError: a lens has more than k1, k2, p1, p2 and is no fisheye.

@@ -28,7 +28,7 @@ def read(text: str, hints: Hints) -> Content:
     """The camera, in a rig whose frame is mrcal's reference.
 
     Raises:
-        FormatError: the text is no camera model, or has a lens that cannot be expressed.
+        FormatError: invalid text, or a lens that cannot be expressed.
     """
     try:
         model: Any = ast.literal_eval(text.strip())
@@ -58,7 +58,7 @@ def write(cameras: Mapping[str, Camera]) -> Written:
     """One camera, with the shortest lens model that has all its coefficients.
 
     Raises:
-        FormatError: there are several, or the lens is none of OpenCV's.
+        FormatError: several cameras, or a lens outside OpenCV's models.
     """
     name, one = only(cameras, "a .cameramodel")
     if not isinstance(one.lens, Lens):

@@ -1,6 +1,6 @@
-"""OpenCV's FileStorage, YAML, XML or JSON, under the keys that its own samples and many programs use.
+"""OpenCV's FileStorage, YAML, XML or JSON, with the keys of its samples and of many programs.
 
-One camera stands at the top (`camera_matrix`, `distortion_coefficients`, as in the sample calibration.cpp), two as
+One camera is at the top level (`camera_matrix`, `distortion_coefficients`, as in the sample calibration.cpp), two are
 `M1, D1, M2, D2` with `R, T` (stereo_calib.cpp), several in a map each.
 """
 
@@ -29,14 +29,14 @@ def read(text: str, hints: Hints) -> Content:
     """All cameras of a storage.
 
     Raises:
-        FormatError: it holds none, or not the size of its images, which the hints do not give either.
+        FormatError: no camera, or an image size that neither the text nor the hints contain.
     """
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     except (cv2.error, SystemError) as error:  # a constructor's exception becomes the cause of a SystemError
         raise FormatError("not a FileStorage of OpenCV: YAML whose first line is %YAML:1.0, XML or JSON") from error
     try:
-        # The tree dies with the storage, so all of it becomes plain values first.
+        # The tree is freed with the storage, so it is copied to plain values first.
         root = _plain(storage.root())
     finally:
         storage.release()
@@ -57,10 +57,10 @@ def read(text: str, hints: Hints) -> Content:
 
 
 def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_YAML) -> Written:
-    """One camera at the top, several in a map each; with T_rs beside OpenCV's own keys.
+    """One camera at the top level, several in a map each; with T_rs besides OpenCV's own keys.
 
     Args:
-        cameras: what to write.
+        cameras: cameras to write.
         dialect: a `cv2.FILE_STORAGE_FORMAT_…`.
     """
     storage = cv2.FileStorage("", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY | dialect)
@@ -121,7 +121,7 @@ def _lens(table: Mapping[str, Any]) -> LensModel:
 
 
 def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
-    """Two cameras of which the left one is the origin; x_right = R x_left + T."""
+    """Stereo pair whose left camera is the origin; x_right = R x_left + T."""
     left, right = (
         {key.removesuffix(side): value for key, value in root.items() if key not in other}
         for side, other in (("1", ("M2", "D2")), ("2", ("M1", "D1")))

@@ -1,4 +1,4 @@
-"""A camera for images of another size."""
+"""Conversion of a camera to another image size."""
 
 import numpy as np
 
@@ -6,10 +6,10 @@ from calib.camera import Camera
 
 
 def resized(one: Camera, width: int, height: int) -> Camera:
-    """The camera of an image of another size, as the device makes it: scaled until it fills the new one, then cropped.
+    """Camera of an image of another size, as devices make it: scaled to fill the new size, then cropped.
 
-    The edges of the image are half a pixel outside of the outermost centres, so centres move by half a pixel less than
-    they are scaled.
+    The image's edges are half a pixel outside the outermost pixel centres, so the principal point is scaled about the
+    corner and not about the first pixel's centre.
     """
     scale = max(width / one.width, height / one.height)
     cropped = np.array([one.width * scale - width, one.height * scale - height]) / 2

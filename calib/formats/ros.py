@@ -1,4 +1,4 @@
-"""ROS CameraInfo as YAML, as `camera_calibration_parsers` reads and writes it: one camera, no pose."""
+"""ROS CameraInfo as YAML, compatible with `camera_calibration_parsers`: one camera, no pose."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,7 +27,7 @@ _KNOWN = (
     "rectification_matrix", "projection_matrix",
 )  # fmt: skip
 
-#: As REP 127 names them, and as OpenCV does.
+#: Names by REP 127 and by OpenCV.
 _FISHEYES = ("equidistant", "fisheye", "kannala_brandt")
 
 
@@ -35,7 +35,7 @@ def read(text: str, hints: Hints) -> Content:
     """The camera, named by its `camera_name`.
 
     Raises:
-        FormatError: the text describes none.
+        FormatError: the text is not a CameraInfo.
     """
     try:
         info = yaml.safe_load(text)
@@ -57,10 +57,10 @@ def read(text: str, hints: Hints) -> Content:
 
 
 def write(cameras: Mapping[str, Camera]) -> Written:
-    """One camera; its image is its own rectified one.
+    """One camera, with identity rectification.
 
     Raises:
-        FormatError: there are several.
+        FormatError: several cameras.
     """
     name, one = only(cameras, "CameraInfo")
     matrix = [one.fx, 0.0, one.cx, 0.0, one.fy, one.cy, 0.0, 0.0, 1.0]

@@ -11,7 +11,7 @@ from calib.formats.urdf import BASE
 
 
 def write(cameras: Mapping[str, Camera]) -> Written:
-    """The poses of all cameras; nothing else of them has a place."""
+    """Poses of all cameras; everything else is lost."""
     transforms = [
         {
             "header": {"frame_id": BASE},

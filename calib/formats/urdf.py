@@ -1,6 +1,6 @@
-"""URDF, write only: the frames of all cameras as links on fixed joints below the link of the rig.
+"""URDF, write only: camera frames as links on fixed joints below the rig's link.
 
-REP 103: `NAME_optical_frame` has z forward and x right, as everything here; `NAME_link` x forward and z up.
+REP 103: `NAME_optical_frame` has z forward and x right, as in this package; `NAME_link` has x forward and z up.
 """
 
 import warnings
@@ -23,7 +23,7 @@ T_LINK_OPTICAL: Pose = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [
 
 
 def write(cameras: Mapping[str, Camera]) -> Written:
-    """The poses of all cameras; nothing else of them has a place."""
+    """Poses of all cameras; everything else is lost."""
     robot = ElementTree.Element("robot", name=BASE)
     ElementTree.SubElement(robot, "link", name=BASE)
     for name, one in cameras.items():

@@ -1,1 +1,1 @@
-"""What the frames of a static sequence tell of a depth sensor's noise, before any model of it."""
+"""Statistics of static sequences of a depth sensor: input of noise model selection."""

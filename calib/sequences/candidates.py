@@ -1,4 +1,4 @@
-"""The noise models that are tried on what a sensor measured, from few coefficients to many."""
+"""Candidate noise models, from few coefficients to many."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,19 +15,19 @@ from calib.noise.per_pixel import PerPixel
 from calib.sequences.evidence import Evidence
 from calib.sequences.steps import Steps
 
-#: Powers (of the distance, of the amplitude) of σ and μ that are tried; those of μ only if real distances are known.
+#: Candidate degrees (distance, amplitude) of σ and μ; those of μ only if true distances are known.
 WITHOUT_AMPLITUDE = ((1, 0), (2, 0), (3, 0))
 WITH_AMPLITUDE = ((1, 1), (2, 1), (2, 2), (3, 2))
 
-#: Powers of the distance in the mean offset of `tof_amplitude` that are tried.
+#: Candidate degrees of the mean offset of `tof_amplitude` in the distance.
 TOF_POWERS = (0, 1, 2, 3, 4, 5)
 
-#: Regions across the shorter side of an image.
+#: Regions along the shorter side of an image.
 _REGIONS = 8
 
 
 class Level(StrEnum):
-    """What shares one set of coefficients."""
+    """Scope of one set of coefficients."""
 
     IMAGE = "image"
     REGION = "region"
@@ -36,13 +36,13 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A model that is tried.
+    """Candidate model.
 
     Attributes:
-        name: its type in a rig file, and its powers, for people.
-        level: what shares its coefficients.
-        coefficients: of the image, or of every place.
-        fit: from evidence to the model; raises `NoiseError` where that does not tell its coefficients.
+        name: its type in a rig file and its degrees, for display.
+        level: scope of its coefficients.
+        coefficients: number for the image, or for every place.
+        fit: from evidence to the model; raises `NoiseError` if the evidence does not determine the coefficients.
     """
 
     name: str
@@ -55,9 +55,9 @@ def of_image(offsets: bool, amplitudes: bool, steps: Steps) -> list[Candidate]:
     """Models with one set of coefficients for the whole image, fewest coefficients first.
 
     Args:
-        offsets: whether real distances are known, and so mean offsets.
-        amplitudes: whether there are amplitudes.
-        steps: that the distances come in.
+        offsets: True if true distances, and so mean offsets, are known.
+        amplitudes: True if there are amplitudes.
+        steps: quantisation of the distances.
     """
     found = [_image("constant", 1 + offsets, _constant, offsets)]
     if steps.growth > 0:
@@ -70,19 +70,19 @@ def of_image(offsets: bool, amplitudes: bool, steps: Steps) -> list[Candidate]:
 
 
 def of_places(law: Candidate, shape: tuple[int, int], own_degree: int) -> list[Candidate]:
-    """A law of the image with maps of how regions, and how pixels, differ.
+    """The image's model with maps of the differences between regions, and between pixels.
 
     Args:
-        law: of the image.
+        law: candidate for the image.
         shape: height and width of the images.
-        own_degree: highest power of the distance in the own mean offset of a region or a pixel.
+        own_degree: degree of the own mean offset of a region or a pixel in the distance.
     """
     labels = blocks(shape)
 
     def fitted(fit: Callable[..., PerPixel], evidence: Evidence) -> PerPixel:
         means, repeats = evidence.means, evidence.repeats
         first = fit(means, law.fit(evidence), labels, own_degree, repeats)
-        # The law's σ had to cover what the places differ by; without that it is the places' own, and of another shape.
+        # The image's σ includes the variation between places; it is refitted without it.
         return fit(means, law.fit(_without_own(first, evidence)), labels, own_degree, repeats)
 
     n = own_degree + 2
@@ -100,7 +100,7 @@ def blocks(shape: tuple[int, int]) -> NDArray[np.int64]:
 
 
 def _without_own(model: PerPixel, evidence: Evidence) -> Evidence:
-    """The single measurements without what places err by for themselves."""
+    """Single measurements minus the fixed errors of their places."""
     samples = evidence.samples
     x, a, p = samples.true, samples.amplitude, samples.pixels
     own = model.mean(x, a, p) - model.law.mean(x, a, p)
@@ -112,7 +112,7 @@ def _image(name: str, coefficients: int, fit: Callable[[Samples], DepthNoise], o
 
 
 def _with(model: DepthNoise, offsets: bool) -> DepthNoise:
-    """The model, without mean offsets where nothing is known of them."""
+    """The model, with zero mean offset if true distances are unknown."""
     match model:
         case constant.Constant() if not offsets:
             return replace(model, offset=0.0)

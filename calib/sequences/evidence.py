@@ -1,4 +1,4 @@
-"""What a sequence says of a sensor's noise: single measurements, and means of all that a pixel measured."""
+"""Evidence of a sequence: single measurements, and per-pixel means."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from calib.noise.fit.shrinkage import Repeats
 from calib.sequences.reference import Reference
 from calib.sequences.static import Static
 
-#: Deviations beyond which a measurement is an outlier of its pixel.
+#: Outlier threshold in deviations of the pixel.
 _CUT = 5.0
 
 
@@ -21,9 +21,9 @@ class Evidence:
     """Measurements and means of the same frames.
 
     Attributes:
-        samples: single measurements; outliers among them.
-        means: mean distance and amplitude of every pixel that has any, without its outliers.
-        repeats: of the means.
+        samples: single measurements, including outliers.
+        means: mean distance and amplitude of every pixel with returns, without outliers.
+        repeats: replicates of the means.
     """
 
     samples: Samples
@@ -32,10 +32,10 @@ class Evidence:
 
 
 def gather(static: Static, reference: Reference, kept: slice = slice(None)) -> Evidence:
-    """The evidence of some of the frames that a sequence has kept.
+    """Evidence of some of the frames kept in a sequence.
 
     Raises:
-        NoiseError: they hold no measurement of a known distance.
+        NoiseError: no measurement of a known distance.
     """
     samples = static.samples(reference.distance, kept)
     if not len(samples):
@@ -46,19 +46,19 @@ def gather(static: Static, reference: Reference, kept: slice = slice(None)) -> E
 
 
 def together(parts: Sequence[Evidence]) -> Evidence:
-    """All evidence of several parts."""
+    """Concatenated evidence."""
     times, variance = (np.concatenate([getattr(part.repeats, name) for part in parts]) for name in Repeats._fields)
     samples, means = (joined([getattr(part, name) for part in parts]) for name in ("samples", "means"))
     return Evidence(samples, means, Repeats(times, variance))
 
 
 def thinned(samples: Samples, most: int, generator: np.random.Generator) -> Samples:
-    """At most so many of the samples, drawn at random."""
+    """At most `most` of the samples, drawn at random."""
     return samples if len(samples) <= most else samples.take(generator.choice(len(samples), most, replace=False))
 
 
 def _averaged(samples: Samples, shape: tuple[int, ...]) -> tuple[Samples, Repeats]:
-    """Means of the samples of each pixel, whose real distance is one."""
+    """Means of the samples of each pixel, all of one true distance."""
     place = samples.row * shape[1] + samples.column
     n = np.bincount(place, minlength=shape[0] * shape[1])
 

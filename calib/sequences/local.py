@@ -1,26 +1,26 @@
-"""How well a deviation that a sensor claims for every pixel agrees with how the pixel fits its neighbours."""
+"""Consistency of a sensor's reported per-pixel deviations with residuals from local planes."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Pixels on either side that a plane is fitted to; how many of them must have a return.
+#: Half width of the window for plane fits; minimum number of returns in it.
 _REACH, _LEAST = 2, 20
 
-#: A neighbourhood whose distances differ by more than this share of them is no plane.
+#: Largest relative range of distances in a window that is treated as a plane.
 _RIM = 0.03
 
 
 def normalized(
     distance: NDArray[np.floating], claimed: NDArray[np.floating], rays: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """Residuals of one image from local planes over claimed deviations (height, width); NaN where there is no plane.
+    """Residuals of one image from local planes over reported deviations (height, width); NaN without a plane.
 
-    A plane is put through the 25 pixels around each one, itself included; that it bends the plane towards itself is
-    taken into account by its leverage. On a curved surface the residuals are too large, never too small.
+    The plane is fitted to the 25 pixels around each one, including itself; its own influence is corrected by the
+    leverage. On a curved surface the residuals are too large, never too small.
 
     Args:
         distance: radial (height, width) [m]; NaN without return.
-        claimed: its deviation (height, width) [m].
+        claimed: reported deviation (height, width) [m].
         rays: unit directions (height, width, 3).
     """
     side = 2 * _REACH + 1
@@ -48,6 +48,6 @@ def normalized(
 
 
 def _windows(image: NDArray[np.floating], side: int) -> NDArray[np.floating]:
-    """Neighbourhoods (height − side + 1, width − side + 1, …, side²) of the pixels of an image (height, width, …)."""
+    """Windows (height − side + 1, width − side + 1, …, side²) of an image (height, width, …)."""
     view = np.lib.stride_tricks.sliding_window_view(image, (side, side), axis=(0, 1))
     return view.reshape(*view.shape[:-2], side * side)

@@ -1,4 +1,4 @@
-"""Parts of an error: what changes from frame to frame, what a pixel errs by for ever, and what all pixels share."""
+"""Components of an error: temporal noise, fixed-pattern noise, and offset common to all pixels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from calib.noise.base import DepthNoise, pixels_where
 from calib.sequences.reference import Kind, Reference
 from calib.sequences.static import Static
 
-#: Variance of a normal distribution without the outermost per cent at either end, in units of its own.
+#: Variance of a normal distribution trimmed by one per cent at either end, relative to the full one.
 _LEFT = 0.8735
 
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What a sequence, or a part of it at similar distances, says of the sensor; all in metres.
+    """Error components of a sequence, or of pixels at similar distances; all in metres.
 
     Attributes:
-        pixels: that tell it.
-        distance: real distance on average.
-        amplitude: on average; NaN without.
+        pixels: number of pixels.
+        distance: mean true distance.
+        amplitude: mean; NaN without.
         temporal: deviation from frame to frame, root mean square over the pixels.
-        fixed: deviation of the pixels' means from what all pixels share, without what is left of the temporal part and
-            of the steps in a mean; NaN where the real distances are the means themselves.
-        offset: mean offset from the real distance; NaN where that is not known.
-        step: of the distances.
+        fixed: deviation of the pixels' means from the common offset, corrected for temporal noise and quantisation; NaN
+            if the means themselves are the reference.
+        offset: mean offset from the true distance; NaN if unknown.
+        step: quantisation step of the distances.
     """
 
     pixels: int
@@ -39,13 +39,13 @@ class Parts:
 
 
 def separate(static: Static, reference: Reference, model: DepthNoise, where: NDArray[np.bool_]) -> Parts:
-    """Separates the parts of one sequence.
+    """Error components of one sequence.
 
     Args:
         static: the sequence.
-        reference: its real distances.
-        model: tells the mean offset that all pixels share.
-        where: pixels (height, width) that count.
+        reference: its true distances.
+        model: noise model; determines the common mean offset.
+        where: mask of pixels (height, width).
     """
     pixels = where & np.isfinite(reference.distance)
     x, a = reference.distance[pixels], static.brightness[pixels]
@@ -71,9 +71,9 @@ def separate(static: Static, reference: Reference, model: DepthNoise, where: NDA
 def pattern(
     statics: Sequence[Static], references: Sequence[Reference], model: DepthNoise
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What each pixel errs by in all sequences alike, and by how much that may be wrong, (height, width) [m].
+    """Fixed error of each pixel over all sequences, and its deviation, (height, width) [m].
 
-    Every sequence counts by how well it tells a pixel's mean; NaN where none does.
+    Sequences are weighted by their information on a pixel's mean; NaN without any.
     """
     shape = statics[0].mean.shape
     total, weight = np.zeros(shape), np.zeros(shape)
@@ -89,7 +89,7 @@ def pattern(
 
 
 def _of_steps(variance: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Variance that steps leave in a mean: less the more the noise carries values from one step to the next.
+    """Variance that quantisation leaves in a mean; decreases as noise dithers the values.
 
     Of a uniform error of a step Δ, noise of deviation σ leaves Δ²/(2π²) exp(−4π² σ²/Δ²), the first term of its Fourier
     series (Widrow and Kollár, Quantization Noise, 2008).
@@ -99,6 +99,6 @@ def _of_steps(variance: NDArray[np.float64], step: NDArray[np.float64]) -> NDArr
 
 
 def _trimmed_variance(values: NDArray[np.float64]) -> float:
-    """Variance of a normal distribution, from its values without the outermost per cent at either end."""
+    """Variance of a normal distribution, from values trimmed by one per cent at either end."""
     low, high = np.quantile(values, [0.01, 0.99])
     return float(np.var(values[(values >= low) & (values <= high)])) / _LEFT

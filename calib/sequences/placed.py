@@ -1,4 +1,4 @@
-"""A board at rest as the target of a sequence: where its corners say that it is, and how well that is known."""
+"""Static board as the target of a sequence: pose from its corners, with uncertainty."""
 
 from dataclasses import dataclass
 
@@ -15,25 +15,25 @@ from calib.sequences import plane
 from calib.solve.start.board_poses import pose_candidates
 from calib.views import CornerView
 
-#: Increments of a pose that derivatives are told from [rad, m].
+#: Increments for finite differences with respect to a pose [rad, m].
 _STEP = 1e-5
-#: Corners of an image are not believed to be known better than this [px].
+#: Lower bound of the deviation of corners [px].
 _LEAST_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A board in front of a depth sensor.
+    """Board in front of a depth sensor.
 
     Attributes:
-        seen_by: sensor whose image told its pose.
-        corners: number of points that told it.
-        rms_px: of their distances from where the pose puts them [px].
+        seen_by: sensor whose image determined the pose.
+        corners: number of points.
+        rms_px: root mean square reprojection error [px].
         T_rb: pose of the board in the rig.
         plane: q (3,) [1/m] of its plane, q · X = 1 in the depth sensor's frame.
         inside: pixels (height, width) of the depth sensor well inside the hull of the points.
-        uncertainty: deviation of the real distances of these pixels that the corners leave open, root mean square [m];
-            what is wrong with cameras or with the size of the board's squares is not in it.
+        uncertainty: deviation of the true distances of these pixels due to corner noise, root mean square [m]; excludes
+            errors of the cameras and of the size of the board's squares.
     """
 
     seen_by: str
@@ -46,15 +46,15 @@ class Placed:
 
 
 def place(view: CornerView, seeing: Camera, depth: Camera) -> Placed:
-    """Places a board that one sensor sees in front of a depth sensor, which may be the same.
+    """Estimates the pose of a board seen by one sensor relative to a depth sensor, which may be the same.
 
     Args:
-        view: of the board.
+        view: view of the board.
         seeing: camera of the view's sensor, with its pose in the rig.
         depth: camera of the depth sensor, likewise.
 
     Raises:
-        NoiseError: no pose explains the view, or the depth sensor does not see the board.
+        NoiseError: no valid board pose, or the board is outside the depth sensor's view.
     """
     found = [_refined(seeing.T_rs @ each.T_sb, view, seeing) for each in pose_candidates(seeing, view)]
     if not found:
@@ -74,7 +74,7 @@ def place(view: CornerView, seeing: Camera, depth: Camera) -> Placed:
 
 
 def _refined(T_rb: Pose, view: CornerView, camera: Camera) -> tuple[Pose, NDArray[np.float64], NDArray[np.float64]]:
-    """The pose near a first guess with the least misses of corners, these misses (2n,) [px] and their derivatives."""
+    """Pose refined by least squares, reprojection errors (2n,) [px] and their Jacobian."""
 
     def misses(increment: NDArray[np.float64]) -> NDArray[np.float64]:
         shown = camera.project(pose.transform(_moved(T_rb, increment), view.points_b))
@@ -85,7 +85,7 @@ def _refined(T_rb: Pose, view: CornerView, camera: Camera) -> tuple[Pose, NDArra
 
 
 def _moved(T_rb: Pose, increment: NDArray[np.float64]) -> Pose:
-    """A pose after an increment: turned about the board's own origin, which moves in the rig's frame."""
+    """Pose after an increment: rotation about the board's own origin, translation in the rig's frame."""
     moved = T_rb @ pose.from_rotation_vector(increment[:3], np.zeros(3))
     moved[:3, 3] += increment[3:]
     return moved
@@ -98,13 +98,13 @@ def _plane(T_rb: Pose, depth: Camera) -> NDArray[np.float64]:
 
 
 def _slope(T_rb: Pose, number: int, depth: Camera, rays: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Derivatives of the real distances along rays (n, 3) by one parameter of the pose."""
+    """Derivative of the true distances along rays (n, 3) with respect to one parameter of the pose."""
     step = _STEP * np.eye(6)[number]
     ahead, behind = (plane.radial(_plane(_moved(T_rb, sign * step), depth), rays) for sign in (1, -1))
     return (ahead - behind) / (2 * _STEP)
 
 
 def _inside(depth: Camera, points_r: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Pixels well inside the hull of points (n, 3); none if one of them is nowhere in the sensor's view."""
+    """Pixels well inside the hull of points (n, 3); none if a point is outside the sensor's view."""
     shape, pixels = (depth.height, depth.width), depth.project(points_r)
     return region(pixels, shape) if np.isfinite(pixels).all() else np.zeros(shape, np.bool_)

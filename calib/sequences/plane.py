@@ -1,4 +1,4 @@
-"""The plane that a target lies in, as the plane q · X = 1 in the sensor's frame: along a unit ray, 1 / r = ray · q."""
+"""Plane of a target as q · X = 1 in the sensor's frame: along a unit ray, 1 / r = ray · q."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,16 +6,16 @@ from scipy import ndimage
 
 from calib.noise.base import NoiseError
 
-#: Triples of pixels that are tried: enough for a plane that covers a fifth of what is seen. Pixels that judge each.
+#: RANSAC trials, enough for a plane covering a fifth of the pixels, and pixels that score each.
 _TRIALS, _JUDGES = 600, 3000
 
-#: Rounds of least squares, each with the weights of the one before.
+#: Iterations of reweighted least squares.
 _ROUNDS = 12
 
-#: A plane of fewer pixels is none.
+#: Minimum number of pixels of a plane.
 _FEWEST = 50
 
-#: Residuals count less from here on, in units of the tolerance (Tukey's biweight ends here).
+#: Cutoff of Tukey's biweight, in units of the tolerance.
 _TUKEY = 1.5
 
 
@@ -26,20 +26,20 @@ def find(
     tolerance: NDArray[np.floating],
     generator: np.random.Generator,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """The largest plane in an image.
+    """Largest plane in an image.
 
     Args:
         distance: radial (height, width) [m].
         rays: unit directions (height, width, 3).
-        where: pixels that count (height, width).
-        tolerance: how far from its plane a pixel may be (height, width) [m].
-        generator: draws the triples of pixels that planes are put through.
+        where: mask of candidate pixels (height, width).
+        tolerance: largest distance of a pixel from its plane (height, width) [m].
+        generator: draws the triples of pixels.
 
     Returns:
-        The plane q (3,) [1/m], and its pixels (height, width), all of them connected.
+        Plane q (3,) [1/m], and its connected pixels (height, width).
 
     Raises:
-        NoiseError: there is none.
+        NoiseError: there is no plane.
     """
     r, along, t = distance[where], rays[where], tolerance[where]
     if len(r) < _FEWEST:
@@ -68,16 +68,16 @@ def through(
     along: NDArray[np.floating],
     tolerance: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """The plane q (3,) [1/m] that meets the optical axis at a known depth, turned so that it fits.
+    """Plane q (3,) [1/m] at a known depth on the optical axis, with fitted orientation.
 
-    An offset common to all pixels does not turn it; one that grows linearly across the image does, and cannot be told
-    from a turned target.
+    A common offset of all pixels does not affect the orientation; one that grows linearly across the image does, and
+    cannot be distinguished from a rotated target.
 
     Args:
-        depth: where the plane meets the optical axis [m].
+        depth: depth of the plane on the optical axis [m].
         distance: radial distances (n,) [m].
         along: unit directions (n, 3).
-        tolerance: how far from the plane a pixel may be, after a common offset (n,) [m].
+        tolerance: largest distance of a pixel from the plane, after a common offset (n,) [m].
     """
     q, offset = np.array([0.0, 0.0, 1 / depth]), float(np.median(distance - depth / along[:, 2]))
     for _ in range(_ROUNDS):
@@ -92,7 +92,7 @@ def through(
 
 
 def radial(q: NDArray[np.floating], rays: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Radial distances (…,) [m] at which unit directions (…, 3) meet the plane q; NaN where they do not."""
+    """Radial distances (…,) [m] at which unit directions (…, 3) meet the plane q; NaN if they do not."""
     inverse = np.asarray(rays, np.float64) @ q
     with np.errstate(divide="ignore"):
         return np.where(inverse > 0, 1 / inverse, np.nan)
@@ -113,5 +113,5 @@ def _least_squares(
 
 
 def _weights(residual: NDArray[np.floating], tolerance: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Square roots of Tukey's weights, over the tolerance."""
+    """Square roots of Tukey's weights, divided by the tolerance."""
     return np.clip(1 - np.square(residual / (_TUKEY * tolerance)), 0, None) / tolerance

@@ -1,4 +1,4 @@
-"""What a target's real distances are taken to be, and so what can be learnt of a sensor from it."""
+"""Reference of a target's true distances, which limits what can be learnt about a sensor."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,31 +11,31 @@ from calib.sequences import plane
 from calib.sequences.placed import Placed
 from calib.sequences.static import Static
 
-#: How far a pixel's mean may be from its plane: so many of its own deviations, and so much of its distance.
+#: Tolerance of a pixel's mean about its plane: in its own deviations, and relative to its distance.
 _DEVIATIONS, _SHARE = 3.0, 0.008
 
 
 class Kind(StrEnum):
-    """Where real distances come from."""
+    """Source of true distances."""
 
-    KNOWN = "known distance"  # everything can be told
-    BOARD = "board pose"  # likewise, as well as the board's corners tell its pose
-    PLANE = "fitted plane"  # all but a mean offset that is common to a plane, or makes one of it
-    MEAN = "temporal mean"  # only how distances scatter in time
+    KNOWN = "known distance"  # all error components
+    BOARD = "board pose"  # all error components, up to the uncertainty of the board's pose
+    PLANE = "fitted plane"  # all but a mean offset that is common to the plane or affine in it
+    MEAN = "temporal mean"  # temporal noise only
 
     @property
     def tells_offset(self) -> bool:
-        """Whether the mean offset of all pixels can be told."""
+        """True if the mean offset of all pixels is observable."""
         return self in (Kind.KNOWN, Kind.BOARD)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:
-    """Real distances of one sequence.
+    """True distances of one sequence.
 
     Attributes:
-        kind: where they come from.
-        distance: radial (height, width) [m]; NaN where none is known.
+        kind: source of the distances.
+        distance: radial (height, width) [m]; NaN where unknown.
         plane: q (3,) [1/m] of the target, q · X = 1 in the sensor's frame; zeros without one.
     """
 
@@ -45,12 +45,12 @@ class Reference:
 
 
 def known(static: Static, depth: float, region: NDArray[np.bool_], generator: np.random.Generator) -> Reference:
-    """A flat target that meets the optical axis at a known depth [m]; how it is turned is fitted.
+    """Planar target at a known depth on the optical axis [m], with fitted orientation.
 
     Args:
         static: the sequence.
-        depth: where the target meets the optical axis [m].
-        region: pixels (height, width) that may show it; the largest plane in them is taken.
+        depth: depth of the target on the optical axis [m].
+        region: candidate pixels (height, width); the largest plane in them is used.
         generator: see `plane.find`.
 
     Raises:
@@ -63,7 +63,7 @@ def known(static: Static, depth: float, region: NDArray[np.bool_], generator: np
 
 
 def subtract_mean_offset(reference: Reference, static: Static, model: DepthNoise) -> Reference:
-    """A known distance's target turned anew, with the mean offsets of the pixels removed that a model now tells."""
+    """Refits the orientation of a target at a known distance after subtracting a model's mean offsets."""
     pixels = np.isfinite(reference.distance)
     x, a, p = reference.distance[pixels], static.brightness[pixels], pixels_where(pixels)
     offset = model.mean(x, a, p)
@@ -73,16 +73,15 @@ def subtract_mean_offset(reference: Reference, static: Static, model: DepthNoise
 
 
 def on_board(static: Static, board: Placed, region: NDArray[np.bool_]) -> Reference:
-    """A board whose pose its corners told.
+    """Board with a pose from its corners.
 
     Args:
         static: the sequence.
-        board: where it is.
-        region: pixels (height, width) that count; of these, those on the board are taken, without what stands before
-            it.
+        board: its pose.
+        region: candidate pixels (height, width); those on the board and not occluded are used.
 
     Raises:
-        NoiseError: nothing of the board is static.
+        NoiseError: no static pixel on the board.
     """
     pixels = static.still & region & board.inside
     off = static.mean - plane.radial(board.plane, static.rays)
@@ -93,7 +92,7 @@ def on_board(static: Static, board: Placed, region: NDArray[np.bool_]) -> Refere
 
 
 def fitted(static: Static, region: NDArray[np.bool_], generator: np.random.Generator) -> Reference:
-    """The largest plane in a region, where the sensor itself sees it.
+    """Largest plane in a region, fitted to the sensor's own distances.
 
     Raises:
         NoiseError: there is no plane.
@@ -103,15 +102,15 @@ def fitted(static: Static, region: NDArray[np.bool_], generator: np.random.Gener
 
 
 def mean(static: Static, region: NDArray[np.bool_], generator: np.random.Generator) -> Reference:
-    """What each pixel measured on average.
+    """Temporal mean of each pixel.
 
-    Where the noise is smaller than the steps of the distances, a pixel may repeat one value for ever, though it errs by
-    up to half a step. That part of the error is made up here: uniform, and as large as what does not show in time.
+    If noise is smaller than the quantisation step, a pixel may repeat one value although it errs by up to half a step.
+    That part of the error is simulated: uniform, with the variance that temporal noise does not show.
 
     Args:
         static: the sequence.
-        region: pixels (height, width) that count.
-        generator: draws the errors within a step.
+        region: candidate pixels (height, width).
+        generator: draws the quantisation errors.
     """
     where = static.still & region
     if not where.any():

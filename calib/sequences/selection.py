@@ -1,4 +1,4 @@
-"""Which noise model a sensor's measurements call for, by the likelihood of what it was not fitted to."""
+"""Noise model selection by held-out likelihood."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
@@ -11,17 +11,17 @@ from calib.noise.fit.quality import Quality, goodness_of_fit
 from calib.sequences.candidates import Candidate
 from calib.sequences.evidence import Evidence, thinned, together
 
-#: Parts that are held out in turn, each once.
+#: Number of folds of the cross-validation.
 FOLDS = 3
 
-#: A gain of log-likelihood per measurement below this is none in practice: σ wrong by 1.7 %, or μ by 0.025 σ, cost as
-#: much. What was drawn changes less, as long as trials are drawn alike.
+#: Negligible gain of log-likelihood per measurement: the cost of σ wrong by 1.7 %, or μ by 0.025 σ. Sampling changes
+#: less, as long as trials draw the same samples.
 NOTHING = 0.0003
 
-#: Single measurements that a law of the image is fitted to while models are compared, and that each part is judged by.
+#: Number of single measurements for fitting and for scoring during model selection.
 ENOUGH = 20_000
 
-#: Single measurements that the law of the chosen model is fitted to.
+#: Number of single measurements for the final fit.
 THOROUGH = 150_000
 
 _NO_QUALITY = Quality(*([np.nan] * len(fields(Quality))))
@@ -29,13 +29,13 @@ _NO_QUALITY = Quality(*([np.nan] * len(fields(Quality))))
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """How a candidate did.
+    """Result of a candidate.
 
     Attributes:
-        candidate: what was tried.
-        scores: log-likelihood per measurement of every part that was held out; empty if it could not be fitted.
-        quality: agreement with everything held out, on average.
-        failure: why it could not be fitted; "" if it could.
+        candidate: the candidate.
+        scores: log-likelihood per measurement of every held-out part; empty if the fit failed.
+        quality: mean goodness of fit on held-out parts.
+        failure: error message of the fit; "" on success.
     """
 
     candidate: Candidate
@@ -45,29 +45,29 @@ class Trial:
 
     @property
     def score(self) -> float:
-        """Log-likelihood per measurement that was held out; −∞ if there is none."""
+        """Held-out log-likelihood per measurement; −∞ if the fit failed."""
         return float(np.mean(self.scores)) if self.scores else -np.inf
 
     def behind(self, other: "Trial") -> tuple[float, float]:
-        """How much less likely it makes what was held out than another trial does, and the deviation of that."""
+        """Difference of held-out log-likelihood to another trial, and its standard deviation."""
         difference = np.subtract(other.scores, self.scores)
         deviation = np.std(difference, ddof=1) / np.sqrt(len(difference)) if len(difference) > 1 else 0.0
         return float(np.mean(difference)), float(deviation)
 
 
 def alike_from(generator: np.random.Generator) -> Callable[[], np.random.Generator]:
-    """Makes generators that draw the same measurements, so that what was drawn makes no difference between models."""
+    """Factory of generators with the same state, so that all candidates are compared on the same samples."""
     return partial(np.random.default_rng, int(generator.integers(2**32)))
 
 
 def attempt(candidate: Candidate, parts: Sequence[Evidence], generator: np.random.Generator) -> Trial:
-    """Fits a candidate to all parts but some, judges it by these, and so on until each part was held out once.
+    """Cross-validates a candidate.
 
     Args:
-        candidate: what to try.
-        parts: what every sequence says, or every third of the frames if there are few sequences. Parts are never
-            divided: measurements of one pixel in one sequence have more in common than the model says.
-        generator: thins measurements where there are more than needed; of trials that are compared, in the same state.
+        candidate: model to fit.
+        parts: evidence of every sequence, or of every third of the frames if there are few sequences. Parts are never
+            divided, because measurements of one pixel in one sequence are correlated.
+        generator: subsamples measurements; must have the same state for trials that are compared.
     """
     scores, qualities = [], []
     try:
@@ -83,13 +83,13 @@ def attempt(candidate: Candidate, parts: Sequence[Evidence], generator: np.rando
 
 
 def choose(trials: Sequence[Trial]) -> Trial:
-    """The first of the trials, which are in the order of their coefficients, that no other is clearly better than.
+    """Simplest trial, by number of coefficients, that no other exceeds by more than a negligible gain.
 
-    What is held out punishes coefficients that are not needed, so a gain of more than nothing is one. The deviation of
-    the difference between sequences is no measure here: what a coefficient tells may concern a few of them only.
+    Held-out likelihood already penalises superfluous coefficients. The scatter of the difference between sequences is
+    no measure of significance here, because a coefficient may matter in a few sequences only.
 
     Raises:
-        NoiseError: nothing could be fitted.
+        NoiseError: all fits failed.
     """
     fitted = [trial for trial in trials if trial.scores]
     if not fitted:
@@ -102,14 +102,14 @@ def choose(trials: Sequence[Trial]) -> Trial:
 
 
 def lean(evidence: Evidence, generator: np.random.Generator, most: int = ENOUGH) -> Evidence:
-    """Evidence with no more single measurements than a law of the image needs, and all means."""
+    """Evidence with subsampled single measurements and all means."""
     return replace(evidence, samples=thinned(evidence.samples, most, generator))
 
 
 def extremes(model: DepthNoise, distances: tuple[float, float], amplitudes: tuple[float, float]) -> tuple[float, ...]:
-    """Least and greatest σ, and greatest |μ| [m], over ranges of distances [m] and amplitudes.
+    """Smallest and largest σ, and largest |μ| [m], over ranges of distances [m] and amplitudes.
 
-    A model that is for images of one size is looked at in a grid over the image.
+    A model of a fixed image size is evaluated on a grid over the image.
     """
     x, a = np.meshgrid(np.geomspace(*distances, 25), np.linspace(*amplitudes, 25))
     height, width = getattr(model, "shape", (1, 1))
@@ -121,7 +121,7 @@ def extremes(model: DepthNoise, distances: tuple[float, float], amplitudes: tupl
 
 
 def _folds(parts: Sequence[Evidence]) -> Iterator[tuple[list[Evidence], list[Evidence]]]:
-    """What to fit to and what to judge by."""
+    """Pairs of training and held-out parts."""
     n = min(FOLDS, len(parts))
     for fold in range(n):
         yield [p for i, p in enumerate(parts) if i % n != fold], [p for i, p in enumerate(parts) if i % n == fold]

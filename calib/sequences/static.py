@@ -1,4 +1,4 @@
-"""A static sequence: what each pixel measured on average and how it scattered, where nothing moved."""
+"""Static sequence: mean and variance of each pixel while nothing moves."""
 
 from dataclasses import dataclass
 
@@ -11,25 +11,25 @@ from calib.sequences import stillness
 from calib.sequences.steps import Steps, recognize
 from calib.sequences.stillness import Segment
 
-#: A segment whose mean is farther from the others' than so many deviations shows the pixel something else.
+#: A segment whose mean differs by more than this many deviations shows another surface.
 _ELSEWHERE = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Static:
-    """One sequence, reduced; images are (height, width).
+    """Statistics of one sequence; images are (height, width).
 
     Attributes:
-        name: of the sequence, for people.
-        frames: number of its frames.
-        distance, amplitude: some of the frames (k, height, width) [m]; NaN where a pixel was not still then.
-        mean: distance of each pixel on average [m]; NaN where it was never still.
-        variance: of its distances around that [m²].
-        count: of the distances that tell it.
-        brightness: amplitude of each pixel on average; NaN without.
+        name: of the sequence, for display.
+        frames: number of frames.
+        distance, amplitude: some of the frames (k, height, width) [m]; NaN where a pixel was not static.
+        mean: mean distance of each pixel [m]; NaN if never static.
+        variance: variance of its distances [m²].
+        count: number of distances used.
+        brightness: mean amplitude of each pixel; NaN without.
         rays: unit directions (height, width, 3).
-        steps: that the distances come in.
-        moving: share of the pixels with returns in which something moved at some time.
+        steps: quantisation of the distances.
+        moving: fraction of the pixels with returns that moved at some time.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Static:
 
     @property
     def still(self) -> NDArray[np.bool_]:
-        """Pixels that were still at least during one segment."""
+        """Pixels that were static during at least one segment."""
         return np.isfinite(self.mean)
 
     def samples(self, reference: NDArray[np.floating], kept: slice = slice(None)) -> Samples:
-        """The measurements of some kept frames, against real distances (height, width) [m]; NaN where unknown."""
+        """Measurements of some kept frames, with true distances (height, width) [m]; NaN where unknown."""
         samples = from_images(self.distance[kept], reference, self.amplitude[kept])
         return samples.take(np.isfinite(samples.measured) & np.isfinite(samples.true))
 
@@ -64,19 +64,19 @@ def reduce(
     digit: float,
     keep: int,
 ) -> Static:
-    """Finds what is static in a sequence, and what it says.
+    """Statistics of the static pixels of a sequence.
 
     Args:
-        name: of the sequence, for people.
-        lengths: what the sensor delivers (n, height, width) [m]; NaN without return.
+        name: of the sequence, for display.
+        lengths: raw measurements (n, height, width) [m]; NaN without return.
         amplitude: likewise; NaN without.
         rays: unit directions (height, width, 3).
         along: radial distance per unit of `lengths` (height, width).
-        digit: smallest difference that the sensor's numbers can have [m]; 0 if they are no whole numbers.
-        keep: number of frames to keep as samples, evenly spread; at least 2.
+        digit: resolution of the sensor's numbers [m]; 0 if they are not integers.
+        keep: number of frames kept as samples, evenly spread; at least 2.
 
     Raises:
-        NoiseError: too few frames, or nothing is static.
+        NoiseError: too few frames, or no static pixel.
     """
     slices = stillness.segments(len(lengths))
     steps = recognize(lengths, digit)
@@ -111,7 +111,7 @@ def reduce(
 
 
 def _agreeing(found: list[Segment]) -> NDArray[np.bool_]:
-    """Which segments (n, height, width) are still and show each pixel the same."""
+    """Mask (n, height, width) of static segments that show each pixel the same surface."""
     still = np.array([part.still for part in found])
     means = np.where(still, [part.mean for part in found], np.nan)
     usual = stillness.median(means)

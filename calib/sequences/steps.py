@@ -1,4 +1,4 @@
-"""The steps that distances come in: those of a sensor's digits, and those of its disparity, which grow as x²."""
+"""Quantisation of distances: resolution of a sensor's numbers, and disparity steps, which grow as x²."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -6,26 +6,26 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-#: A difference below this is rounding of the computer, not of the sensor [m].
+#: Smaller differences are floating-point rounding [m].
 _NOTHING_M = 2e-6
 
-#: Bins of distance in which the pixels' steps are looked at, and how many of them a bin needs.
+#: Number of distance bins, and minimum number of pixels in each.
 _BINS, _FEW = 12, 30
 
-#: A step that is at least as many digits is one of the disparity, if it grows as one.
+#: Minimum ratio of a disparity step to the resolution.
 _DIGITS = 3
 
-#: How far growth may differ between distances, relative to its median, if it is that of a disparity.
+#: Largest relative variation of the growth between distances for disparity steps.
 _ALIKE = 0.35
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Step of a distance x: the larger of `digit` and `growth` · x².
+    """Quantisation step at distance x: the larger of `digit` and `growth` · x².
 
     Attributes:
-        digit: smallest step at any distance [m]; 0 if there is none.
-        growth: step per squared distance [1/m]; 0 if steps do not grow.
+        digit: resolution at any distance [m]; 0 if there is none.
+        growth: step per squared distance [1/m]; 0 if steps are constant.
     """
 
     digit: float = 0.0
@@ -37,14 +37,14 @@ class Steps:
 
 
 def recognize(lengths: NDArray[np.floating], digit: float) -> Steps:
-    """The steps of a sequence, from the smallest gap between the values that each pixel takes.
+    """Quantisation of a sequence, from the smallest gap between the values of each pixel.
 
-    A disparity of whole numbers makes steps ∝ x², which are then rounded to digits: downwards as often as upwards, but
-    the smallest gap is the one rounded downwards, so half a digit is added to it.
+    Integer disparities give steps ∝ x², rounded to the resolution. The smallest gap is the one rounded downwards, so
+    half a unit of the resolution is added.
 
     Args:
-        lengths: what the sensor delivers (n, height, width) [m], z or radial; NaN without return.
-        digit: smallest difference that the sensor's numbers can have [m]; 0 if they are no whole numbers.
+        lengths: raw measurements (n, height, width) [m], z or radial; NaN without return.
+        digit: resolution of the sensor's numbers [m]; 0 if they are not integers.
     """
     x, step = _gaps(lengths)
     if len(x) < _FEW:
@@ -53,7 +53,7 @@ def recognize(lengths: NDArray[np.floating], digit: float) -> Steps:
     bins = [inside for low, high in pairwise(edges) if (inside := (x >= low) & (x < high)).sum() >= _FEW]
     if not bins:
         return Steps(digit)
-    # Some pixels never take two neighbouring values, so the lower quartile counts.
+    # Some pixels never take two adjacent values, so the lower quartile is used.
     typical = np.array([np.quantile(step[inside], 0.25) for inside in bins])
     growth = np.array([(t + digit / 2) / np.median(x[inside]) ** 2 for t, inside in zip(typical, bins)])
     growth = growth[typical > (_DIGITS - 0.5) * max(digit, _NOTHING_M)]
@@ -62,7 +62,7 @@ def recognize(lengths: NDArray[np.floating], digit: float) -> Steps:
 
 
 def _gaps(lengths: NDArray[np.floating]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Usual value and smallest gap (pixels,) [m] of the pixels that take more than one value."""
+    """Median value and smallest gap (pixels,) [m] of the pixels with more than one value."""
     ordered = np.sort(lengths, axis=0)  # NaN last
     gap = np.diff(ordered, axis=0)
     smallest = np.where(gap > _NOTHING_M, gap, np.inf).min(axis=0, initial=np.inf)

@@ -1,4 +1,4 @@
-"""Which parts of a sequence are static: where what changes is no more than noise."""
+"""Motion detection in a sequence: a pixel is static if it changes no more than by noise."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,42 +10,42 @@ from scipy import ndimage
 from calib.noise.base import NoiseError
 from calib.noise.fit.fitting import MAD_TO_SIGMA
 
-#: Frames that are judged together, and the fewest that anything can be said of.
+#: Frames per segment, and minimum number of frames.
 SEGMENT, LEAST_FRAMES = 30, 8
 
-#: Share of a segment's frames in which a static pixel has a return, and share of these that are no outlier.
+#: Minimum fraction of frames with a return, and of inliers among these, for a static pixel.
 _RETURNS, _INLIERS = 0.8, 0.9
 
-#: Deviation of a normal distribution over the median size of the difference between two of its values.
+#: σ of a normal distribution over the median absolute difference of two of its values.
 _PER_CHANGE = MAD_TO_SIGMA / np.sqrt(2)
 
-#: Deviations beyond which a value is an outlier of its pixel.
+#: Outlier threshold in deviations of the pixel.
 _CUT = 4.0
 
-#: Variance over the one that successive differences tell, at which a pixel moves: six standard deviations of this ratio
-#: (von Neumann, 1941) for n frames are about 6/√n.
+#: Threshold for the ratio of the variance to that from successive differences, in standard deviations of this ratio
+#: (von Neumann, 1941), which are about 1/√n for n frames.
 _RATIO = 6.0
 
-#: Neighbours whose distances differ by more than this share of it lie on different surfaces, at a rim.
+#: Relative difference of neighbouring distances at an edge between surfaces.
 _RIM = 0.03
 
-#: A pixel whose deviation is so many times that of the pixels around it flickers between two surfaces; how many around.
+#: Ratio to the deviation of surrounding pixels at which a pixel flickers between two surfaces; size of the window.
 _FLICKER, _NEIGHBOURHOOD = 3.0, 7
 
-#: Pixels around a moving one that do not count either.
+#: Dilation of moving regions [px].
 _AROUND = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """What each pixel did during some frames; arrays are (height, width).
+    """Statistics of each pixel during a segment; arrays are (height, width).
 
     Attributes:
         mean: of the distances without outliers [m]; NaN where there was never a return.
         variance: of the distances around their mean [m²].
-        still: where nothing moved.
-        moving: where something did; what is neither has too few returns, lies at a rim or flickers.
-        count: distances that are no outlier.
+        still: True where nothing moved.
+        moving: True where something moved; pixels that are neither have too few returns, lie at an edge or flicker.
+        count: number of inliers.
         amplitude: mean amplitude; NaN without.
     """
 
@@ -58,7 +58,7 @@ class Segment:
 
 
 def segments(n: int) -> list[slice]:
-    """Frames that are judged together: about `SEGMENT` each, none left over.
+    """Segments of about `SEGMENT` frames each, covering all frames.
 
     Raises:
         NoiseError: too few frames.
@@ -70,19 +70,19 @@ def segments(n: int) -> list[slice]:
 
 
 def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: NDArray[np.floating]) -> Segment:
-    """Judges one segment.
+    """Statistics and motion of one segment.
 
-    Successive differences tell the noise even of what moves slowly; what moves varies by more than they tell. A sensor
-    that smooths over time has larger variance than they tell everywhere, which is taken from the quieter quarter of
-    all pixels. Jumps by one step are no motion.
+    Successive differences estimate the noise even under slow motion; a moving pixel has a larger variance. A sensor
+    that smooths over time has a larger variance everywhere, which is estimated from the quieter quarter of all pixels.
+    Jumps by one quantisation step are no motion.
 
     Args:
         distance: (n, height, width) [m]; NaN without return.
         amplitude: likewise; NaN without.
-        step: of the distances (height, width) [m].
+        step: quantisation of the distances (height, width) [m].
     """
     centre = median(distance)
-    usual_change = median(np.abs(np.diff(distance, axis=0)))  # outliers do not make it larger
+    usual_change = median(np.abs(np.diff(distance, axis=0)))  # robust to outliers
     kept = _near(distance, centre, np.square(_PER_CHANGE * usual_change), step)
     fast = _fast(np.where(kept, distance, np.nan))
     kept = _near(distance, centre, fast, step)
@@ -102,7 +102,7 @@ def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: 
 
 
 def median(values: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Median (height, width) over the frames without NaN; NaN where all are. NumPy's is many times slower."""
+    """Median (height, width) over the frames, ignoring NaN; many times faster than NumPy's."""
     ordered = np.sort(values, axis=0)
     middle = (np.isfinite(ordered).sum(axis=0) - 1).clip(0) // 2
     return np.take_along_axis(ordered, middle[None], axis=0)[0].astype(np.float64)
@@ -114,13 +114,13 @@ def _near(
     variance: NDArray[np.float64],
     step: NDArray[np.floating],
 ) -> NDArray[np.bool_]:
-    """Which distances (n, height, width) are no outliers."""
+    """Mask of inlier distances (n, height, width)."""
     with np.errstate(invalid="ignore"):
         return np.abs(distance - centre) <= np.maximum(_CUT * np.sqrt(variance), 1.5 * step)
 
 
 def _fast(distance: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Variance (height, width) that successive differences tell [m²]."""
+    """Variance (height, width) from successive differences [m²]."""
     squares = np.square(np.diff(distance, axis=0))
     known = np.isfinite(squares)
     return np.where(known, squares, 0).sum(axis=0, dtype=np.float64) / (2 * known.sum(axis=0).clip(1))
@@ -129,7 +129,7 @@ def _fast(distance: NDArray[np.floating]) -> NDArray[np.float64]:
 def _moments(
     values: NDArray[np.floating], kept: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Mean, variance and number (height, width) of the values that are kept; NaN without any."""
+    """Mean, variance and number (height, width) of the kept values; NaN without any."""
     count = kept.sum(axis=0)
     with np.errstate(invalid="ignore"):
         mean = np.where(kept, values, 0).sum(axis=0, dtype=np.float64) / np.where(count, count, np.nan)
@@ -138,7 +138,7 @@ def _moments(
 
 
 def _rims(centre: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where a pixel and one of its neighbours see different surfaces, or the neighbour sees none."""
+    """Pixels with a neighbour on another surface or without a return."""
     far = ndimage.maximum_filter(np.nan_to_num(centre, nan=np.inf), 3)
     near = ndimage.minimum_filter(np.nan_to_num(centre, nan=-np.inf), 3)
     with np.errstate(invalid="ignore"):
@@ -146,7 +146,7 @@ def _rims(centre: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray
 
 
 def _flickers(deviation: NDArray[np.float64], seen: NDArray[np.bool_], step: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Where a pixel deviates by far more than those around it, which a dark surface does not."""
+    """Pixels whose deviation is far above that of their surroundings, unlike those of a dark surface."""
     usual = float(np.median(deviation[seen])) if seen.any() else 0.0
     around = ndimage.median_filter(np.where(seen, deviation, usual), _NEIGHBOURHOOD)
     return deviation > _FLICKER * np.maximum(around, np.nan_to_num(step) / 2)

@@ -1,1 +1,1 @@
-"""Input warping (section 3.2): what one sensor measured, as another camera would have it."""
+"""Input warping (section 3.2): measurements of one sensor in the view of another camera."""

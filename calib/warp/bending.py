@@ -1,11 +1,11 @@
-"""How far a surface leaves the flat faces between its measured points: the warping's own error."""
+"""Interpolation error: deviation of a surface from the flat faces between its measured points."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: Root mean square of t (1 − t) / 2 over a step: what linear interpolation is off by, per second difference.
+#: Root mean square of t (1 − t) / 2 over a step: error of linear interpolation per second difference.
 _PER_DIFFERENCE = 1 / np.sqrt(120)
 
 
@@ -15,8 +15,8 @@ def bending(
 ) -> None:
     """Root mean square error (h, w) [m] of linear interpolation around every pixel, from the second differences.
 
-    What noise of the deviation `sigma` alone makes of them, 6 σ², is taken off. Along an axis on which a neighbour is
-    missing, or belongs to another surface, nothing is known and nothing is added.
+    The variance 6 σ² that noise of deviation `sigma` contributes to them is subtracted. An axis on which a neighbour is
+    missing, or belongs to another surface, contributes nothing.
     """
     height, width = distance.shape
     for row in range(height):

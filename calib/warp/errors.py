@@ -1,14 +1,14 @@
-"""Why nothing can be warped, in words; a warping never returns an empty image."""
+"""Errors of warping, with their causes; a warp never returns an empty image."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
 
-#: No depth sensor measures farther [m]; a median beyond is a length in another unit.
+#: Largest plausible median distance [m]; a larger one indicates a wrong unit.
 FARTHEST_M = 100.0
 
-#: Cameras of one rig that are farther apart, and by so many times the distances measured, have a pose in another unit.
+#: Largest plausible baseline, in metres and relative to the measured distances; beyond, T_rs has a wrong unit.
 LONGEST_BASELINE_M, BASELINE_RATIO = 10.0, 10.0
 
 
@@ -17,29 +17,29 @@ class WarpError(ValueError):
 
 
 class NoReturnsError(WarpError):
-    """The image has no distance at all."""
+    """Image without any distance."""
 
 
 class NoOverlapError(WarpError):
-    """Nothing that the one sensor measured is in the other's view."""
+    """No measurement is in the target's view."""
 
 
 class UnitError(WarpError):
-    """Distances or a pose are not in metres."""
+    """Distances or a pose that are not in metres."""
 
 
 def check(distance: NDArray[np.floating], source: Camera, target: Camera) -> None:
-    """Refuses what is no distance image [m] of the source, or cannot be meant.
+    """Validates a distance image [m] of the source and the baseline.
 
     Raises:
-        WarpError: the image has another size.
+        WarpError: wrong image size.
         NoReturnsError: no pixel has a distance.
-        UnitError: the distances, or the way from one camera to the other, are no metres.
+        UnitError: distances or baseline are not in metres.
     """
     if distance.shape != (source.height, source.width):
         size = " × ".join(map(str, distance.shape[::-1]))
         raise WarpError(f"an image of {size} pixels is not one of the camera's {source.width} × {source.height}")
-    known = _some(distance[::7, ::7])  # enough for a median
+    known = _some(distance[::7, ::7])  # sufficient for a median
     known = _some(distance) if known.size == 0 else known
     if known.size == 0:
         raise NoReturnsError(f"none of the {source.width} × {source.height} pixels has a distance")
@@ -58,7 +58,7 @@ def _some(distance: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def nothing_seen(distance: NDArray[np.floating], inverse_z: NDArray[np.floating], target: Camera) -> NoOverlapError:
-    """What to say of distances [m] of which the target sees none; 1/z there is NaN where they are not before it."""
+    """Error for distances [m] outside the target's view; `inverse_z` is NaN behind the target."""
     known = np.isfinite(distance)
     before = int(np.count_nonzero(np.isfinite(inverse_z)))
     return NoOverlapError(

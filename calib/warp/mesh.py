@@ -1,4 +1,4 @@
-"""A depth image as another camera would have it (section 3.2): the surface between its pixels, by a z-buffer."""
+"""Mesh warping of a depth image into another view (section 3.2): triangles between pixels, with a z-buffer."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -13,29 +13,28 @@ from calib.warp.points import Geometry, Points, bands
 
 Value = TypeVar("Value", bound=np.generic)
 
-#: Neighbours whose distances differ by more belong to different surfaces; nothing is rendered between them [m].
+#: Largest difference of neighbouring distances on one surface [m]; larger ones separate surfaces.
 LARGEST_STEP_M = 0.04
 
-#: What is nearer may reach so far from the centre of its outermost pixel towards the next pixel's centre [pixels].
+#: Extent of a foreground surface beyond its outermost pixel centre, as a fraction of the next pixel.
 _REACH = 0.99
 
 
 class Each(Protocol):
-    """What applies a function to all parts of an image: the built-in `map`, or `map` of a pool of threads."""
+    """Applies a function to all parts of an image: the built-in `map`, or `map` of a thread pool."""
 
     def __call__(
         self, function: Callable[[tuple[int, int]], None], parts: Iterable[tuple[int, int]], /
     ) -> Iterable[None]:
-        """The results in order; the parts may be worked on at the same time."""
+        """Results in order; parts may be processed concurrently."""
         ...
 
 
 class MeshWarp:
-    """Warps what a depth sensor measured into any other view; distances there are radial, from the view's own centre.
+    """Warps a depth image into any other view; distances there are radial, from the view's own centre.
 
-    Neighbouring pixels span a surface, which is exact where the scene is flat: a pixel of the view is not moved by half
-    a pixel of the source, whatever the slope. It ends at the outermost pixels' centres, and what lies behind a rim is
-    unknown as near to it as a pixel of the source is wide.
+    Neighbouring pixels span triangles, which are exact where the scene is planar, whatever the slope. The surface ends
+    at the centres of its outermost pixels; the background within one source pixel of a depth edge is unknown.
     """
 
     def __init__(
@@ -46,14 +45,14 @@ class MeshWarp:
         each: Each = map,
         parts: int = 1,
     ):
-        """Prepares all that does not depend on images.
+        """Precomputes everything that does not depend on images.
 
         Args:
             source: the depth sensor.
             target: the view: a pinhole, or any other camera.
-            largest_step_m: neighbours whose distances differ by more belong to different surfaces [m].
-            each: what works on the parts; kernels hold no interpreter lock.
-            parts: bands of rows that may be worked on at the same time.
+            largest_step_m: largest difference of neighbouring distances on one surface [m].
+            each: applies a function to the parts; kernels release the interpreter lock.
+            parts: number of bands of rows that may be processed concurrently.
 
         Raises:
             LensError: one of the lenses has no inverse on the image.
@@ -67,10 +66,10 @@ class MeshWarp:
         self._bands = bands(target.height, parts)
 
     def warp(self, distance: NDArray[np.floating]) -> "Warped":
-        """The source's radial distances (h, w) [m], NaN without return, in the view.
+        """Radial distances (h, w) [m] of the source, NaN without return, in the view.
 
         Raises:
-            WarpError: there is nothing to be seen in the view, or units are wrong; says why.
+            WarpError: nothing in the view, or wrong units; names the cause.
         """
         errors.check(distance, self.geometry.source, self.geometry.target)
         points = self.geometry.see(distance)
@@ -94,15 +93,15 @@ class MeshWarp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Warped:
-    """A depth image in another view, and what else belongs to its measurements.
+    """Depth image in another view, with its correspondences.
 
     Attributes:
-        distance: radial distances from the view's centre (height, width) [m], NaN where nothing is known.
+        distance: radial distances from the view's centre (height, width) [m], NaN where unknown.
         points: the source's points in the view.
         geometry: of the two cameras.
         largest_step_m: as in `MeshWarp`.
-        face: number of the face that a pixel shows (`calib.warp.raster`), −1 if none.
-        nearness: its 1/z there [1/m].
+        face: index of the face that covers a pixel (`calib.warp.raster`), −1 if none.
+        nearness: 1/z of that face at the pixel [1/m].
     """
 
     distance: NDArray[np.float32]
@@ -113,20 +112,20 @@ class Warped:
     nearness: NDArray[np.float32]
 
     def hidden(self) -> NDArray[np.bool_]:
-        """What the view sees (height, width) but something nearer hides from the source: nothing is known there."""
+        """Pixels (height, width) that the view sees but that are occluded for the source; their distance is unknown."""
         torn = np.zeros(self.face.shape, np.bool_)
         points = self.points
         raster.tear(points.place, points.inverse_z, points.distance, self.largest_step_m, torn)
         return torn & (self.face < 0)
 
     def index(self) -> NDArray[np.int32]:
-        """The pixel of the source, flattened, that is nearest to a pixel of the view (height, width), −1 if none is."""
+        """Flat index of the nearest source pixel for each pixel of the view (height, width), −1 if none."""
         result = np.empty(self.face.shape, np.int32)
         shading.nearest(*self._faces(), result)
         return result
 
     def nearest(self, image: NDArray[Value], missing: float = np.nan) -> NDArray[Value]:
-        """An image (h, w, …) of the source in the view, no pixel mixed with another: confidences, colours, labels."""
+        """Image (h, w, …) of the source in the view by nearest neighbour: confidences, colours, labels."""
         index = self.index()
         flat = image.reshape(-1, *image.shape[2:])
         result = flat[np.maximum(index, 0)]
@@ -134,7 +133,7 @@ class Warped:
         return result
 
     def blended(self, image: NDArray[np.floating]) -> NDArray[np.float32]:
-        """An image (h, w) of the source in the view, linear between its pixels: amplitudes; NaN where none is known."""
+        """Image (h, w) of the source in the view, linearly interpolated: amplitudes; NaN where unknown."""
         result = np.empty(self.face.shape, np.float32)
         shading.blend(*self._faces(), np.ascontiguousarray(image, np.float32).ravel(), result)
         return result
@@ -142,8 +141,8 @@ class Warped:
     def deviation(self, sigma: NDArray[np.floating]) -> NDArray[np.float32]:
         """Deviation of the warped distances (height, width) [m], for deviations of the source's (h, w) [m].
 
-        It is their noise, carried along, and how far the surface leaves the faces between its points. Neighbours that
-        come from the same measurements err alike.
+        Propagated noise plus the interpolation error of the faces. Errors of neighbours with common source pixels are
+        correlated.
         """
         given = np.ascontiguousarray(np.broadcast_to(sigma, self.points.distance.shape), np.float32)
         bend, result = np.empty_like(given), np.empty(self.face.shape, np.float32)

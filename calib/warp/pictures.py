@@ -1,4 +1,4 @@
-"""Pictures in a depth sensor's view: what its points look like to another camera, where that sees them."""
+"""Images of another camera in a depth sensor's view, where the camera sees its points."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 from calib.warp.mesh import LARGEST_STEP_M, MeshWarp
 
-#: A camera sees what is nearest to it; a point farther away by more than this is hidden from it [m].
+#: Depth difference beyond which a point is occluded [m].
 HIDING_M = 0.02
 
 
 class PictureLookup:
-    """Looks up, through the distances of one view, what a camera's picture shows of the same points."""
+    """Maps a camera's images into a view by means of the view's distances."""
 
     def __init__(
         self, view: Camera, camera: Camera, largest_step_m: float = LARGEST_STEP_M, hiding_m: float = HIDING_M
@@ -24,12 +24,12 @@ class PictureLookup:
         self._hiding_m = hiding_m
 
     def look(self, distance: NDArray[np.floating]) -> "Sight":
-        """Where the camera sees the points of the view's radial distances (height, width) [m].
+        """Positions of the view's points, given by radial distances (height, width) [m], in the camera's image.
 
-        A point is hidden if the surface that all of them span is nearer to the camera there.
+        A point is occluded if the surface spanned by all points is nearer to the camera there.
 
         Raises:
-            WarpError: the camera sees none of them; says why.
+            WarpError: the camera sees none of them; names the cause.
         """
         warped = self._warp.warp(distance)
         height, width = warped.distance.shape
@@ -39,7 +39,8 @@ class PictureLookup:
         pixel[~inside] = 0
         column, row = pixel[..., 0], pixel[..., 1]
         front = np.where(np.isnan(warped.distance), np.float32(np.inf), warped.distance)
-        # A surface is rendered up to its outermost pixels' centres only; it hides what is beside that by a jump, too.
+        # The rendered surface ends at its outermost pixel centres, so points beside a depth edge are checked
+        # separately.
         around = np.asarray(cv2.erode(front, np.ones((3, 3), np.uint8)), np.float32)
         nearest = np.minimum(front + self._hiding_m, around + max(self._hiding_m, self._warp.largest_step_m))
         with np.errstate(invalid="ignore"):
@@ -49,25 +50,25 @@ class PictureLookup:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sight:
-    """Where a camera sees the points of a view.
+    """Correspondence of the points of a view with a camera's image.
 
     Attributes:
-        place: pixel coordinates in the camera's picture (height, width, 2) [px]; mean nothing where it is not visible.
-        visible: whether the camera sees the point (height, width).
+        place: pixel coordinates in the camera's image (height, width, 2) [px]; undefined where not visible.
+        visible: True where the camera sees the point (height, width).
     """
 
     place: NDArray[np.float64]
     visible: NDArray[np.bool_]
 
     def nearest(self, picture: NDArray[np.generic]) -> NDArray[np.float32]:
-        """A picture (h, w, channels) in the view, each pixel as it is, NaN where the camera does not see the point."""
+        """Image (h, w, channels) in the view by nearest neighbour, NaN where not visible."""
         column, row = np.floor(self.place[self.visible] + 0.5).astype(np.int64).T
         result = np.full((*self.visible.shape, picture.shape[2]), np.nan, np.float32)
         result[self.visible] = picture[row, column]
         return result
 
     def blended(self, picture: NDArray[np.generic]) -> NDArray[np.float32]:
-        """As `nearest`, bilinear between pixels; the outermost half pixel repeats."""
+        """Like `nearest`, but bilinear; the outermost half pixel is extrapolated."""
         height, width, _ = picture.shape
         result = np.full((*self.visible.shape, picture.shape[2]), np.nan, np.float32)
         place = np.clip(self.place[self.visible], 0, (width - 1, height - 1))

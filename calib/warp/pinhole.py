@@ -1,21 +1,20 @@
-"""A camera without distortion that sees all that another one sees, and where its pixels are in the other's image."""
+"""Undistorted camera with the field of view of another camera, and the resampling between both."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
 
-#: The image of the camera without distortion is at most so many times as wide and as high as the original.
+#: Largest size of the undistorted image relative to the original.
 MOST_GROWTH = 2.0
 
 
 def pinhole_of(camera: Camera) -> Camera:
-    """The pinhole at the same place, with the same focal lengths, whose image covers the camera's field of view.
+    """Pinhole camera with the same centre and focal lengths, whose image covers the camera's field of view.
 
-    On the axis, where the lens does not distort, pixels of both have the same centres. Otherwise the nearest pixel
-    would be off by the same part of a pixel all over the middle of the image: a shift of the surface.
-
-    Where a wide lens would need more than twice the size, the rim is left out.
+    On the optical axis, where distortion vanishes, pixel centres of both coincide. Otherwise nearest-neighbour sampling
+    would shift the middle of the image by a fraction of a pixel. For wide lenses the image is limited to twice the
+    size.
     """
     if camera.lens.is_pinhole:
         return camera
@@ -29,11 +28,11 @@ def pinhole_of(camera: Camera) -> Camera:
 
 
 def resampling(pinhole: Camera, camera: Camera) -> NDArray[np.int32]:
-    """For every pixel of a pinhole with the same centre, the nearest one of the camera: the backward distortion.
+    """Nearest pixel of the camera for every pixel of a concentric pinhole: backward distortion.
 
     Returns:
-        Indices (height + 2, width + 2) into the camera's flattened image with a border of one pixel, 0 where the camera
-        sees nothing; the result has a border as well.
+        Indices (height + 2, width + 2) into the camera's flattened image with a border of one pixel, 0 outside its
+        view; the result has a border as well.
     """
     ideal = pinhole.lookup.ideal
     place = camera.lens.distort(ideal) * (camera.fx, camera.fy) + (camera.cx, camera.cy)

@@ -1,4 +1,4 @@
-"""The points that a depth image shows, in the image of another camera (eq. 10)."""
+"""Points of a depth image in the image of another camera (eq. 10)."""
 
 import itertools
 from collections.abc import Sequence
@@ -11,18 +11,18 @@ from calib.camera import Camera
 from calib.forward import projector
 from calib.jit import kernel
 
-#: Nearer to the plane of a camera it sees nothing [m].
+#: Minimum z of a visible point [m].
 _NEAREST_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """What a source measured, as the target sees it; arrays have the source's height and width.
+    """Points measured by a source, as seen by the target; arrays have the source's height and width.
 
     Attributes:
-        distance: what was measured: radial distances (h, w) [m], NaN without return.
+        distance: measured radial distances (h, w) [m], NaN without return.
         place: pixel coordinates in the target (h, w, 2) [px].
-        inverse_z: 1/z in the target (h, w) [1/m], NaN for what it cannot see.
+        inverse_z: 1/z in the target (h, w) [1/m], NaN if not visible.
     """
 
     distance: NDArray[np.float32]
@@ -31,12 +31,12 @@ class Points:
 
 
 class Geometry:
-    """Two cameras, and all of the way from one to the other that does not depend on what is measured.
+    """Two cameras, with everything precomputed that does not depend on measurements.
 
     Attributes:
         source, target: the cameras.
-        rays: lines of sight of the source's pixels in the target's frame (h, w, 3).
-        shift: the source's centre there (3,) [m].
+        rays: viewing directions of the source's pixels in the target's frame (h, w, 3).
+        shift: source's centre in the target's frame (3,) [m].
     """
 
     def __init__(self, source: Camera, target: Camera):
@@ -50,7 +50,7 @@ class Geometry:
         self._to_pixels = projector(target.lens)
 
     def see(self, distance: NDArray[np.floating]) -> Points:
-        """The points of radial distances (h, w) [m] of the source."""
+        """Points of radial distances (h, w) [m] of the source."""
         measured = np.ascontiguousarray(distance, np.float32)
         place = np.empty((*measured.shape, 2), np.float32)
         inverse_z = np.empty(measured.shape, np.float32)
@@ -60,7 +60,7 @@ class Geometry:
 
 
 def bands(height: int, count: int) -> Sequence[tuple[int, int]]:
-    """A height in so many bands of rows, as (first, last + 1), which may be worked on at the same time."""
+    """Divides a height into bands of rows (first, last + 1) for concurrent processing."""
     edges = np.linspace(0, height, count + 1).round().astype(int).tolist()
     return list(itertools.pairwise(edges))
 
@@ -74,7 +74,7 @@ def _see(
     ideal: NDArray[np.float32],
     inverse_z: NDArray[np.float32],
 ) -> None:
-    """Ideal coordinates and 1/z of distances along rays that begin at `shift`; limit of r², beyond which is nothing."""
+    """Ideal coordinates and 1/z of points along rays from `shift`; points beyond the limit of r² are invalid."""
     zero, one, farthest = np.float32(0), np.float32(1), np.float32(limit)
     for r in range(distance.shape[0]):
         for c in range(distance.shape[1]):

@@ -1,8 +1,7 @@
-"""A depth image as a surface: the triangles between its neighbouring pixels, by a z-buffer.
+"""Rasterisation of a depth image: triangles between neighbouring pixels, with a z-buffer.
 
-Four neighbours span two triangles, three of them one. Corner k of the quadrilateral at pixel (r, c) is pixel
-(r + k // 2, c + k % 2); a triangle is named by the corner m that it lacks, and the number of a face is
-4 (r columns + c) + m.
+Four neighbours span two triangles, three span one. Corner k of the quadrilateral at pixel (r, c) is pixel (r + k // 2,
+c + k % 2); a triangle is identified by its missing corner m, and its face index is 4 (r columns + c) + m.
 """
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: A pixel on the line between two triangles must not fall between them.
+#: Tolerance that closes the seam between two triangles.
 _EDGE = -1e-4
 
 
@@ -25,9 +24,9 @@ def cover(
     nearness: NDArray[np.float32],
     face: NDArray[np.int32],
 ) -> None:
-    """Fills rows `top` to `bottom` − 1 of `nearness` (1/z) and `face` with the nearest faces of an unbroken surface.
+    """Rasterises rows `top` to `bottom` − 1 of `nearness` (1/z) and `face` with the nearest faces.
 
-    Both triangles of a quadrilateral, beside the diagonal from corner 0 to corner 3, are filled in one go.
+    Both triangles of a quadrilateral, beside the diagonal from corner 0 to corner 3, are filled in one pass.
     """
     zero, one, edge, slack, step = (
         np.float32(0),
@@ -56,7 +55,7 @@ def cover(
             if first_row > last_row or first_column > last_column:
                 continue
             first, second = x1 * y3 - y1 * x3, x2 * y3 - y2 * x3
-            if not first * second < zero:  # folded, or a triangle without area
+            if not first * second < zero:  # folded or degenerate
                 _fill(place, inverse_z, r, c, 1, top, bottom, nearness, face)
                 _fill(place, inverse_z, r, c, 2, top, bottom, nearness, face)
                 continue
@@ -88,7 +87,7 @@ def _fill_rest(
     nearness: NDArray[np.float32],
     face: NDArray[np.int32],
 ) -> None:
-    """The only triangle of a quadrilateral with one gap, if its surface is unbroken."""
+    """Single triangle of a quadrilateral with one missing corner, unless it spans a depth edge."""
     missing = lone_gap(inverse_z[r, c], inverse_z[r, c + 1], inverse_z[r + 1, c], inverse_z[r + 1, c + 1])
     if missing >= 0 and height_of_step(distance, r, c) <= step:
         _fill(place, inverse_z, r, c, missing, top, bottom, nearness, face)
@@ -96,7 +95,7 @@ def _fill_rest(
 
 @kernel
 def lone_gap(n0: np.float32, n1: np.float32, n2: np.float32, n3: np.float32) -> int:
-    """Which of four values is NaN, if only one is; else −1."""
+    """Index of the only NaN among four values; −1 if there is none or more than one."""
     if np.isnan(n0):
         return -1 if np.isnan(n1 + n2 + n3) else 0
     if np.isnan(n1):
@@ -108,7 +107,7 @@ def lone_gap(n0: np.float32, n1: np.float32, n2: np.float32, n3: np.float32) -> 
 
 @kernel
 def height_of_step(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
-    """Largest difference of the distances of a quadrilateral's corners, as far as they are known [m]."""
+    """Largest difference of the known distances of a quadrilateral's corners [m]."""
     near, far = np.float32(np.inf), np.float32(-np.inf)
     for k in range(4):
         d = distance[r + k // 2, c + k % 2]
@@ -128,7 +127,7 @@ def _fill(
     nearness: NDArray[np.float32],
     face: NDArray[np.int32],
 ) -> None:
-    """One triangle into the z-buffer."""
+    """Rasterises one triangle into the z-buffer."""
     i, j, k = corners(missing)
     ar, ac, br, bc, cr, cc = r + i // 2, c + i % 2, r + j // 2, c + j % 2, r + k // 2, c + k % 2
     ax, ay = place[ar, ac, 0], place[ar, ac, 1]
@@ -168,10 +167,10 @@ def fray(
     face: NDArray[np.int32],
     warped: NDArray[np.float32],
 ) -> None:
-    """Forgets what is shown behind a rim, as near to it as a pixel of the source is wide.
+    """Invalidates the background within one source pixel of a depth edge.
 
-    What is nearer ends anywhere between its last pixel's centre and the next, so there either of the two may be seen.
-    `reach` (h, w) is that way in the view for a distance of 1 and a 1/z of 1 [px].
+    The foreground ends anywhere between its last pixel centre and the next, so either surface may be visible there.
+    `reach` (h, w) is that width in the view for a distance of 1 and a 1/z of 1 [px].
     """
     height, width = face.shape
     step, one = np.float32(largest_step), np.float32(1)
@@ -196,7 +195,7 @@ def fray(
 
 @kernel
 def largest(distance: NDArray[np.float32], r: int, c: int) -> np.float32:
-    """Largest distance of a quadrilateral's corners, as far as they are known [m]."""
+    """Largest known distance of a quadrilateral's corners [m]."""
     far = np.float32(-np.inf)
     for k in range(4):
         d = distance[r + k // 2, c + k % 2]
@@ -212,7 +211,7 @@ def tear(
     largest_step: float,
     torn: NDArray[np.bool_],
 ) -> None:
-    """Marks the pixels behind broken surfaces: between what is nearer and what is farther the source sees nothing."""
+    """Marks pixels behind depth edges: the region between foreground and background is unobserved."""
     height, width = torn.shape
     for r in range(place.shape[0] - 1):
         for c in range(place.shape[1] - 1):

@@ -1,4 +1,4 @@
-"""What the pixels of a view show, from the faces of the source's depth image that cover them."""
+"""Attributes of a view's pixels, interpolated from the source faces that cover them."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ def weigh(
     row: int,
     column: int,
 ) -> tuple[int, int, int, np.float32, np.float32, np.float32]:
-    """The three pixels of the source, flattened, around one of the view, and their weights, right in perspective."""
+    """Three source pixels (flat indices) around a pixel of the view, with perspective-correct weights."""
     columns = place.shape[1]
     quadrilateral, missing = face[row, column] // 4, face[row, column] % 4
     r, c = quadrilateral // columns, quadrilateral % columns
@@ -49,7 +49,7 @@ def measure(
     bottom: int,
     distance: NDArray[np.float32],
 ) -> None:
-    """Radial distances of rows `top` to `bottom` − 1, NaN where no face is."""
+    """Radial distances of rows `top` to `bottom` − 1, NaN without a face."""
     for row in range(top, bottom):
         for column in range(face.shape[1]):
             far = ray_length[row, column] / nearness[row, column]
@@ -64,7 +64,7 @@ def nearest(
     inverse_z: NDArray[np.float32],
     index: NDArray[np.int32],
 ) -> None:
-    """The pixel of the source, flattened, that weighs most in every pixel of the view; −1 where no face is."""
+    """Source pixel (flat index) with the largest weight in every pixel of the view; −1 without a face."""
     for row in range(face.shape[0]):
         for column in range(face.shape[1]):
             index[row, column] = -1
@@ -82,7 +82,7 @@ def blend(
     values: NDArray[np.float32],
     result: NDArray[np.float32],
 ) -> None:
-    """Values (n,) of the source's pixels, linear within every face; NaN where no face is."""
+    """Values (n,) of the source's pixels, linearly interpolated within every face; NaN without a face."""
     for row in range(face.shape[0]):
         for column in range(face.shape[1]):
             result[row, column] = np.nan
@@ -105,9 +105,9 @@ def deviate(
     bend: NDArray[np.float32],
     result: NDArray[np.float32],
 ) -> None:
-    """Deviation of the warped distances D: ∂D/∂d_i = b_i (n · r_i) / (n · q), with normal n and lines of sight r and q.
+    """Deviation of the warped distances: ∂D/∂d_i = b_i (n · r_i) / (n · q), with normal n and viewing directions r, q.
 
-    Distances (n,), rays (n, 3), `sigma` and `bend`, what the surface leaves the face by, (n,) are the source's.
+    Distances (n,), rays (n, 3), `sigma` and `bend`, the interpolation error, (n,) are the source's.
     """
     p = np.empty((3, 3), np.float32)
     normal = np.empty(3, np.float32)

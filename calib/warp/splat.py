@@ -1,6 +1,6 @@
-"""A depth image as another camera would have it, pixel by pixel: surface splatting, for thin things and sparse images.
+"""Surface splatting of a depth image into another view, for thin objects and sparse images.
 
-M. Zwicker, H. Pfister, J. van Baar, M. Gross: Surface splatting. SIGGRAPH 2001; with tents in place of Gaussians.
+M. Zwicker, H. Pfister, J. van Baar, M. Gross: Surface splatting. SIGGRAPH 2001; with tent kernels instead of Gaussians.
 """
 
 from dataclasses import dataclass
@@ -14,15 +14,15 @@ from calib.warp import errors
 from calib.warp.mesh import LARGEST_STEP_M
 from calib.warp.points import Geometry, Points
 
-#: A splat is so many times as wide as the pixel it comes from, so that turned and slanted ones leave no gaps.
+#: Width of a splat relative to its source pixel, so that rotated and slanted surfaces have no gaps.
 WIDTH = 1.5
 
 
 class SplatWarp:
-    """Warps what a depth sensor measured into any other view, each measurement for itself.
+    """Warps a depth image into any other view, each measurement separately.
 
-    What is nearest wins; of several measurements of one surface a pixel gets the weighted mean. More is covered at
-    every rim than by a `MeshWarp`, a measurement without neighbours is kept, but slopes are averaged, not followed.
+    The nearest surface wins; a pixel gets the weighted mean of its measurements. Compared with `MeshWarp`, edges are
+    dilated and isolated measurements are kept, but slopes are averaged instead of interpolated.
     """
 
     def __init__(self, source: Camera, target: Camera, largest_step_m: float = LARGEST_STEP_M):
@@ -35,10 +35,10 @@ class SplatWarp:
         self._size = np.stack(halves, axis=-1).astype(np.float32)
 
     def warp(self, distance: NDArray[np.floating]) -> "Splats":
-        """The source's radial distances (h, w) [m], NaN without return, in the view.
+        """Radial distances (h, w) [m] of the source, NaN without return, in the view.
 
         Raises:
-            WarpError: there is nothing to be seen in the view, or units are wrong; says why.
+            WarpError: nothing in the view, or wrong units; names the cause.
         """
         errors.check(distance, self.geometry.source, self.geometry.target)
         points = self.geometry.see(distance)
@@ -56,13 +56,13 @@ class SplatWarp:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Splats:
-    """A depth image in another view.
+    """Depth image in another view.
 
     Attributes:
-        distance: radial distances from the view's centre (height, width) [m], NaN where nothing is known.
+        distance: radial distances from the view's centre (height, width) [m], NaN where unknown.
         points: the source's points in the view.
         half: half the size of every splat (h, w, 2) [px].
-        front: 1/z of what is nearest (height, width) [1/m], 0 where nothing is.
+        front: 1/z of the nearest surface (height, width) [1/m], 0 without one.
         largest_step_m: measurements farther behind the nearest one belong to another surface [m].
     """
 
@@ -75,8 +75,8 @@ class Splats:
     def deviation(self, sigma: NDArray[np.floating]) -> NDArray[np.float32]:
         """Deviation of the warped distances (height, width) [m], for deviations of the source's (h, w) [m].
 
-        It is the noise of the weighted mean, and how far apart the measurements are that it is made of: what half a
-        pixel makes of a slope.
+        Combines the noise of the weighted mean with the spread of its measurements due to the slope within half a
+        pixel.
         """
         sums = self.sums(np.broadcast_to(sigma, self.points.distance.shape))
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -85,7 +85,7 @@ class Splats:
             return np.sqrt(sums[..., 3] / weight**2 + apart)
 
     def sums(self, sigma: NDArray[np.floating]) -> NDArray[np.float32]:
-        """Per pixel (height, width, 4) the sums of the weights w, of w/z, of w/z² and of w² σ²."""
+        """Sums per pixel (height, width, 4) of the weights w, of w/z, of w/z² and of w² σ²."""
         result = np.zeros((*self.front.shape, 4), np.float32)
         given = np.ascontiguousarray(sigma, np.float32)
         _gather(self.points.place, self.points.inverse_z, self.half, given, self.largest_step_m, self.front, result)
@@ -99,7 +99,7 @@ def _advance(
     half: NDArray[np.float32],
     front: NDArray[np.float32],
 ) -> None:
-    """The nearest 1/z of all splats that touch a pixel's centre."""
+    """Nearest 1/z of all splats that cover a pixel's centre."""
     height, width = front.shape
     for r in range(place.shape[0]):
         for c in range(place.shape[1]):
@@ -122,7 +122,7 @@ def _gather(
     front: NDArray[np.float32],
     sums: NDArray[np.float32],
 ) -> None:
-    """Adds up the splats of the nearest surface, each with a tent's weight around its centre."""
+    """Accumulates the splats of the nearest surface with tent weights."""
     height, width = front.shape
     one, step = np.float32(1), np.float32(largest_step)
     for r in range(place.shape[0]):
