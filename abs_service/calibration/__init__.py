@@ -1,1 +1,1 @@
-"""Around the calibration: what it reads, and what it writes for people and programs."""
+"""Calibration workflow: collection of views, files, reports."""

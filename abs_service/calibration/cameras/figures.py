@@ -1,4 +1,4 @@
-"""Pictures of a solved calibration: uncertainty over the image, halves, views, distances."""
+"""Plots of a solved calibration: uncertainty over the image, difference of the halves, views, distances."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ _UNSEEN = "0.8"
 
 
 def uncertainty_map(field: UncertaintyMap, label: str) -> "Figure":
-    """Deviation of projections over an image; hatched where no board was seen."""
+    """Standard deviation of projections over an image; hatched where no board was seen."""
     figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()
     u, v = field.pixels[..., 0], field.pixels[..., 1]
@@ -34,7 +34,7 @@ def uncertainty_map(field: UncertaintyMap, label: str) -> "Figure":
 
 
 def halves(agreement: Agreement) -> "Figure":
-    """By how much projections of the two halves differ, as arrows over the image."""
+    """Difference between the projections of the two halves, as arrows over the image."""
     figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()
     u, v = agreement.pixels[..., 0], agreement.pixels[..., 1]
@@ -62,7 +62,7 @@ def view_errors(views: Sequence[ViewFit], unit: str, scale: float) -> "Figure":
 
 
 def distance_errors(views: Sequence[ViewFit], distances: Mapping[int, float]) -> "Figure":
-    """What is left of distances on boards, over the image and over the board's distance.
+    """Residual distances on boards, over the image and over the board's distance.
 
     Args:
         views: distances of one sensor.

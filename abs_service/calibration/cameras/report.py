@@ -1,4 +1,4 @@
-"""What `calibrate intrinsics` and `calibrate rig` found out, as a report and as a calibration file."""
+"""Report and calibration file of `calibrate intrinsics` and `calibrate rig`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -18,10 +18,10 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
     """The report of a solved calibration.
 
     Args:
-        title: of the page.
-        origin: where the result comes from.
-        solution, found: the result and what is to be thought of it.
-        notes: what else the user should know, such as images that were not used.
+        title: title of the page.
+        origin: provenance of the result.
+        solution, found: the result and its assessment.
+        notes: remarks for the user, such as rejected images.
     """
     verdicts = [Verdict(Level.GOOD if found.trusted else Level.DOUBTFUL, found.verdict)]
     verdicts += [Verdict(Level.DOUBTFUL, reason) for reason in found.reasons[1:]]
@@ -48,14 +48,14 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
 def calibration(
     name: str, origin: Provenance, solution: Solution, trusted: bool, kept: Mapping[str, SensorCalibration]
 ) -> RigCalibration:
-    """The calibration file's content; of sensors known before, what is not of cameras stays.
+    """Content of the calibration file; values of known sensors that do not concern the camera are kept.
 
     Args:
         name: of the rig.
-        origin: where the result comes from.
+        origin: provenance of the result.
         solution: the result.
         trusted: the verdict.
-        kept: what was known before, by sensor.
+        kept: previous calibration, by sensor.
     """
     sensors = {}
     for sensor, state in solution.state.sensors.items():
@@ -135,7 +135,7 @@ def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Pict
         pixels = [view.pixels for view in corners]
         drawn = figures.coverage_map(pixels, camera.width, camera.height)
         yield drawing(drawn, "Where corners were seen", f"Coverage of the image of {name}")
-        # Shared pictures show measured less predicted.
+        # Residuals in reports are measured minus predicted.
         residuals = -np.concatenate([view.residuals for view in corners])
         drawn = figures.residual_field(np.concatenate(pixels), residuals, camera.width, camera.height)
         yield drawing(drawn, "Residuals of corners", f"Residuals of corners over the image of {name}")

@@ -1,4 +1,4 @@
-"""What new views of a board say about a stored calibration, as a report in plain words."""
+"""Verification of a stored calibration against new views of a board, as a report in plain words."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -24,39 +24,39 @@ from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.state import SensorState
 from calib.views import PlaneView
 
-#: More shots say hardly more, and take longer.
+#: Maximum number of shots.
 MOST_SHOTS = 40
 
-#: Distances of one view that are used: neighbours err alike, so that more of them say hardly more.
+#: Maximum number of distances per view; errors of neighbours are correlated, so more add little.
 MOST_DISTANCES = 300
 
-#: Corners miss by so much where a calibration does not say what was usual [px].
+#: Expected reprojection error if the calibration does not contain its own [px].
 USUAL_PX = 0.5
 
-#: How many times the usual miss is doubtful and bad.
+#: Ratios to the expected reprojection error that are doubtful and bad.
 DOUBTFUL_RATIO, BAD_RATIO = 1.5, 3.0
 
-#: Shifts of pictures that nobody notices, and that spoil a projection [px].
+#: Image shifts that are negligible, and that are unacceptable [px].
 UNNOTICED_PX, SPOILT_PX = 0.3, 1.0
 
-#: A shift of so many pixels that passes for chance: too little was seen.
+#: Insignificant shift that is too large for a verdict: too few views [px].
 BLIND_PX = 2.0
 
-#: Distances that are off by less are as good as any depth camera's, by more are wrong [m].
+#: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01
 
 
 @dataclass(frozen=True)
 class Found:
-    """Everything that was computed.
+    """Results of a verification.
 
     Attributes:
-        fits: of sensors that see corners, by sensor.
-        usual_px: their miss when they were calibrated.
-        biases: of sensors that see corners and measure distances.
-        changes: of all pairs.
-        explanations: what setting one sensor free explains; empty if nothing moved.
-        unseen: sensors without any view.
+        fits: residuals of sensors with corners, by sensor.
+        usual_px: their reprojection errors at calibration.
+        biases: distance bias of sensors with corners and distances.
+        changes: relative motion of all pairs.
+        explanations: hypotheses about a moved sensor; empty if nothing moved.
+        unseen: sensors without views.
     """
 
     fits: Mapping[str, CornerFit]
@@ -68,16 +68,16 @@ class Found:
 
 
 def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
-    """The report on a calibration.
+    """Report on a calibration.
 
     Args:
         known: the calibration.
-        seen: what its sensors saw of a board.
-        provenance: where the report comes from.
+        seen: new views of a board by its sensors.
+        provenance: provenance of the report.
 
     Raises:
-        CalibrationCheckError: no view can be used.
-        NotSolvedError, UndeterminedError: the views do not place the board.
+        CalibrationCheckError: no usable view.
+        NotSolvedError, UndeterminedError: the views do not determine the board poses.
     """
     found = _found(known, seen)
     sections = [
@@ -90,7 +90,7 @@ def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
 
 
 def verdicts(found: Found) -> list[Verdict]:
-    """The judgements, the worst first."""
+    """Verdicts, the worst first."""
     said = [_moved(found)] if found.explanations else []
     said += [_of_fit(name, fit, found.usual_px[name]) for name, fit in found.fits.items()]
     said += [_of_bias(name, bias) for name, bias in found.biases.items()]
@@ -136,7 +136,7 @@ def _ours(seen: Seen, sensors: Mapping[str, SensorState]) -> Views:
 
 
 def _thinned(views: Views) -> Views:
-    """Evenly spread shots, if there are very many."""
+    """At most a fixed number of evenly spread shots."""
     shots = sorted({view.shot for view in views.corners})
     kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
     fewer = views.of(views.shots, kept)
@@ -193,7 +193,7 @@ def _how_far(change: PairChange) -> str:
 
 
 def _moved(found: Found) -> Verdict:
-    """Which sensor it was."""
+    """Verdict on the sensor that moved."""
     worst = max(found.changes, key=lambda change: _level(change) * change.is_significant)
     level = _level(worst)
     able = moved_candidates(found.explanations)

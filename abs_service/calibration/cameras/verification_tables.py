@@ -1,4 +1,4 @@
-"""The evidence of a verification: tables, pictures and numbers for programs."""
+"""Evidence of a verification: tables, pictures and machine-readable values."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from calib.calibration_check.hypotheses import CornerFit, DistanceBias, MotionHy
 def sensors(
     fits: Mapping[str, CornerFit], usual_px: Mapping[str, float], biases: Mapping[str, DistanceBias]
 ) -> Section:
-    """Each sensor for itself."""
+    """Table of each sensor alone."""
     columns = (
         Column("sensor"), Column("views"), Column("corners miss by", "px", ".3f"), Column("usual", "px", ".3f"),
         Column("distances exceed by", "mm", ".2f"), Column("±", "mm", ".2f"),
@@ -28,7 +28,7 @@ def sensors(
 
 
 def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypothesis]) -> list[Section]:
-    """Pairs of sensors, and what setting one free explains; nothing if there are no pairs."""
+    """Tables of relative motion and of hypotheses; empty without pairs."""
     if not changes:
         return []
     columns = (
@@ -57,7 +57,7 @@ def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypoth
 
 
 def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
-    """What is left in the images."""
+    """Residuals over the images."""
     pictures = []
     for name, fit in fits.items():
         camera = known.sensors[name].camera
@@ -69,7 +69,7 @@ def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
 
 
 def refusals(seen: Seen) -> list[Section]:
-    """Why images were not used; nothing if all were."""
+    """Reasons for rejected images; empty without any."""
     if not seen.refused:
         return []
     counts = Counter((sensor, str(error)) for (_, sensor), error in seen.refused.items())
@@ -84,7 +84,7 @@ def values(
     changes: Sequence[PairChange],
     explanations: Mapping[str, MotionHypothesis],
 ) -> dict[str, Any]:
-    """For programs."""
+    """Machine-readable values."""
     return {
         "sensors": {name: {"views": fit.views, "corners_px": fit.rms} for name, fit in fits.items()},
         "distance_bias_m": {name: bias.mean for name, bias in biases.items()},

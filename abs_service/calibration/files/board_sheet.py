@@ -1,4 +1,4 @@
-"""A board on a sheet of paper, true to scale: where it lies, its ruler, and the page as SVG or PDF."""
+"""Board on a sheet of paper, true to scale, with a ruler, as SVG or PDF."""
 
 import io
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from calib.board.artwork import artwork
 from calib.board.target import Target, outline
 
-#: Rim that printers leave white, and the strip below the board for ruler and text [m].
+#: Margin that printers leave white, and the strip below the board for ruler and text [m].
 RIM, STRIP = 0.008, 0.014
 #: Longest ruler, and the distance of its ticks [m].
 _RULER, _TICK = 0.1, 0.01
@@ -20,7 +20,7 @@ _MM = 1e3
 
 
 class SheetError(ValueError):
-    """A board that does not fit on its sheet, or a file that cannot be written."""
+    """Board that does not fit on its sheet, or a file that cannot be written."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,10 +44,10 @@ class Sheet:
 
 
 def lay_out(target: Target, width: float, height: float, text: str) -> Sheet:
-    """Puts a board in the middle of a sheet of paper, a ruler and a line of text below it.
+    """Places a board in the middle of a sheet of paper, with a ruler and a line of text below.
 
     Raises:
-        SheetError: it does not fit; says by how much it would have to shrink.
+        SheetError: it does not fit; names the required scale.
     """
     corners = outline(target)[:, :2]
     size = np.ptp(corners, axis=0)
@@ -72,7 +72,7 @@ def lay_out(target: Target, width: float, height: float, text: str) -> Sheet:
 
 
 def write(sheet: Sheet, path: Path) -> None:
-    """Writes a sheet; the ending of the file's name, `.svg` or `.pdf`, is the format.
+    """Writes a sheet as SVG or PDF, according to the file's suffix.
 
     Raises:
         SheetError: the file cannot be written.
@@ -108,7 +108,7 @@ def to_svg(sheet: Sheet) -> str:
 
 def to_pdf(sheet: Sheet) -> bytes:
     """The sheet as PDF of one page; the same sheet gives the same bytes."""
-    import matplotlib as mpl  # noqa: PLC0415  loaded by those only who draw
+    import matplotlib as mpl  # noqa: PLC0415  imported only when a PDF is written
     from matplotlib.backends.backend_pdf import FigureCanvasPdf  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
     from matplotlib.patches import Circle, Rectangle  # noqa: PLC0415
@@ -131,7 +131,7 @@ def to_pdf(sheet: Sheet) -> bytes:
 
 
 def _ruler_lines(sheet: Sheet) -> NDArray[np.float64]:
-    """The ruler's line and its ticks: x and y of both ends (n, 4) [m]."""
+    """Line and ticks of the ruler: x and y of both ends (n, 4) [m]."""
     left, right, y = sheet.ruler
     ticks = np.linspace(left, right, round((right - left) / _TICK) + 1)
     reach = np.where(np.arange(len(ticks)) % 5 == 0, 0.003, 0.002)

@@ -1,4 +1,4 @@
-"""Which format a calibration of another program has, and the cameras in it."""
+"""Format detection, reading and writing of other programs' calibrations."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -27,13 +27,13 @@ WRITERS = {
     "tf": tf.write,
 }
 
-#: The format of our own calibration files.
+#: Format of our own calibration files.
 OWN = "toml"
 
 _BY_SUFFIX = {".toml": OWN, ".cameramodel": "mrcal", ".xml": "opencv", ".urdf": "urdf"}
 _DIALECTS = {".xml": cv2.FILE_STORAGE_FORMAT_XML, ".json": cv2.FILE_STORAGE_FORMAT_JSON}
 
-#: What only texts of one format hold, the most telling first.
+#: Distinctive strings of each format, the most specific first.
 _TELLING = (
     ("%YAML:", "opencv"),
     ("!!opencv-matrix", "opencv"),
@@ -45,14 +45,14 @@ _TELLING = (
 
 
 class ExchangeError(Exception):
-    """A file whose format is not known, or that is not of the format that it is said to be."""
+    """Unknown format, or a file that does not conform to its format."""
 
 
 def of_content(path: Path, text: str) -> str:
-    """The format of a file, by its suffix or by what it holds.
+    """Format of a file, from its suffix or content.
 
     Raises:
-        ExchangeError: it cannot be told.
+        ExchangeError: the format is ambiguous or unknown.
     """
     if path.suffix in _BY_SUFFIX:
         return _BY_SUFFIX[path.suffix]
@@ -65,7 +65,7 @@ def of_content(path: Path, text: str) -> str:
 
 
 def of_name(path: Path) -> str:
-    """The format of a file to be written, by its suffix.
+    """Format of a file to be written, from its suffix.
 
     Raises:
         ExchangeError: several formats have this suffix.
@@ -76,10 +76,10 @@ def of_name(path: Path) -> str:
 
 
 def read(path: Path, text: str, name: str, hints: Hints) -> Content:
-    """The cameras in a file of another program.
+    """Cameras in a file of another program.
 
     Raises:
-        ExchangeError: it is not of this format, or holds what cannot be expressed.
+        ExchangeError: invalid file, or content that cannot be expressed.
     """
     if name not in READERS:
         raise ExchangeError(f"{path}: {name} is only written, not read; {allowed_instead(name, list(READERS))}")
@@ -90,7 +90,7 @@ def read(path: Path, text: str, name: str, hints: Hints) -> Content:
 
 
 def write(path: Path, name: str, cameras: Mapping[str, Camera]) -> Written:
-    """The text of a file for another program.
+    """Text of a file for another program.
 
     Raises:
         ExchangeError: the format cannot express the cameras.

@@ -1,6 +1,6 @@
-"""The calibration file: what is known of the sensors of a rig as TOML for people, with covariances in a file beside it.
+"""Calibration file: sensors of a rig as TOML, with covariances in a side file.
 
-`abs_service.config.load_calibration` reads it, and a rig file that names it uses it.
+Read by `abs_service.config.load_calibration`, and through rig files that name it.
 """
 
 import hashlib
@@ -22,12 +22,12 @@ SUFFIX = ".calibration.toml"
 
 
 class RigFileError(Exception):
-    """A calibration file that cannot be written, or a side file that cannot be used."""
+    """Calibration file that cannot be written, or an invalid side file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Root mean squares of what the calibration does not explain; None where there was nothing.
+    """Root mean square residuals of a calibration; None without measurements.
 
     Attributes:
         corners_px: of corners [px].
@@ -42,17 +42,17 @@ class Residuals:
 
 @dataclass(frozen=True)
 class SensorCalibration:
-    """What is known of one optical head.
+    """Calibration of one optical head.
 
     Attributes:
         camera: projection with its pose in the rig.
         depth_offset, depth_scale: measured distance = (1 + scale) · distance + offset [m, 1].
-        time_offset: what has to be added to the sensor's times to get the rig's [s].
-        noise: the TOML table of its noise model; empty if it was not calibrated. Paths in it start from the folder of
-            the calibration file.
-        texture: likewise of what it sees of the surface besides.
-        factory: the device's own calibration; None if the command did not know it.
-        residuals: what is left.
+        time_offset: offset from the sensor's clock to the rig's [s]; added to the sensor's times.
+        noise: TOML table of its noise model; empty without one. Paths are relative to the folder of the calibration
+            file.
+        texture: likewise for its amplitude, intensity or colour.
+        factory: the device's own calibration; None if unknown.
+        residuals: of the calibration.
     """
 
     camera: Camera
@@ -67,11 +67,11 @@ class SensorCalibration:
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of all parameters that were determined.
+    """Covariance of all estimated parameters.
 
     Attributes:
-        names: of the parameters, `tof.fx`, `color.rotation_x`, …; `calib.solve.bundle.layout` explains them.
-        matrix: (n, n), in the square of their units (m, rad, px, s, 1).
+        names: of the parameters, `tof.fx`, `color.rotation_x`, …; see `calib.solve.bundle.layout`.
+        matrix: (n, n), in the product of their units (m, rad, px, s, 1).
     """
 
     names: tuple[str, ...] = ()
@@ -86,14 +86,14 @@ class Covariance:
 
 @dataclass(frozen=True)
 class RigCalibration:
-    """A calibration with everything that its file holds.
+    """Complete content of a calibration file.
 
     Attributes:
         name: of the rig.
         sensors: by name.
-        provenance: where it comes from.
-        verdict: of the command that made it; unknown if it did not judge.
-        covariance: of the parameters; empty if there is none.
+        provenance: origin of the calibration.
+        verdict: of the command that made it; unknown without a verdict.
+        covariance: of the parameters; empty if unknown.
     """
 
     name: str
@@ -104,13 +104,13 @@ class RigCalibration:
 
 
 def write(calibration: RigCalibration, path: Path) -> list[Path]:
-    """Writes a calibration file, and its covariances beside it if there are any.
+    """Writes a calibration file, with its covariances beside it if there are any.
 
     Returns:
-        What was written.
+        Paths of the written files.
 
     Raises:
-        RigFileError: it cannot be.
+        RigFileError: a file cannot be written.
     """
     side = path.with_suffix(".npz")
     arrays = _arrays(calibration.covariance) if calibration.covariance.names else b""
@@ -126,14 +126,14 @@ def write(calibration: RigCalibration, path: Path) -> list[Path]:
 
 
 def read_covariance(path: Path, sha256: str) -> Covariance:
-    """The covariances of a side file.
+    """Covariances of a side file.
 
     Args:
         path: the file.
-        sha256: hash that the calibration file gives for it.
+        sha256: expected hash, from the calibration file.
 
     Raises:
-        RigFileError: it cannot be read, or is not the one that belongs to the calibration.
+        RigFileError: it cannot be read, or its hash differs.
     """
     try:
         content = path.read_bytes()
@@ -146,7 +146,7 @@ def read_covariance(path: Path, sha256: str) -> Covariance:
 
 
 def camera_table(camera: Camera) -> dict[str, Any]:
-    """The table `camera` of a rig file that makes the same camera."""
+    """Table `camera` of a rig file for a camera."""
     rotation_vector, translation = pose.to_rotation_vector(camera.T_rs)
     coefficients = np.trim_zeros(camera.lens.coefficients, "b").tolist()
     return {

@@ -1,4 +1,4 @@
-"""A board as a TOML file: `kind = "charuco"`, counts, and lengths in metres, or in millimetres as `square_mm`."""
+"""Board description in TOML: `kind = "charuco"`, counts, lengths in metres, or in millimetres as `square_mm`."""
 
 import tomllib
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ import tomli_w
 from abs_service.config.problems import ABSENT, Problem, allowed_instead
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError
 
-#: The values of `kind`.
+#: Values of `kind`.
 KINDS: Mapping[str, type[Target]] = {
     "chessboard": Chessboard,
     "charuco": Charuco,
@@ -19,19 +19,19 @@ KINDS: Mapping[str, type[Target]] = {
     "asymmetric_circles": AsymmetricCircles,
 }
 
-#: The lengths among the keys; each may end in `_mm`.
+#: Keys of lengths; each may end in `_mm`.
 _LENGTHS = ("square", "marker", "spacing", "diameter")
 
 
 class TargetFileError(ValueError):
-    """A file that describes no board; the message names file, key, value and what is allowed."""
+    """Invalid board description; the message names file, key, value and what is allowed."""
 
 
 def read(path: Path) -> Target:
-    """Reads the description of a board.
+    """Reads a board description.
 
     Raises:
-        TargetFileError: the file cannot be read, or what it says is no board.
+        TargetFileError: unreadable file or invalid description.
     """
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -43,10 +43,10 @@ def read(path: Path) -> Target:
 
 
 def from_table(table: Mapping[str, Any], path: str) -> Target:
-    """The board that a TOML table describes; `path` is for the message.
+    """Board of a TOML table; `path` is for error messages.
 
     Raises:
-        TargetFileError: what the table says is no board.
+        TargetFileError: invalid description.
     """
     kind = table.get("kind", ABSENT)
     if kind not in KINDS:
@@ -77,7 +77,7 @@ def from_table(table: Mapping[str, Any], path: str) -> Target:
 
 
 def to_table(target: Target) -> dict[str, Any]:
-    """The TOML table that `from_table` makes the same board from, lengths in millimetres."""
+    """TOML table of a board, the inverse of `from_table`, with lengths in millimetres."""
     kind = next(name for name, Kind in KINDS.items() if type(target) is Kind)
     shown = {
         f"{k}_mm" if k in _LENGTHS else k: round(1e3 * v, 6) if k in _LENGTHS else v for k, v in asdict(target).items()
@@ -106,7 +106,7 @@ _EXAMPLES: Mapping[str, Target] = {
 
 
 def _name(key: str) -> tuple[str, bool]:
-    """The attribute that a key is about, and whether its value is in millimetres."""
+    """Attribute of a key, and True if its value is in millimetres."""
     name = key.removesuffix("_mm")
     return (name, True) if name != key and name in _LENGTHS else (key, False)
 

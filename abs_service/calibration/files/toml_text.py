@@ -1,4 +1,4 @@
-"""TOML as a person would write it: comments, short arrays on one line, matrices row by row."""
+"""TOML formatting for people: comments, short arrays on one line, matrices row by row."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,14 +9,14 @@ _WIDTH = 110
 
 
 def table(key: Sequence[str], content: Mapping[str, Any], comment: str = "") -> str:
-    """A table with its heading; the root if the key is empty."""
+    """Table with its heading; the root table if the key is empty."""
     heading = f"[{'.'.join(key)}]\n" if key else ""
     lines = "".join(f"{name} = {value(part)}\n" for name, part in content.items())
     return f"{f'# {comment}' + chr(10) if comment else ''}{heading}{lines}"
 
 
 def value(given: Any) -> str:
-    """A value; floats such that reading gives the same bits."""
+    """TOML literal of a value; floats round-trip exactly."""
     if isinstance(given, Mapping):
         return "{ " + ", ".join(f"{name} = {value(part)}" for name, part in given.items()) + " }"
     if isinstance(given, list | tuple):

@@ -1,4 +1,4 @@
-"""Where the board stands in front of a depth sensor during a sequence, by its own image or another sensor's."""
+"""Board pose relative to a depth sensor during a static sequence."""
 
 from abs_service.calibration.shots.corner_extraction import see
 from abs_service.calibration.shots.sequences import Sequence, SequenceError
@@ -8,11 +8,11 @@ from calib.sequences.placed import Placed, place
 
 
 def placed(target: Target, sequence: Sequence) -> Placed:
-    """The board at rest of a sequence, as the depth sensor's own image shows it, or else the one that shows most of it.
+    """Board pose from the depth sensor's own image, or else from the sensor with the most corners.
 
     Raises:
-        SequenceError: no sensor shows the board, or not well; says why each does not.
-        NoiseError: what is seen is no board in front of the depth sensor.
+        SequenceError: no sensor detects the board; names the reason for each.
+        NoiseError: the detected board is not in front of the depth sensor.
     """
     looks = {sensor: look for sensor, look in sequence.looks.items() if sensor in sequence.cameras}
     if not looks:

@@ -1,4 +1,4 @@
-"""From static sequences of a depth sensor to its noise model: what `abs-service calibrate noise` does."""
+"""Estimation of a depth sensor's noise model from static sequences, for `abs-service calibrate noise`."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -22,19 +22,19 @@ from calib.sequences.selection import FOLDS, THOROUGH, Trial, alike_from, attemp
 from calib.sequences.static import Static, reduce
 from calib.sequences.steps import Steps
 
-#: Frames of a sequence that are kept as single measurements, and measurements of all sequences together.
+#: Maximum number of frames kept as samples per sequence, and of samples in total.
 _KEPT, _LARGEST = 30, 40_000_000
 
-#: A plane is the target if it covers this share of what is static; otherwise there is none.
+#: Minimum fraction of the static pixels that a plane must cover to be the target.
 _TARGET = 0.85
 
-#: Times that targets are turned anew with the mean offsets that the model tells by then.
+#: Refits of the targets' orientations after subtracting the model's mean offsets.
 _TURNS = 2
 
-#: The farthest over the nearest distance from which on pixels' own offsets may change with it.
+#: Minimum ratio of largest to smallest distance for own offsets that vary with distance.
 _SEVERAL = 1.3
 
-#: Distances that sequences without a target are told apart by, for the table of the parts.
+#: Number of distance ranges in the table of error components of sequences without a target.
 _BINS = 8
 
 _FEW = 100
@@ -42,21 +42,21 @@ _FEW = 100
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What the sequences say of a sensor.
+    """Result of a noise calibration.
 
     Attributes:
-        statics: every sequence, reduced.
-        references: its real distances.
+        statics: statistics of every sequence.
+        references: true distances of every sequence.
         model: the noise model.
-        chosen: the trial that called for it; `law` is that of its law of the image.
-        trials: of all that were tried.
-        by_sequence: whether whole sequences were held out, not only frames of them.
-        rows: the parts of the error, of every sequence or of every range of distances, with a name.
-        pattern: what each pixel errs by in all sequences alike, and the deviation of that (height, width) [m].
-        z: residuals over deviations of a third of the parts, by a model that was fitted to the others.
+        chosen: the selected trial; `law` is the trial of its image model.
+        trials: all trials.
+        by_sequence: True if whole sequences were held out, false if only frames of them.
+        rows: error components of every sequence or range of distances, with a name.
+        pattern: fixed error of each pixel over all sequences, and its deviation (height, width) [m].
+        z: normalised held-out residuals.
         distances, amplitudes: domain; the latter NaN without amplitudes.
-        steps: that the distances come in.
-        boards: that the real distances are those of, for every sequence; empty if they come from elsewhere.
+        steps: quantisation of the distances.
+        boards: board poses of every sequence; empty if the true distances have another source.
     """
 
     statics: tuple[Static, ...]
@@ -76,7 +76,7 @@ class Found:
 
     @property
     def kind(self) -> Kind:
-        """Where real distances came from."""
+        """Source of the true distances."""
         return self.references[0].kind
 
 
@@ -87,17 +87,17 @@ def calibrate(
     generator: np.random.Generator,
     say: Callable[[str], None],
 ) -> Found:
-    """Learns a sensor's noise from static sequences.
+    """Selects and fits a sensor's noise model from static sequences.
 
     Args:
         sequences: of one sensor.
-        targets: of each, where it meets the optical axis [m], NaN if that is not known; or a board whose pose is.
+        targets: for each, its depth on the optical axis [m], NaN if unknown, or the pose of a board.
         region: pixels (height, width) that may show a target.
-        generator: draws what is random in the search for planes, and thins measurements.
-        say: takes what is being done, for people.
+        generator: for the plane search and subsampling.
+        say: called with progress messages.
 
     Raises:
-        NoiseError: nothing can be learnt; says why.
+        NoiseError: no model can be estimated; names the reason.
     """
     statics = _reduced(sequences, say)
     references = _references(statics, targets, region, generator)
@@ -158,7 +158,7 @@ def _references(
     region: NDArray[np.bool_],
     generator: np.random.Generator,
 ) -> list[Reference]:
-    """Boards or known distances if there are any, else planes if every sequence has a large one, else the means."""
+    """Boards or known distances if given, else planes if every sequence has a large one, else temporal means."""
     boards = [one for one in targets if isinstance(one, Placed)]
     if len(boards) == len(statics):
         return [reference.on_board(static, one, region) for static, one in zip(statics, boards)]
@@ -178,7 +178,7 @@ def _references(
 def _turned(
     statics: Sequence[Static], references: list[Reference], law: Candidate, generator: np.random.Generator
 ) -> list[Reference]:
-    """Known distances' targets, turned with the mean offsets that a law tells: the law is fitted anew each time."""
+    """Targets at known distances, refitted alternately with the mean offsets of the image model."""
     for _ in range(_TURNS if references[0].kind is Kind.KNOWN else 0):
         model = law.fit(lean(together(_evidence(statics, references)), generator))
         references = [reference.subtract_mean_offset(one, static, model) for static, one in zip(statics, references)]
@@ -190,7 +190,7 @@ def _by_sequence(statics: Sequence[Static]) -> bool:
 
 
 def _evidence(statics: Sequence[Static], references: Sequence[Reference]) -> list[Evidence]:
-    """Of every sequence in the order of their distances, or of every third of the frames if there are few of them."""
+    """Evidence by sequence in the order of distance, or by thirds of the frames if there are few sequences."""
     pairs = sorted(zip(statics, references), key=lambda pair: float(np.nanmedian(pair[1].distance)))
     if _by_sequence(statics):
         return [gather(static, one) for static, one in pairs]
@@ -221,7 +221,7 @@ def _steps(statics: Sequence[Static]) -> Steps:
 
 
 def _rows(statics: Sequence[Static], references: Sequence[Reference], law: DepthNoise) -> tuple[tuple[str, Parts], ...]:
-    """The parts of every sequence with a target; else of ranges of distances."""
+    """Error components of every sequence with a target; else of ranges of distances."""
     pairs = list(zip(statics, references))
     if references[0].kind is not Kind.MEAN:
         return tuple((s.name, parts.separate(s, one, law, s.still)) for s, one in pairs)

@@ -1,4 +1,4 @@
-"""Pictures of a sensor's noise: over distance and amplitude as in Fig. 8 of the paper, and residuals."""
+"""Plots of a sensor's noise: over distance and amplitude as in Fig. 8 of the paper, and residuals."""
 
 from typing import TYPE_CHECKING
 
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Distances and amplitudes at which a model is drawn.
+#: Number of distances and amplitudes at which a model is plotted.
 _FINE = 120
 
-#: Residuals beyond so many deviations are drawn at the edge.
+#: Range of the histogram in deviations; larger residuals are clipped.
 _EDGE = 5.0
 
 
 def over_distance_and_amplitude(found: Found) -> "Figure":
-    """σ, and μ if it is known, of the middle pixel as the model has them, with what every sequence shows as dots."""
+    """σ, and μ if known, of the middle pixel by the model, with the measurements of every sequence as dots."""
     return _maps(found) if np.isfinite(found.amplitudes[0]) else _curves(found)
 
 
 def histogram(found: Found) -> "Figure":
-    """Held-out residuals over their deviations, against the normal distribution."""
+    """Normalised held-out residuals against the normal distribution."""
     figure = plots.figure(7.5, 3.6)
     axes = figure.add_subplot()
     axes.hist(np.clip(found.z, -_EDGE, _EDGE), 101, density=True, color="0.75", label="held out")
@@ -41,7 +41,7 @@ def histogram(found: Found) -> "Figure":
 
 
 def _maps(found: Found) -> "Figure":
-    """σ and μ as colours over distance and amplitude."""
+    """σ and μ as colour maps over distance and amplitude."""
     near, far = found.distances
     faint, bright = (max(value, 1.0) for value in found.amplitudes)
     x, a = np.meshgrid(np.linspace(near, far, _FINE), np.geomspace(faint, bright, _FINE))
@@ -66,7 +66,7 @@ def _maps(found: Found) -> "Figure":
 
 
 def _curves(found: Found) -> "Figure":
-    """σ and μ over distance where there is no amplitude."""
+    """σ and μ over distance, without amplitudes."""
     x = np.linspace(*found.distances, _FINE)
     sigma, mu = _middle(found.model, found, x, np.zeros(_FINE))
     known = found.kind.tells_offset

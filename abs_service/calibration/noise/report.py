@@ -1,4 +1,4 @@
-"""The report of a calibration of noise: verdicts, what was compared, the parts of the error, and pictures of them."""
+"""Report of a noise calibration: verdicts, model comparison, error components, and plots."""
 
 import numpy as np
 
@@ -11,20 +11,20 @@ from abs_service.report.provenance import Provenance
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.reference import Kind
 
-#: Sequences of which a picture shows what was static.
+#: Maximum number of sequences with a picture of static pixels.
 _SHOWN = 3
 
 _COLORS = {"static": (60, 160, 60), "target": (60, 90, 220), "left out": (160, 160, 160)}
 
 
 def report(sensor: str, found: Found, claims: tuple[Claim, ...], provenance: Provenance) -> Report:
-    """The report of one sensor.
+    """Report of one sensor.
 
     Args:
         sensor: its name.
-        found: what its sequences say.
-        claims: how well deviations that it claims itself agree with what it measured.
-        provenance: where this comes from.
+        found: result of the calibration.
+        claims: consistency of the σ that the sensor reports.
+        provenance: provenance of the report.
     """
     sections = [
         Section("Models", (_models(found),)),
@@ -48,7 +48,7 @@ _WHAT = (
 
 
 def values(found: Found) -> dict[str, object]:
-    """What programs want of it."""
+    """Machine-readable values."""
     return {
         "model": found.chosen.candidate.name,
         "reference": str(found.kind),
@@ -67,7 +67,7 @@ def values(found: Found) -> dict[str, object]:
 
 
 def _boards(found: Found) -> tuple[Section, ...]:
-    """Where the boards were, if the real distances are theirs."""
+    """Board poses, if they are the reference."""
     if found.kind is not Kind.BOARD:
         return ()
     columns = (
@@ -138,7 +138,7 @@ def _maps(found: Found) -> list[str | Picture]:
 
 
 def _pattern_deviation(found: Found) -> float:
-    """Deviation of the fixed pattern without the uncertainty of its map [m]; NaN where it is not determined."""
+    """Deviation of the fixed pattern without the uncertainty of its map [m]; NaN if undetermined."""
     if found.kind is Kind.MEAN:
         return float("nan")
     pattern, deviation = (part[np.isfinite(found.pattern[0])] for part in found.pattern)

@@ -1,4 +1,4 @@
-"""How well the deviation that a sensor claims for every pixel agrees with what it measures."""
+"""Consistency of the σ that a sensor reports for every pixel with its measurements."""
 
 from dataclasses import dataclass
 
@@ -12,13 +12,13 @@ from calib.sequences import local
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """Residuals from local planes over the claimed deviation.
+    """Residuals from local planes, normalised by the reported σ.
 
     Attributes:
-        name: of what was looked at, for people.
-        pixels: that have a local plane and a claim.
-        within_one, within_95: share within 1 and 1.96 claimed deviations; 0.683 and 0.95 if the claim is right.
-        ratio: robust deviation of the residuals over the claimed one; 1 if the claim is right.
+        name: label for display.
+        pixels: number of pixels with a local plane and a reported σ.
+        within_one, within_95: fraction within 1 and 1.96 reported σ; 0.683 and 0.95 if consistent.
+        ratio: robust deviation of the residuals over the reported σ; 1 if consistent.
     """
 
     name: str
@@ -29,7 +29,7 @@ class Claim:
 
 
 def of_values(name: str, z: NDArray[np.floating]) -> Claim:
-    """The claim that residuals over deviations amount to; NaN does not count."""
+    """Consistency from normalised residuals; NaN is ignored."""
     size = np.abs(z[np.isfinite(z)])
     if not size.size:
         return Claim(name, 0, np.nan, np.nan, np.nan)
@@ -38,7 +38,7 @@ def of_values(name: str, z: NDArray[np.floating]) -> Claim:
 
 
 def of_sequence(sequence: Sequence) -> tuple[Claim, ...]:
-    """That of a sequence's first frame, which has a noise that no mean has taken away; none without claims."""
+    """Consistency of a sequence's first frame, which is not averaged; none without reported σ."""
     if not np.isfinite(sequence.claimed).any():
         return ()
     distance = sequence.lengths[0] * sequence.along

@@ -1,4 +1,4 @@
-"""What a calibration of noise says in plain words: what to use, how far to trust it, what could not be determined."""
+"""Verdicts of a noise calibration in plain words: model to use, its reliability, and what is undetermined."""
 
 import math
 
@@ -10,24 +10,24 @@ from calib.sequences.candidates import Level as Places
 from calib.sequences.reference import Kind
 from calib.sequences.selection import NOTHING, Trial, extremes
 
-#: How far coverage and variance of held-out residuals may be from 68.3 %, 95 % and 1.
+#: Tolerances of coverage and variance of held-out residuals about 68.3 %, 95 % and 1.
 _COVERAGE, _VARIANCE = 0.03, (0.8, 1.25)
 
-#: The farthest distance over the nearest below which a model knows one distance only, and so for amplitudes.
+#: Ratio of largest to smallest distance below which a model covers a single distance; likewise for amplitudes.
 _SPREAD = 1.3
 
-#: Share of the image that may move before somebody should look at it.
+#: Fraction of moving pixels that triggers a warning.
 _MOVING = 0.3
 
-#: Real distances that are known worse than this tell no offset that is worth having [m].
+#: Largest uncertainty of true distances at which an offset is meaningful [m].
 _WELL_KNOWN = 2e-3
 
-#: How far outside the domain a model is checked, as a factor on either end.
+#: Factor by which the domain is extended to check extrapolation.
 _OUTSIDE = 10.0
 
 
 def verdicts(found: Found) -> tuple[Verdict, ...]:
-    """All that there is to say, the most important first."""
+    """All verdicts, the most important first."""
     return (
         _use(found),
         _agreement(found),
@@ -67,7 +67,7 @@ def _agreement(found: Found) -> Verdict:
 
 
 def _boards(found: Found) -> list[Verdict]:
-    """How well the real distances are known that the poses of boards tell."""
+    """Uncertainty of the true distances from board poses."""
     if found.kind is not Kind.BOARD:
         return []
     worst = max(board.uncertainty for board in found.boards)
@@ -86,7 +86,7 @@ def _boards(found: Found) -> list[Verdict]:
 
 
 def _undetermined(found: Found) -> list[Verdict]:
-    """What the sequences cannot tell."""
+    """Quantities that the sequences do not determine."""
     said = []
     if found.kind is Kind.MEAN:
         said.append(
@@ -125,7 +125,7 @@ def _undetermined(found: Found) -> list[Verdict]:
 
 
 def _places(found: Found) -> Verdict:
-    """What maps of regions and of pixels gain."""
+    """Gain of maps of regions and pixels."""
     parts = []
     for trial in found.trials:
         if trial.candidate.level is Places.IMAGE or not trial.scores:
@@ -147,7 +147,7 @@ def _none() -> Verdict:
 
 
 def _outside(found: Found) -> Verdict:
-    """Whether the model stays sensible where nothing was measured."""
+    """Check of the model's extrapolation."""
     near, far = found.distances
     _, high, _ = extremes(found.model, found.distances, _amplitudes(found))
     beyond = extremes(found.model, (near / _OUTSIDE, far * _OUTSIDE), (0.0, 65535.0))

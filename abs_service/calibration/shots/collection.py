@@ -1,4 +1,4 @@
-"""Which shots of a board are worth keeping, and when there are enough of them."""
+"""Selection of shots of a board for a calibration."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +11,7 @@ from calib.views import CornerView
 
 
 class Collector:
-    """Keeps shots that show something new.
+    """Keeps shots that add information.
 
     Args:
         sizes: width and height of the images of every sensor that has any [px], by sensor name.
@@ -19,7 +19,7 @@ class Collector:
     Attributes:
         views: kept views of all sensors.
         kept: number of shots.
-        latest: what became of the last shot, by sensor; "" for a sensor whose view was kept.
+        latest: rejection of the last shot by sensor; "" for a sensor whose view was kept.
     """
 
     def __init__(self, sizes: Mapping[str, tuple[int, int]]) -> None:
@@ -30,13 +30,13 @@ class Collector:
 
     @property
     def missing_views(self) -> Sequence[MissingView]:
-        """What is missing, the most important first; empty when there is enough."""
+        """Missing views, the most important first; empty if sufficient."""
         return coverage.missing_views(self.views, self.sizes)
 
     def take(self, seen: Seen) -> bool:
-        """Keeps what one shot showed if it adds something, and tells whether it did.
+        """Keeps a shot if it adds information; returns True if kept.
 
-        A shot with a sensor before which the board moved is never kept: the others may have seen it elsewhere.
+        A shot is rejected if the board moved in front of any sensor, because the others may have seen it elsewhere.
         """
         self.latest = {sensor: str(error) for (_, sensor), error in seen.refused.items()}
         moved = any(isinstance(error, MovedError) for error in seen.refused.values())
@@ -52,7 +52,7 @@ class Collector:
         return is_kept
 
     def problem(self) -> str:
-        """Why the kept views are of no use for a calibration; "" if they are."""
+        """Reason why the kept views do not allow a calibration; "" if they do."""
         missing = [sensor for sensor in self.sizes if not any(view.sensor == sensor for view in self.views)]
         try:
             coverage.check(self.views)

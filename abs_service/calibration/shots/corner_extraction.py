@@ -1,4 +1,4 @@
-"""From shots and a board to what a calibration starts from: corners, planes, and why an image was not used."""
+"""Corner and plane extraction from shots, with reasons for rejected images."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,18 +13,18 @@ from calib.board.target import Target
 from calib.camera import Camera
 from calib.views import CornerView, PlaneView
 
-#: How far a board that another sensor saw may be from where prior cameras put it in a sensor without image [px].
+#: Tolerance of the predicted board position in a sensor without image, by prior cameras [px].
 _SLACK_PX = 8.0
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What is known of a board after some shots.
+    """Observations of a board in some shots.
 
     Attributes:
         corners: views of its points.
         planes: distances on it.
-        refused: why a sensor's image of a shot was not used, by (shot, sensor).
+        refused: errors of rejected images, by (shot, sensor).
         sizes: width and height of each sensor's images [px], by sensor name.
     """
 
@@ -43,7 +43,7 @@ class Seen:
 
 
 def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
-    """What all shots show of a board; see `see`."""
+    """Observations of a board in all shots; see `see`."""
     seen = Seen()
     for shot in shots:
         seen += see(target, shot, cameras)
@@ -51,11 +51,11 @@ def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]
 
 
 def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> Seen:
-    """What one shot shows of a board.
+    """Observations of a board in one shot.
 
-    A sensor that makes images is asked for the board's points in them, and one that measures distances for those
-    within. Where a sensor measures distances only, the pose of the board as another sensor sees it, and the `cameras`
-    known so far, say where; without them such a sensor is left out.
+    Corners come from a sensor's image, and distances from within their hull. For a sensor that measures distances only,
+    the region is predicted from the pose of the board in another sensor and the `cameras` known so far; without them
+    such a sensor is left out.
     """
     corners: list[CornerView] = []
     planes: list[PlaneView] = []

@@ -1,4 +1,4 @@
-"""Mean images of what is at rest: a board's corners lie more surely in them than in any single image."""
+"""Mean images of a static scene, in which corners are more accurate than in a single image."""
 
 from typing import Any
 
@@ -8,23 +8,23 @@ from numpy.typing import NDArray
 from abs_service.calibration.shots.shots import OWN_LIGHT, SOUGHT, Look, pixels
 from drivers.contract.frame import Frame, Kind
 
-#: Images whose mean the mean of the others is compared with, to see whether anything moved.
+#: Number of initial images whose mean is compared with the mean of the others to detect motion.
 _FIRST = 5
 
 
 class MeanLooks:
-    """The mean image of every sensor whose frames were added, of the kind in which corners are sought best."""
+    """Mean image of every sensor, of the kind best suited for corner detection."""
 
     def __init__(self) -> None:
         self._means: dict[tuple[str, Kind], _Mean] = {}
 
     def add(self, frame: Frame) -> None:
-        """Takes a frame of any kind; those in which no board can be seen do not count."""
+        """Adds a frame; kinds without a visible board are ignored."""
         if frame.kind in SOUGHT:
             self._means.setdefault((frame.sensor, frame.kind), _Mean()).add(frame)
 
     def looks(self) -> dict[str, Look]:
-        """What each sensor saw on average, by sensor; the image before it is the mean of the first few."""
+        """Mean image of each sensor; `before` is the mean of the first few."""
         found: dict[str, Look] = {}
         for (sensor, kind), mean in sorted(self._means.items(), key=lambda item: -SOUGHT.index(item[0][1])):
             image = mean.image()
@@ -34,7 +34,7 @@ class MeanLooks:
 
 
 class _Mean:
-    """Sums of the first images and of those after them."""
+    """Sums of the first images and of the remaining ones."""
 
     def __init__(self) -> None:
         self.t_ns = 0
@@ -53,18 +53,18 @@ class _Mean:
 
     @property
     def moves_show(self) -> bool:
-        """Whether there are enough images to compare some with others."""
+        """True if there are enough images for motion detection."""
         return self._counts[1] > 0
 
     def first(self) -> NDArray[Any]:
         return self._typed(self._sums[0] / self._counts[0])
 
     def image(self) -> NDArray[Any]:
-        """Of those after the first, if there are any: a board that was put elsewhere then is elsewhere wholly."""
+        """Mean of the images after the first ones, if any: a board that was moved in between is not blurred."""
         part = int(self.moves_show)
         return self._typed(self._sums[part] / self._counts[part])
 
     def _typed(self, mean: NDArray[np.float64]) -> NDArray[Any]:
-        # In the type of the images, so that what saturates can be told.
+        # In the type of the images, so that saturation can be detected.
         whole = self._type.kind in "ui"
         return (np.rint(mean) if whole else mean).astype(self._type)

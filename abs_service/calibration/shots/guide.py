@@ -1,4 +1,4 @@
-"""What somebody who holds a board sees: where each sensor has seen it, and what to do next."""
+"""Interactive guide for the person holding a board: coverage of each sensor, and the next instruction."""
 
 from collections.abc import Sequence
 from typing import Protocol, Self
@@ -17,33 +17,33 @@ from calib.board import coverage
 from calib.board.corners.to_8bit import Image, grey
 from calib.views import CornerView
 
-#: Cells of the map in the terminal, and signs for no points, some, many.
+#: Cells of the map in the terminal, and symbols for no points, some, many.
 _COLUMNS, _ROWS = 12, 7
 _SIGNS = "·░▒▓█"
-#: Wishes that are shown at a time.
+#: Number of instructions shown at a time.
 _SHOWN = 3
-#: How a map is drawn: of points, and of ninths of the image that nobody has seen.
+#: Style of a map: points, and ninths of the image without points.
 _POINT, _UNSEEN = (40, 200, 60), (60, 60, 230)
 
 
 class Guide(Protocol):
-    """Shows how a collection goes on; a context."""
+    """Displays the progress of a collection; a context manager."""
 
     def __enter__(self) -> Self:
-        """Takes the terminal."""
+        """Starts the display."""
         ...
 
     def __exit__(self, *error: object) -> None:
-        """Gives it back."""
+        """Stops the display."""
         ...
 
     def update(self, collector: Collector, is_kept: bool) -> None:
-        """Shows what became of one shot."""
+        """Shows the result of one shot."""
         ...
 
 
 class LiveGuide:
-    """Maps that are drawn anew with every shot, in a terminal."""
+    """Coverage maps in a terminal, redrawn with every shot."""
 
     def __init__(self, console: Console) -> None:
         self._live = Live(console=console, refresh_per_second=6, transient=True)
@@ -63,7 +63,7 @@ class LiveGuide:
 
 
 class LineGuide:
-    """A line for every shot that is kept and for every new reason why none is, for files and pipes."""
+    """One line for every kept shot and for every new reason for rejection, for files and pipes."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -87,7 +87,7 @@ class LineGuide:
 
 
 def draw(collector: Collector) -> RenderableType:
-    """The state of a collection: a map for each sensor, what became of the last shot, what is missing."""
+    """State of a collection: a map for each sensor, the result of the last shot, missing views."""
     maps = [_panel(sensor, size, collector) for sensor, size in collector.sizes.items()]
     missing_views = collector.missing_views
     lines = [Text(f"{collector.kept} shots kept", style="bold")]
@@ -114,7 +114,7 @@ def _panel(sensor: str, size: tuple[int, int], collector: Collector) -> Panel:
 
 
 def coverage_map(image: Image, views: Sequence[CornerView]) -> NDArray[np.uint8]:
-    """An image of a sensor, the points of its views on it; ninths of the image that none was in are red (BGR)."""
+    """Image of a sensor with the points of its views; ninths of the image without points are red (BGR)."""
     levels = (0.4 * grey(image)).astype(np.uint8)
     size = (levels.shape[1], levels.shape[0])
     picture = np.repeat(levels[..., None], 3, axis=2)

@@ -1,4 +1,4 @@
-"""Shots of devices that are running: always the newest, however long the last one took to look at."""
+"""Shots of running devices: always the newest, independent of the processing time."""
 
 import threading
 from collections import deque
@@ -11,29 +11,29 @@ from calib.camera import Camera
 from drivers.contract.device import Device, DeviceState, Truth
 from drivers.contract.frame import Frame, FrameSet
 
-#: Frames that may wait while a shot is looked at; older ones are dropped.
+#: Capacity of the frame queue; the oldest frames are dropped.
 _WAITING = 256
-#: A rig that delivers nothing for so long has failed [s].
+#: Timeout without frames after which a rig has failed [s].
 SILENCE_S = 10.0
 
 
 @dataclass(frozen=True)
 class Wired:
-    """An opened device, and the names in the rig of those of its heads that are wanted."""
+    """Opened device, with the rig names of its selected heads."""
 
     device: Device
     heads: Mapping[str, str]
 
 
 class LiveShots:
-    """Shots of a rig; a context that starts its devices and closes them.
+    """Shots of a rig; a context manager that starts and closes its devices.
 
     Args:
         devices: opened, by name.
         cameras: of every sensor, by its name in the rig.
-        tolerance_ns: largest difference between the stamps of images that show one moment [ns].
+        tolerance_ns: largest time difference between images of one shot [ns].
         clock: CLOCK_MONOTONIC [ns].
-        is_over: whether to end now; asked again and again.
+        is_over: polled; True ends the iteration.
     """
 
     def __init__(
@@ -79,10 +79,10 @@ class LiveShots:
             wired.device.close()
 
     def __iter__(self) -> Iterator[Shot]:
-        """The newest shot whenever one is asked for, until all is over or all devices have come to their end.
+        """Newest shot on every iteration, until `is_over` or the end of all devices.
 
         Raises:
-            ShotsError: a device failed, or nothing comes any more.
+            ShotsError: a device failed, or frames timed out.
         """
         number, last, heard_ns = 0, None, self._clock()
         while not self._is_over():
@@ -93,7 +93,7 @@ class LiveShots:
                 heard_ns = self._clock()
                 pair = [last or sets[0], *sets][-2:]
                 last = pair[1]
-                # The very first set has none before it and would pass for still.
+                # The very first set has no predecessor, so its motion is unknown.
                 if pair[0] is not pair[1]:
                     yield self._assembler.shot(number, pair[1], pair[0])
                     number += 1
@@ -118,7 +118,7 @@ class LiveShots:
 
 
 class _Inbox:
-    """A sink that keeps the newest frames, under the names of the rig."""
+    """Frame sink that keeps the newest frames, under their rig names."""
 
     def __init__(self, heads: Mapping[str, str]) -> None:
         self._heads = heads
@@ -128,7 +128,7 @@ class _Inbox:
         self.reason = ""
 
     def take(self) -> list[Frame]:
-        """Everything that came since."""
+        """Frames since the last call."""
         self._arrived.clear()
         taken = []
         while self._frames:
@@ -136,7 +136,7 @@ class _Inbox:
         return taken
 
     def wait(self, seconds: float) -> None:
-        """Until something comes, at most so long."""
+        """Waits for a frame, with a timeout."""
         self._arrived.wait(seconds)
 
     def on_frame(self, frame: Frame) -> None:

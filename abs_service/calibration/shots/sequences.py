@@ -1,4 +1,4 @@
-"""Depth sequences out of recordings, folders of images and live devices, one for each exposure setting."""
+"""Depth sequences from recordings, image folders and live devices, one per exposure setting."""
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -16,12 +16,12 @@ from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.opening import open_device
 from drivers.replay import Recording
 
-#: How long a live device may take until its first frame, and then between two [s].
+#: Timeouts of a live device for the first frame and between frames [s].
 PATIENCE_S = 20.0
 
 
 class SequenceError(Exception):
-    """A source without a sequence that a sensor's noise could be learnt from; says why."""
+    """Source without a usable sequence; names the reason."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,17 +29,17 @@ class Sequence:
     """Frames of one depth sensor with one exposure setting.
 
     Attributes:
-        name: of the source, for people.
-        sensor: that took them.
+        name: of the source, for display.
+        sensor: name of the sensor.
         camera: its camera.
-        lengths: what it delivered (n, height, width) [m], z or radial; NaN without return.
+        lengths: measurements (n, height, width) [m], z or radial; NaN without return.
         amplitude: (n, height, width); NaN without.
-        claimed: deviation that the sensor itself claims (height, width) [m], on average; NaN without.
-        radial: whether the lengths are radial.
-        digit: smallest difference that they can have [m]; 0 if they are no whole numbers.
-        exposure: the setting, for people; "" if the frames do not tell.
-        filters: that the device says it applied.
-        looks: what this and other sensors saw on average, by sensor, if they make images that can show a board.
+        claimed: mean σ that the sensor reports (height, width) [m]; NaN without.
+        radial: True if the lengths are radial.
+        digit: resolution of the lengths [m]; 0 if they are not integers.
+        exposure: setting, for display; "" if unknown.
+        filters: filters that the device applied.
+        looks: mean images of this and other sensors, by sensor, for board detection.
         cameras: of all sensors, by name.
     """
 
@@ -63,10 +63,10 @@ class Sequence:
 
 
 def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
-    """The same with other cameras of some sensors; those of sensors that it does not have do not count.
+    """Sequence with replaced cameras of some sensors; unknown sensors are ignored.
 
     Raises:
-        SequenceError: the depth sensor's new camera has images of another size.
+        SequenceError: the depth sensor's new camera has another image size.
     """
     known = {name: cameras.get(name, camera) for name, camera in sequence.cameras.items()}
     camera = known[sequence.sensor]
@@ -80,16 +80,16 @@ def with_cameras(sequence: Sequence, cameras: Mapping[str, Camera]) -> Sequence:
 
 
 def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
-    """The sequences of one sensor in a recording of abs-service.
+    """Sequences of one sensor in a recording of abs-service.
 
     Args:
         path: of the file.
         sensor: name; "" for the only depth sensor.
-        most: frames to read at most; the first ones.
+        most: maximum number of frames; the first ones are read.
 
     Raises:
-        SequenceError: there is no such sensor, or none or several without a name.
-        RecordingError: the file is damaged or no recording.
+        SequenceError: unknown sensor, or no name given and not exactly one depth sensor.
+        RecordingError: damaged file, or not a recording.
     """
     recording = Recording(path)
     frames = (item for item in recording.frames() if isinstance(item, Frame))
@@ -97,11 +97,11 @@ def of_recording(path: Path, sensor: str, most: int) -> list[Sequence]:
 
 
 def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> list[Sequence]:
-    """The sequences of one sensor of a live device; arguments and errors as of `of_recording`.
+    """Sequences of one sensor of a live device; arguments and errors as in `of_recording`.
 
     Raises:
         DeviceError: the device cannot be opened.
-        SequenceError: it does not stream.
+        SequenceError: the device does not stream.
     """
     device = open_device(uri, clock)
     try:
@@ -119,7 +119,7 @@ def of_device(uri: str, sensor: str, most: int, clock: Callable[[], int]) -> lis
 def of_frames(
     name: str, frames: Iterable[Frame], cameras: Mapping[str, Camera], sensor: str, most: int
 ) -> list[Sequence]:
-    """Sorts frames into sequences, one for every exposure setting; arguments and errors as of `of_recording`."""
+    """Groups frames into sequences by exposure setting; arguments and errors as in `of_recording`."""
     gathered: dict[str, _Gathered] = {}
     others = MeanLooks()
     chosen = sensor
@@ -145,7 +145,7 @@ def of_frames(
 
 @dataclass(eq=False)
 class _Gathered:
-    """Frames of one exposure setting, by number of the exposure."""
+    """Frames of one exposure setting, by sequence number."""
 
     depth: dict[tuple[int, int], Frame] = field(default_factory=dict)
     amplitude: dict[tuple[int, int], Frame] = field(default_factory=dict)
@@ -153,7 +153,7 @@ class _Gathered:
     looks: MeanLooks = field(default_factory=MeanLooks)
 
     def add(self, frame: Frame) -> None:
-        """Takes a frame, whatever it is of."""
+        """Adds a frame of any kind."""
         places = {Kind.DEPTH: self.depth, Kind.AMPLITUDE: self.amplitude, Kind.DEVIATION: self.claimed}
         places.get(frame.kind, {})[frame.epoch, frame.seq] = frame
         self.looks.add(frame)
@@ -161,7 +161,7 @@ class _Gathered:
     def sequence(
         self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, Look], most: int
     ) -> Sequence:
-        """The sequence of the first so many depth images; without amplitudes if one of them has none."""
+        """Sequence of the first depth images; without amplitudes if one of them has none."""
         numbers = list(self.depth)[:most]
         first = self.depth[numbers[0]]
         lengths = np.stack([self.depth[number].si() for number in numbers])
@@ -191,7 +191,7 @@ class _Gathered:
 
 
 class _Collected:
-    """A sink that keeps so many frames."""
+    """Frame sink with a maximum number of frames."""
 
     def __init__(self, most: int) -> None:
         self.frames: list[Frame] = []
@@ -213,14 +213,14 @@ class _Collected:
         pass
 
     def wait(self) -> None:
-        """Until there are enough frames, or no more come."""
+        """Waits for the maximum number of frames, or a timeout."""
         for _ in range(self._most):
             if not self._more.acquire(timeout=PATIENCE_S):
                 return
 
 
 def _setting(frame: Frame) -> str:
-    """Exposure settings that amplitudes can be compared within."""
+    """Exposure settings within which amplitudes are comparable."""
     exposure = f"{frame.exposure_s * 1e3:.3g} ms" if np.isfinite(frame.exposure_s) else ""
     gain = f"gain {frame.gain:.3g}" if np.isfinite(frame.gain) else ""
     return ", ".join(part for part in (exposure, gain, frame.modulation) if part)

@@ -1,4 +1,4 @@
-"""Writes shots as a recording, which all commands that read recordings read."""
+"""Recording of shots in the format of all recordings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,15 +14,15 @@ from drivers.encoding.mcap_file import McapFile
 
 
 class ShotFileError(Exception):
-    """A recording of shots that cannot be written; names the file."""
+    """Recording of shots that cannot be written; names the file."""
 
 
 class ShotRecording:
-    """A recording that grows by the frames of one shot after another, and of the set before each.
+    """Recording of the frames of shots, each with the preceding frame set.
 
     Args:
         path: file to write; must not exist.
-        headers: writes the headers.
+        headers: creates message headers.
         cameras: of all sensors, by name.
         rig_toml: configuration to attach.
 
@@ -45,10 +45,10 @@ class ShotRecording:
         self._write_cameras(cameras, now_ns)
 
     def write(self, shot: Shot) -> None:
-        """Adds a shot, and makes sure that it is on disk.
+        """Appends a shot and flushes it to disk.
 
         Raises:
-            ShotFileError: the disk is full, or gone.
+            ShotFileError: the disk is full or unavailable.
         """
         try:
             for frame in sorted(shot.frames, key=lambda frame: frame.t_host_ns):
@@ -61,7 +61,7 @@ class ShotRecording:
         """Closes the file.
 
         Raises:
-            ShotFileError: the disk is full, or gone.
+            ShotFileError: the disk is full or unavailable.
         """
         try:
             self._file.finish()

@@ -1,4 +1,4 @@
-"""Where shots come from offline: recordings, and folders of images."""
+"""Offline sources of shots: recordings and image folders."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -13,19 +13,19 @@ from drivers.contract.frame import Frame, FrameSet
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_number
 from drivers.replay.recording import Recording
 
-#: Largest difference between the stamps of images that show one moment [ns].
+#: Largest time difference between images of one shot [ns].
 TOLERANCE_NS = 12_000_000
 
 
 @dataclass(frozen=True)
 class RecordingShots:
-    """The shots of a recording.
+    """Shots of a recording.
 
     Attributes:
         recording: the file.
-        every_s: least time between two shots [s].
-        tolerance_ns: largest difference between the stamps of images that show one moment [ns].
-        cameras: cameras in place of those that the recording names, by sensor name.
+        every_s: minimum interval between shots [s].
+        tolerance_ns: largest time difference between images of one shot [ns].
+        cameras: replacements for the recording's cameras, by sensor name.
     """
 
     recording: Recording
@@ -34,11 +34,11 @@ class RecordingShots:
     cameras: Mapping[str, Camera] | None = None
 
     def __iter__(self) -> Iterator[Shot]:
-        """Reads the recording through.
+        """Iterates over the recording.
 
         Raises:
-            ShotsError: it holds no image in which corners or planes can be sought.
-            RecordingError: a part of it is damaged.
+            ShotsError: no image that can show corners or planes.
+            RecordingError: a part of the file is damaged.
         """
         return thinned(self._sets(), Assembler(self.cameras or self.recording.cameras), self.every_s)
 
@@ -47,7 +47,7 @@ class RecordingShots:
         used = [key for key, kind in kinds.items() if kind in USED]
         if not used:
             raise ShotsError(f"{self.recording.path}: no image in it shows a board: {', '.join(map('/'.join, kinds))}")
-        # The slowest stream decides how many moments there are.
+        # The slowest stream determines the number of shots.
         reference = min(used, key=lambda key: self.recording.counts[key])
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
         for item in self.recording.frames():
@@ -67,19 +67,19 @@ class RecordingShots:
 
 @dataclass(frozen=True)
 class FolderShots:
-    """The shots of folders of images: files with the same last number in their names show the same moment.
+    """Shots of image folders: files with the same last number in their names belong to one shot.
 
     Attributes:
-        patterns: where each sensor's images are, by sensor name: a path whose last part may hold wildcards.
+        patterns: path of each sensor's images, by sensor name; the last part may hold wildcards.
     """
 
     patterns: Mapping[str, str]
 
     def __iter__(self) -> Iterator[Shot]:
-        """Reads image after image.
+        """Iterates over the images.
 
         Raises:
-            ShotsError: no file matches, one has no number or is no image; names it.
+            ShotsError: no file matches, or a file has no number or is no image; names it.
         """
         files = {sensor: self._files(sensor, pattern) for sensor, pattern in self.patterns.items()}
         for number in sorted({seq for numbered in files.values() for seq in numbered}):
@@ -94,7 +94,7 @@ class FolderShots:
 
 
 def _look(file: ImageFile) -> Look:
-    # As the sensor made it: other flags would turn it by what a phone's compass says.
+    # Without EXIF rotation: the image is used as the sensor delivered it.
     image = cv2.imread(str(file.path), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise ShotsError(f"{file.path}: this is no image that can be read")

@@ -1,4 +1,4 @@
-"""Shots: what the sensors of a rig saw at one moment, wherever the images come from."""
+"""Shots: synchronous observations by the sensors of a rig, from any source."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,15 +13,15 @@ from drivers.contract.frame import ENCODINGS, Frame, FrameSet, Geometry, Kind
 
 Array = NDArray[np.integer | np.floating]
 
-#: Which image of a sensor corners are sought in, the best first.
+#: Kinds of images for corner detection, the best first.
 SOUGHT = (Kind.COLOR, Kind.BAYER, Kind.AMPLITUDE, Kind.IR, Kind.INTENSITY)
-#: What a shot is made of besides.
+#: Further kinds of frames in a shot.
 USED = frozenset({*SOUGHT, Kind.DEPTH, Kind.DEVIATION})
 
-#: Images of the sensor's own light: where it is saturated, distances are wrong.
+#: Images of active illumination, whose saturation invalidates distances.
 OWN_LIGHT = frozenset({Kind.AMPLITUDE, Kind.IR})
 
-#: What changed within this time moved; what changed in a longer time may have been moved and held still again [ns].
+#: Maximum interval for motion detection; over longer intervals the board may have moved and stopped again [ns].
 _CLOSE_NS = 250_000_000
 
 _GREY_OF_BAYER = {
@@ -31,26 +31,26 @@ _GREY_OF_BAYER = {
     "bayer_grbg8": cv2.COLOR_BayerGRBG2GRAY,
 }
 
-#: Stands for an image that a sensor does not make.
+#: Placeholder for a missing image.
 NO_IMAGE: Array = np.zeros((0, 0), np.uint8)
 NO_DISTANCE: NDArray[np.float32] = np.zeros((0, 0), np.float32)
 
 
 class ShotsError(Exception):
-    """Images that a calibration cannot use; the message names where they come from."""
+    """Images that a calibration cannot use; the message names their source."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """What one sensor saw at one moment.
+    """Observation of one sensor in a shot.
 
     Attributes:
-        t_ns: time of its exposure [ns]; of a rig all count from the same moment.
-        image: in which corners are sought, (height, width) or (height, width, 3); `NO_IMAGE` if there is none.
-        before: the image before it, the same one if there was none; tells whether anything moves.
-        own_light: whether the image is of the sensor's own light.
+        t_ns: time of its exposure [ns]; all sensors of a rig have the same origin.
+        image: for corner detection, (height, width) or (height, width, 3); `NO_IMAGE` if there is none.
+        before: the previous image, or the same one without any; for motion detection.
+        own_light: True if the image is of the sensor's own illumination.
         distance: radial distances (height, width) [m], NaN without return; `NO_DISTANCE` if it measures none.
-        sigma: what the sensor says that they scatter by (height, width) [m], NaN where it does not.
+        sigma: σ reported by the sensor (height, width) [m], NaN where it reports none.
     """
 
     t_ns: int
@@ -63,12 +63,12 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shot:
-    """One moment.
+    """Observations of all sensors at one time.
 
     Attributes:
-        number: of the moment.
-        looks: what each sensor saw, by sensor name; a sensor that saw nothing is missing.
-        frames: what it was made of, with those shortly before that tell what moved; empty if it was made of files.
+        number: of the shot.
+        looks: observation of each sensor, by sensor name; sensors without one are missing.
+        frames: its frames, and preceding ones for motion detection; empty for image files.
     """
 
     number: int
@@ -82,10 +82,10 @@ class Shot:
 
 
 class Assembler:
-    """Makes shots of sets of frames.
+    """Converts frame sets to shots.
 
     Args:
-        cameras: the camera that each sensor's frames are said to come from; turns z into radial distances.
+        cameras: camera of each sensor, for the conversion of z to radial distances.
     """
 
     def __init__(self, cameras: Mapping[str, Camera]) -> None:
@@ -93,10 +93,10 @@ class Assembler:
         self._stretch: dict[str, NDArray[np.float32]] = {}
 
     def shot(self, number: int, frames: FrameSet, before: FrameSet) -> Shot:
-        """The shot of a set of frames.
+        """Shot of a frame set.
 
         Raises:
-            ShotsError: a depth image does not fit its sensor's camera.
+            ShotsError: the size of a depth image differs from its camera's.
         """
         sensors = dict.fromkeys(sensor for sensor, _ in frames.frames)
         looks = {sensor: self._look(sensor, frames, before) for sensor in sensors}
@@ -135,10 +135,10 @@ class Assembler:
 
 
 def thinned(sets: Iterable[FrameSet], assembler: Assembler, every_s: float) -> Iterator[Shot]:
-    """Shots of sets of frames, at least `every_s` apart; the set before each tells what moved.
+    """Shots from frame sets, at least `every_s` apart; the preceding set is used for motion detection.
 
-    A set that has none shortly before it is left out if it has one shortly after it: that one will tell. A set on its
-    own is taken for still.
+    A set without a close predecessor is skipped if it has a close successor, whose motion is known. An isolated set is
+    assumed static.
 
     Raises:
         ShotsError: as `Assembler.shot`.
@@ -168,7 +168,7 @@ def _by_kind(sensor: str, frames: FrameSet) -> dict[Kind, Frame]:
 
 
 def pixels(frame: Frame) -> Array:
-    """The image of a frame as numbers that a board is sought in; a mosaic of colours becomes grey."""
+    """Image of a frame for board detection; a Bayer mosaic becomes grey."""
     if frame.kind == Kind.BAYER:
         return cv2.cvtColor(np.ascontiguousarray(frame.data, np.uint8), _GREY_OF_BAYER[frame.encoding])
     return frame.data.view(ENCODINGS[frame.encoding][0].type)

@@ -1,6 +1,6 @@
-"""Where the sensors of a rig are, how they project and how they err: print a board, show it to them, solve."""
+"""Calibration commands: print a board, capture views, solve intrinsics and extrinsics, fit noise models, verify."""
 
-#: One line of help for each command; kept here so that `--help` imports none of them.
+#: One line of help for each command, here so that `--help` imports none of them.
 COMMANDS = {
     "target": "a board to print, true to scale, and its description",
     "capture": "show a board to the sensors: what they have seen, and what is missing",

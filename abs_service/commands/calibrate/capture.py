@@ -1,4 +1,4 @@
-"""Shows a board to the sensors of a rig, and keeps the views that a calibration needs.
+"""Collects views of a board from the sensors of a rig for a calibration.
 
   abs-service calibrate capture rig.toml --target target.toml --out board.mcap
   abs-service calibrate capture rig.toml --target target.toml --out board.mcap --limit-s 120 --json
@@ -39,7 +39,7 @@ from calib.board.target import Target
 from calib.camera import Camera
 from drivers.opening import open_device
 
-#: Least time between two kept shots [ns]; nobody changes a pose faster, and recordings are read at this pace.
+#: Minimum interval between kept shots [ns]; recordings are sampled at the same rate.
 PAUSE_NS = 600_000_000
 
 
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Collects views until there are enough."""
+    """Collects views until they are sufficient."""
     rig = rig_process.load_config(arguments)
     target = target_file.read(arguments.target)
     stop = rig_process.stop_on_signals()
@@ -81,11 +81,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def opened(rig: config.ServiceConfig, path: Path) -> Iterator[tuple[dict[str, Wired], dict[str, Camera]]]:
-    """The devices of a rig file, opened and set as it says, and the camera of every sensor; closes them afterwards.
+    """Opens and configures the devices of a rig file; yields them with their cameras, and closes them afterwards.
 
     Raises:
         DeviceError: one cannot be opened.
-        SettingError, HeadError: the file names a control or a head that a device does not have.
+        SettingError, HeadError: the file names a control or a head that a device lacks.
     """
     devices: dict[str, Wired] = {}
     cameras: dict[str, Camera] = {}
@@ -123,7 +123,7 @@ def _collect(
 
 
 def _sizes(devices: Mapping[str, Wired]) -> dict[str, tuple[int, int]]:
-    """Width and height of the images in which corners are sought, by the names of the rig [px]."""
+    """Width and height of the images for corner detection, by rig name [px]."""
     return {
         wired.heads[stream.sensor]: (stream.width, stream.height)
         for wired in devices.values()

@@ -36,13 +36,13 @@ class ConvertError(Exception):
 
 @dataclass(frozen=True)
 class Options:
-    """What the command line asks for.
+    """Command-line options.
 
     Attributes:
-        source, target: formats; None if they are to be told from the files.
-        sensors: the ones to write, by their new names; all if empty.
+        source, target: formats; None to detect them from the files.
+        sensors: sensors to write, by their new names; all if empty.
         names: new names by old ones.
-        hints: what the input leaves open; `hints.size` is also what cameras of another size are resized to.
+        hints: values that the input omits; `hints.size` is also the size to convert cameras to.
     """
 
     source: str | None
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Converts, and says what was lost."""
+    """Converts, and reports losses."""
     out = arguments.out
     if out.exists():
         raise ConvertError(f"{out}: exists already; choose another name or remove it")
@@ -103,7 +103,7 @@ def _read(path: Path, options: Options) -> Content:
 
 
 def _own(path: Path) -> Content:
-    """Our own file, of which only the cameras go on."""
+    """Cameras of our own file."""
     known = calibrations.load(path)
     lost = ["the covariances"] if known.covariance.names else []
     for name, sensor in known.sensors.items():
@@ -119,7 +119,7 @@ def _own(path: Path) -> Content:
 
 
 def _chosen(contents: list[Content], options: Options) -> Content:
-    """The wanted cameras of all files under their new names and in the wanted size."""
+    """Selected cameras of all files under their new names and in the requested size."""
     cameras: dict[str, Camera] = {}
     lost: list[str] = []
     for content in contents:
@@ -142,7 +142,7 @@ def _chosen(contents: list[Content], options: Options) -> Content:
 
 
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Writes the file; returns what it has no place for."""
+    """Writes the file; returns what was lost."""
     if target == exchange.OWN:
         origin = provenance.trace(_said(arguments), arguments.inputs)
         sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}
@@ -158,7 +158,7 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
 
 
 def _said(arguments: argparse.Namespace) -> list[str]:
-    """The command line, as far as it matters for what is written."""
+    """Command line without options that do not affect the result."""
     options = [("--from", arguments.source), ("--size", arguments.size)]
     options += [("--unit-m", str(arguments.unit_m))] if arguments.unit_m != 1 else []
     options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]

@@ -1,4 +1,4 @@
-"""The running devices of a rig file as a source of views of a board, where a recording would do as well."""
+"""Live devices of a rig file as a source of views, as an alternative to a recording."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -14,7 +14,7 @@ from calib.camera import Camera
 
 
 def is_live(source: Path | None) -> bool:
-    """Whether a source is a rig whose devices are to be looked through, and no recording."""
+    """True if a source is a rig with live devices, false for a recording."""
     return source is not None and source.suffix == ".toml"
 
 
@@ -22,17 +22,17 @@ def is_live(source: Path | None) -> bool:
 def streaming(
     path: Path, cameras: Mapping[str, Camera], is_over: Callable[[], bool] = lambda: False
 ) -> Iterator[tuple[LiveShots, Mapping[str, Camera]]]:
-    """Shots of the devices that a rig file describes, while they stream, and the camera of each of its sensors.
+    """Shots of the devices of a rig file while they stream, and the camera of each sensor.
 
     Args:
         path: of the rig file.
-        cameras: cameras in place of those that the devices and the rig file tell, by sensor name.
-        is_over: whether to end now; asked again and again.
+        cameras: replacements for the cameras of devices and rig file, by sensor name.
+        is_over: polled; True ends the iteration.
 
     Raises:
-        ConfigError: the rig file cannot be used.
+        ConfigError: invalid rig file.
         DeviceError, HeadError, SettingError: a device cannot be opened, or lacks a head or a control.
-        ShotsError: no sensor makes images in which a board can be seen.
+        ShotsError: no sensor has images that can show a board.
     """
     rig = config.load(path)
     with opened(rig, path) as (devices, given):
@@ -43,10 +43,10 @@ def streaming(
 
 
 def adds(new: Seen, seen: Seen) -> bool:
-    """Whether a shot shows some sensor a view that is unlike all before: a board that is held says nothing twice."""
+    """True if a shot adds a view unlike all previous ones for some sensor; repeated views add no information."""
     return any(coverage.adds_information(view, seen.corners, new.sizes[view.sensor]) for view in new.corners)
 
 
 def views(seen: Seen) -> int:
-    """Number of shots that showed the board to some sensor."""
+    """Number of shots with a view of some sensor."""
     return len({view.shot for view in seen.corners})

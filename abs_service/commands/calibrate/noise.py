@@ -1,4 +1,4 @@
-"""Learns the noise of a depth sensor from recordings of things at rest, and writes it as a table for the rig file.
+"""Fits a noise model of a depth sensor to recordings of static scenes, and writes it as a table for the rig file.
 
   abs-service calibrate noise white.mcap grey.mcap dark.mcap --distance-m 1.2    a flat target, 1.2 m away
   abs-service calibrate noise d*.mcap --distance-m 0.8 0.8 1.2 1.2 1.6 1.6       a distance for each recording
@@ -48,15 +48,15 @@ from drivers.contract.frame import Geometry
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 
-#: Seed of what is random: the same recordings give the same model.
+#: Seed of the random generator, for reproducible models.
 SEED = 0
 
-#: Metres per unit of the depth images of a folder whose camera file does not tell.
+#: Metres per unit of the depth images of a folder whose camera file has no unit.
 DEPTH_SCALE = 0.001
 
 
 class NoiseOptionError(Exception):
-    """Options that do not go together."""
+    """Incompatible options."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -81,7 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Reads the sources, learns, writes and says what was found."""
+    """Reads the sources, fits, writes and reports."""
     console = Console(stderr=True)
     with console.status("reading"):
         groups = _groups(arguments)
@@ -110,7 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Sequence, float | Placed]]]:
-    """The sequences of all sources by their exposure setting, each with where its target is."""
+    """Sequences of all sources by exposure setting, each with its target."""
     depths = _depths(arguments.distance_m, len(arguments.sources))
     if arguments.target is not None and not math.isnan(depths[0]):
         raise NoiseOptionError("--target, --distance-m: give only one of them; a board tells its own distance")
@@ -174,7 +174,7 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
 
 
 def _write_model(found: measurement.Found, sensor: str, out: Path) -> list[Path]:
-    """The table for the rig file, and the maps that it names."""
+    """Writes the table for the rig file, and its maps."""
     toml, written, model = out.with_suffix(".toml"), [], found.model
     try:
         if isinstance(model, PerPixel):
@@ -192,9 +192,9 @@ def _write_model(found: measurement.Found, sensor: str, out: Path) -> list[Path]
 
 
 def _out(given: Path | None, sensor: str, number: int) -> Path:
-    """Where to write: a name without suffix, numbered from the second exposure setting on."""
+    """Output path without suffix, numbered from the second exposure setting on."""
     out = given or Path(f"noise-{sensor}")
-    # A suffix is added, never put in the place of what looks like one: noise-1.2 is a name.
+    # The suffix is appended and never replaced: noise-1.2 is a name.
     name = f"{out.name}-{number + 1}" if number else out.name
     return out.with_name(f"{name}.x")
 
@@ -211,7 +211,7 @@ def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> 
 
 
 def _said(arguments: argparse.Namespace) -> list[str]:
-    """The command line that these arguments are."""
+    """Command line of these arguments."""
     said = list(arguments.sources)
     if not math.isnan(arguments.distance_m[0]):
         said += ["--distance-m", *(f"{depth:g}" for depth in arguments.distance_m)]

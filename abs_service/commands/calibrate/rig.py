@@ -1,4 +1,4 @@
-"""Calibrates a whole rig in one solve: cameras, where they stand to each other, and what depth sensors measure.
+"""Calibrates a whole rig by bundle adjustment: intrinsics, extrinsics, and errors of depth sensors.
 
   abs-service calibrate rig take.mcap --target target.toml --out lab.calibration.toml
   abs-service calibrate rig take.mcap --target target.toml --keep tof --depth-terms tof=offset --out l.toml
@@ -23,7 +23,7 @@ from abs_service.commands.calibrate.solving import Material, SolveOptionError
 from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
-#: What `--depth-terms` may say.
+#: Values of `--depth-terms`.
 TERMS = {"offset": ("depth_offset",), "scale": ("depth_scale",), "both": ("depth_offset", "depth_scale")}
 
 
@@ -83,7 +83,7 @@ def _check_names(option: str, names: Iterable[str], there: list[str]) -> None:
 
 
 def _reference(found: Material, there: list[str], free_running: list[str]) -> str:
-    """The first depth sensor, as in the built-in rigs, or else the first sensor; one whose clock counts."""
+    """The first depth sensor, as in the built-in rigs, or else the first sensor; free-running ones are excluded."""
     measured = [view.sensor for view in found.seen.planes]
     able = [name for name in there if name not in free_running]
     if not able:

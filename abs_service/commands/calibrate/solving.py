@@ -1,4 +1,4 @@
-"""What `calibrate intrinsics` and `calibrate rig` share: sources, options, and everything after the solve."""
+"""Common parts of `calibrate intrinsics` and `calibrate rig`: sources, options, and everything after the solve."""
 
 import argparse
 import itertools
@@ -39,12 +39,12 @@ class SolveOptionError(ValueError):
 
 @dataclass(frozen=True)
 class Material:
-    """What a calibration starts from.
+    """Input of a calibration.
 
     Attributes:
-        seen: boards.
-        known: what was known of the sensors before, by name.
-        data: files that the images come from.
+        seen: observations of boards.
+        known: previous calibration, by sensor.
+        data: image files.
     """
 
     seen: Seen
@@ -53,7 +53,7 @@ class Material:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Adds the arguments that both commands have."""
+    """Adds the common arguments."""
     parser.add_argument(
         "source", metavar="SOURCE", nargs="?", type=Path, help="recording (.mcap), or rig (.toml): live"
     )
@@ -82,12 +82,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def material(arguments: argparse.Namespace) -> Material:
-    """Looks for the board in all images, and tells the terminal how it goes.
+    """Detects the board in all images, with progress on the terminal.
 
     Raises:
-        SolveOptionError: options that do not go together.
+        SolveOptionError: incompatible options.
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
-        TooFewViewsError, ViewsAlikeError: views of which no calibration can be made.
+        TooFewViewsError, ViewsAlikeError: insufficient views.
     """
     if arguments.out.exists():
         raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
@@ -115,7 +115,7 @@ def material(arguments: argparse.Namespace) -> Material:
 def _shots(
     arguments: argparse.Namespace, cameras: Mapping[str, Camera], stack: ExitStack
 ) -> tuple[Iterable[Shot], Mapping[str, Camera], tuple[Path, ...]]:
-    """Shots, cameras known, and files they come from."""
+    """Shots, known cameras, and source files."""
     if arguments.images:
         patterns = named(arguments.images, "--images")
         folders = dict.fromkeys(Path(pattern).parent for pattern in patterns.values())
@@ -129,10 +129,10 @@ def _shots(
 
 
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
-    """The task of one sensor, from its size, what is known of it and the options.
+    """Task of one sensor, from its image size, previous calibration and options.
 
     Raises:
-        SolveOptionError: intrinsics to keep that nobody knows, or no such kind of lens.
+        SolveOptionError: fixed intrinsics that are unknown, or no such kind of lens.
     """
     size = found.seen.sizes[name]
     factory = (replace(found.known[name].camera),) if name in found.known else ()
@@ -141,14 +141,14 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     if kind not in KINDS:
         raise SolveOptionError(f"--lens {name}={kind}: {allowed_instead(kind, KINDS)}")
     if factory and name in lenses and kind_of(factory[0].lens).make is not KINDS[kind].make and not keeps:
-        factory = ()  # of another family: nothing to start from
+        factory = ()  # of another lens family: no initial values
     if keeps and not factory:
         raise SolveOptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
     return SensorTask(*size, KINDS[kind], factory, keeps, **terms)  # pyright: ignore[reportArgumentType]
 
 
 def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
-    """Solves, cross-validates, writes calibration and report, and says what to think of it."""
+    """Solves, cross-validates, writes calibration and report, and prints the verdict."""
     solution = calibrate(task, say)
     distance = arguments.distance or _usual(solution.task.reference, solution)
     assessment = assess(solution, distance, arguments.needed, say)
@@ -170,7 +170,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
 
 
 def _usual(reference: str, solution) -> float:
-    """The distance in the middle of where the boards were, from the reference."""
+    """Middle of the boards' range of distances from the reference."""
     from calib.solve.validation.projection_uncertainty import reach  # noqa: PLC0415
 
     return round(math.fsum(reach(solution, reference)) / 2, 2)
@@ -192,5 +192,5 @@ def named(options: Iterable[str], option: str) -> dict[str, str]:
 
 
 def say(text: str) -> None:
-    """Tells the user how it goes."""
+    """Prints a progress message."""
     print(f"  {text}", file=sys.stderr)

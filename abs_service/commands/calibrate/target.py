@@ -26,7 +26,7 @@ from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, 
 #: Papers by name: width and height, upright [m].
 PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}
 
-#: What is printed if no lengths are given; all fit on A4 and on letter.
+#: Default lengths; all fit on A4 and on letter.
 DEFAULTS: dict[str, Target] = {
     "charuco": Charuco(9, 6, 0.028, 0.021, "5x5_100"),
     "chessboard": Chessboard(8, 5, 0.028),
@@ -34,7 +34,7 @@ DEFAULTS: dict[str, Target] = {
     "asymmetric_circles": AsymmetricCircles(5, 11, 0.016, 0.012),
 }
 
-#: Arguments that are about the board, with what they mean.
+#: Arguments of the board, with their meaning.
 _BOARD = {
     "columns": "inner corners, squares (charuco) or discs along the longer side",
     "rows": "along the shorter side",
@@ -46,7 +46,7 @@ _BOARD = {
 
 
 class TargetOptionError(ValueError):
-    """Options that describe no board, or one that does not fit on the paper."""
+    """Invalid options for a board, or one that does not fit on the paper."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,7 +102,7 @@ def _target(arguments: argparse.Namespace) -> Target:
         if name not in allowed:
             raise TargetOptionError(f"--{_option(name)} = {value}: means nothing for {arguments.kind}")
     changed = {name: value * 1e-3 if isinstance(value, float) else value for name, value in given.items()}
-    # Markers and discs follow their squares and spacing unless they are given themselves.
+    # Markers and discs scale with squares and spacing unless given explicitly.
     for part, whole in (("marker", "square"), ("diameter", "spacing")):
         if whole in changed and part in allowed and part not in changed:
             changed[part] = changed[whole] * getattr(default, part) / getattr(default, whole)

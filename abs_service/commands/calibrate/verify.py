@@ -1,4 +1,4 @@
-"""Looks whether a stored calibration still holds, in new views of a board, and which sensor has moved if not.
+"""Verifies a stored calibration with new views of a board, and identifies a sensor that has moved.
 
   abs-service calibrate verify rig.toml recordings/board.mcap --target board.toml
   abs-service calibrate verify lab.calibration.toml rig.toml --target board.toml            live, 15 different views
@@ -34,7 +34,7 @@ from drivers.replay import Recording
 
 
 class VerifyOptionError(Exception):
-    """Options that do not fit together."""
+    """Incompatible options."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) -> tuple[Seen, list[Path]]:
-    """What the sensors saw of the board, and the files that it comes from."""
+    """Observations of the board, and their source files."""
     if (arguments.source is None) == (not arguments.images):
         raise VerifyOptionError("give either a recording or a rig as SOURCE, or --images NAME=GLOB for each sensor")
     cameras = {name: sensor.camera for name, sensor in known.sensors.items()}
@@ -90,7 +90,7 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
 
 
 def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
-    """What all shots show; tells on standard error how it goes."""
+    """Observations in all shots, with progress on standard error."""
     seen = Seen()
     for number, shot in enumerate(shots, start=1):
         seen += see(target, _of(cameras, shot), cameras)
@@ -100,7 +100,7 @@ def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera
 
 
 def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> Seen:
-    """What shots of running devices show that differ, until there are enough of them or a signal says to stop."""
+    """Observations in distinct shots of running devices, until sufficient or interrupted by a signal."""
     if arguments.shots < 1:
         raise VerifyOptionError(f"--shots {arguments.shots}: must be 1 at least")
     stop = rig_process.stop_on_signals()
@@ -124,7 +124,7 @@ def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[st
 
 
 def _of(cameras: Mapping[str, Camera], shot: Shot) -> Shot:
-    """A shot without the sensors that the calibration does not know."""
+    """Shot without the sensors that the calibration does not contain."""
     return Shot(shot.number, {name: look for name, look in shot.looks.items() if name in cameras})
 
 
