@@ -1,4 +1,4 @@
-"""Sequences whose truth is known, and what a tracker makes of them, offline and without a clock."""
+"""Simulated sequences with known truth, tracked offline and without a clock."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -24,20 +24,20 @@ from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation
 from evaluation.scenes.exposure import LabeledExposure
 
-#: Euclidean fitness counts distances that differ by more like this much [m]. The published one has no such bound; this
-#: one is above all errors here, and keeps a search that has lost the object finite.
+#: The Euclidean fitness clamps differences of distances to this value [m]. The published fitness has no bound; this one
+#: is above all errors here, and keeps the cost finite when the object is lost.
 CUTOFF_M = 0.1
 
-#: The exposure from which on simulated sheets move: until then they rest where the mesh is made.
-MOVING = 40
+#: First exposure in which simulated sheets move; before, they rest in their initial pose.
+FIRST_MOVING = 40
 
 
 class UntrackedError(RuntimeError):
-    """A sequence that does not begin with an object in sight, or whose truth is not known."""
+    """No object is detected in the first exposure of a sequence, or its truth is unknown."""
 
 
 def expose(simulation: Simulation, indices: Iterable[int]) -> list[LabeledExposure]:
-    """Takes exposures of a simulated device."""
+    """Exposures of a simulated device at the given indices, with their truth."""
     exposures = []
     for k in indices:
         frames, truth = simulation.expose(k)
@@ -46,9 +46,9 @@ def expose(simulation: Simulation, indices: Iterable[int]) -> list[LabeledExposu
     return exposures
 
 
-def moving_indices(frames: int, every: int) -> list[int]:
-    """Exposures of a simulated sheet: the first, in which nothing moves, and then `frames`, one in `every`."""
-    return [0, *range(MOVING, MOVING + every * frames, every)]
+def moving_indices(frames: int, stride: int) -> list[int]:
+    """Indices of exposures of a simulated sheet: 0, at rest, then `frames` of its motion at intervals of `stride`."""
+    return [0, *range(FIRST_MOVING, FIRST_MOVING + stride * frames, stride)]
 
 
 def simulate(address: str) -> Simulation:
@@ -57,7 +57,7 @@ def simulate(address: str) -> Simulation:
 
 
 def demo_rig(simulation: Simulation) -> Rig:
-    """The built-in rig around a simulation's cameras, with the sensors that the simulation has."""
+    """The demo rig with the cameras of a simulation; sensors that the simulation lacks are left out."""
     settings = config.load_default()
     cameras = {name: head.camera for name, head in simulation.heads.items()}
     rig = wiring.rig(settings, next(iter(settings.trackers)), cameras)
@@ -65,26 +65,27 @@ def demo_rig(simulation: Simulation) -> Rig:
 
 
 def with_noise(rig: Rig, sensor: str, noise: Noise) -> Rig:
-    """A rig that believes another noise model of one of its sensors."""
+    """The rig with another noise model of one sensor."""
     return replace(rig, sensors={**rig.sensors, sensor: replace(rig.sensors[sensor], noise=noise)})
 
 
-def demo_plan(model: ModelSettings, **changes: object) -> Plan:
-    """The built-in rig's tracker with another model, and other parts exchanged."""
+def demo_plan(model: ModelSettings | None = None, **changes: object) -> Plan:
+    """Plan of the demo rig's tracker with another model, if one is given, and other parts replaced."""
     settings = config.load_default()
-    return replace(wiring.plan(settings, next(iter(settings.trackers))), model=model, **changes)
+    plan = wiring.plan(settings, next(iter(settings.trackers)))
+    return replace(plan, model=plan.model if model is None else model, **changes)
 
 
 @dataclass(frozen=True, eq=False)
 class TrackedSequence:
-    """What a tracker made of a sequence.
+    """Result of tracking a sequence.
 
     Attributes:
-        models: that every estimate's parameters are those of; another one where a lost object was found again.
-        estimates: of every exposure.
-        errors: of every estimate.
-        material: where the vertices' own material points (n, 3) really were [m], of every exposure.
-        cpu_ms: processor time of every exposure [ms].
+        models: of the estimates; it changes when a lost object is detected again.
+        estimates: of all exposures.
+        errors: of all estimates.
+        material: true positions of the vertices' material points (n, 3) [m], of all exposures.
+        cpu_ms: CPU time of all exposures [ms].
     """
 
     models: Sequence[DeformationModel]
@@ -110,7 +111,7 @@ class TrackedSequence:
 
     @property
     def relocations(self) -> int:
-        """How often a lost object was found again: its vertices are then compared with other material points."""
+        """Number of times a lost object was detected again; its vertices then have other material points."""
         return sum(one is not other for one, other in pairwise(self.models))
 
     @property
@@ -125,12 +126,12 @@ class TrackedSequence:
 
     @property
     def median_ms(self) -> float:
-        """Processor time of a exposure [ms], median; the first one, which may take longer, is left out."""
+        """Median CPU time of an exposure [ms], without the first, which includes initial detection."""
         return float(np.median(self.cpu_ms[1:]))
 
     @property
     def evaluations(self) -> float:
-        """Mean number of candidates a exposure; the first one is left out."""
+        """Mean number of candidates per exposure, without the first."""
         return float(np.mean([estimate.evaluations for estimate in self.estimates[1:]]))
 
     @property
@@ -140,10 +141,10 @@ class TrackedSequence:
 
 
 class TruthEvaluator:
-    """Compares what a tracking finds with the truth.
+    """Compares the estimates of a tracking session with the truth.
 
     Args:
-        tracking: the tracker. Whoever asks lets it track, so that nothing of the comparison counts as its time.
+        tracking: the session. The caller tracks, so that the comparison is not part of the measured time.
     """
 
     def __init__(self, tracking: Tracking):
@@ -152,11 +153,11 @@ class TruthEvaluator:
         self._known = tracking.mesh_version
 
     def errors(self, estimate: Estimate, points: NDArray[np.floating]) -> Errors | None:
-        """How far the tracking's newest estimate is from the truth; None where that is unknown.
+        """Errors of the session's latest estimate; None if the truth is unknown.
 
         Args:
-            estimate: the newest.
-            points: where the surface's material points (rows, columns, 3) really were [m] at its moment.
+            estimate: the latest.
+            points: true positions of the surface's material points (rows, columns, 3) [m] at that time.
         """
         self._truths.add_truth(estimate.t_host_ns, points)
         if self._tracking.mesh is not None and self._tracking.mesh_version != self._known:
@@ -165,12 +166,12 @@ class TruthEvaluator:
         return self._truths.compare(estimate.t_host_ns, estimate.vertices)
 
     def material_points(self, estimate: Estimate) -> NDArray[np.float64] | None:
-        """Where the vertices' own material points (n, 3) really were [m] at a judged estimate; None where unknown."""
+        """True positions of the vertices' material points (n, 3) [m] at an evaluated estimate; None if unknown."""
         return self._truths.material_points(estimate.t_host_ns)
 
 
 def effort(runs: Sequence[TrackedSequence]) -> dict[str, float]:
-    """What several sequences cost, and how well they held."""
+    """Cost and tracking share of several sequences, by name."""
     return {
         "worst_mm": max(one.worst_mm for one in runs),
         "evaluations": float(np.mean([one.evaluations for one in runs])),
@@ -183,15 +184,15 @@ def track(rig: Rig, plan: Plan, exposures: Sequence[LabeledExposure]) -> Tracked
     """Tracks a sequence.
 
     Raises:
-        UntrackedError: no object is in sight in its first exposure.
+        UntrackedError: no object is detected in the first exposure.
     """
     tracking = Tracking(rig, plan)
     evaluator = TruthEvaluator(tracking)
     models, estimates, errors, material, cpu_ms = [], [], [], [], []
     for exposure in exposures:
-        begun = time.process_time()
+        start = time.process_time()
         estimate = tracking.track(exposure.frames, lambda: True)
-        cpu_ms.append((time.process_time() - begun) * 1e3)
+        cpu_ms.append((time.process_time() - start) * 1e3)
         error, points = evaluator.errors(estimate, exposure.points), evaluator.material_points(estimate)
         if error is None or points is None or tracking.model is None:
             raise UntrackedError(f"exposure {exposure.frames.seq}: {', '.join(estimate.reasons)}")
@@ -203,7 +204,7 @@ def track(rig: Rig, plan: Plan, exposures: Sequence[LabeledExposure]) -> Tracked
 
 
 def mean_deviation(rig: Rig, sensor: str, exposure: LabeledExposure, nearer_than: float) -> float:
-    """Mean σ [m] over the pixels of a depth sensor's image that are nearer than so many metres: those of the object."""
+    """Mean σ [m] over the pixels of a depth image nearer than `nearer_than` [m]: those of the object."""
     image, noise = Observer(rig).observe(exposure.frames).images[sensor], rig.sensors[sensor].noise
     if not (isinstance(image, DepthImage) and isinstance(noise, DepthNoise)):
         raise TypeError(f"{sensor} measures no distances")
@@ -214,12 +215,12 @@ def mean_deviation(rig: Rig, sensor: str, exposure: LabeledExposure, nearer_than
 
 
 def euclidean_fitness(deviation: float, levels: float = 4.0) -> euclidean.Settings:
-    """The Euclidean fitness that weighs like the likelihood of one deviation everywhere.
+    """Euclidean fitness with the weights of a likelihood whose standard deviations are the same for all pixels.
 
-    So the priors, which are the same for both, count as much beside either.
+    The priors, which are the same for both, thus have the same relative weight.
 
     Args:
         deviation: of distances [m].
-        levels: of colours, of 256.
+        levels: of colours [levels of 256].
     """
     return euclidean.Settings(depth_weight=0.5 / deviation**2, color_weight=0.5 / levels**2, cutoff_m=CUTOFF_M)

@@ -1,14 +1,14 @@
-"""What the joint solve makes of published boards and of simulated rigs, as the tables of docs/calibration.md.
+"""Joint calibration of cameras on published boards and on simulated rigs: the tables of docs/calibration.md."""
 
-python -m evaluation.calibration.cameras            simulated rigs only: a few minutes
-python -m evaluation.calibration.cameras FOLDER     published boards as well; FOLDER holds calib_rct_circles, …
-"""
-
-import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
 
+from abs_service.report.content import Cell, Column, Section, Table
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -19,77 +19,134 @@ from calib.solve.solution import Solution
 from calib.solve.validation.verdict import assess
 from calib.views import CornerView
 from evaluation.calibration import published_boards, simulated_rig
+from evaluation.experiment import Context, Findings, Goal, at_least, at_most
+
+TITLE = "Camera calibration: published boards, coverage and planes on simulated rigs"
+
+#: Folders of the published boards.
+FOLDERS = ("calib_rct_circles", "calib_opencv_stereo", "calib_azure_charuco")
 
 
-def main() -> None:
-    """Prints all tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("folder", nargs="?", type=Path)
-    folder = parser.parse_args().folder
-    if folder is not None:
-        _published(folder)
-    _rates()
-    _planes()
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        rigs: simulated rigs whose coverage is counted.
+        plane_rigs: simulated rigs with a coarse time-of-flight camera.
+        corner_sigmas: standard deviations of its corners [px]; the goal is about 0.6.
+    """
+
+    rigs: int = simulated_rig.SEEDS
+    plane_rigs: int = simulated_rig.PLANE_SEEDS
+    corner_sigmas: tuple[float, ...] = (0.3, simulated_rig.COARSE_PX, 1.0)
 
 
-def _published(folder: Path) -> None:
-    views, published = published_boards.circles(folder / "calib_rct_circles")
-    solution = calibrate(_alone("camera", (640, 480), BROWN_CONRADY, views))
-    _matrix("circle grid", solution, published.matrix)
-    views = published_boards.stereo(folder / "calib_opencv_stereo")
-    sensors = {side: SensorTask(640, 480) for side in ("left", "right")}
-    solution = calibrate(Task(sensors, views, (), "left"))
-    _place("stereo pair", solution, "right")
-    print(f"  {assess(solution, 0.4, 3.0).verdict}")
-    views, cameras = published_boards.azure(folder / "calib_azure_charuco")
-    solution = calibrate(_alone("color", (4096, 3072), RATIONAL, [view for view in views if view.sensor == "color"]))
-    _matrix("Azure Kinect, colour", solution, cameras["color"].matrix)
+QUICK = Settings(1, 1, (simulated_rig.COARSE_PX,))
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Calibrates the published boards in the data folder, and the simulated rigs."""
+    sections = []
+    if context.data is not None and all((context.data / name).is_dir() for name in FOLDERS):
+        context.progress("published boards")
+        sections.append(_published(context.data))
+    inside = _coverage(settings, context)
+    planes = {}
+    for sigma in settings.corner_sigmas:
+        context.progress(f"planes, corners to {sigma:g} px")
+        errors = [simulated_rig.tof_errors(seed, sigma) for seed in range(settings.plane_rigs)]
+        planes[sigma] = np.array(errors).T * 1e3
+    sections += [_coverage_section(inside, settings.rigs), _planes_section(planes)]
+    goals = (*_coverage_goals(inside, settings.rigs), _planes_goal(planes))
+    values = {"inside": inside, "tof_error_mm": {f"{sigma:g}": errors for sigma, errors in planes.items()}}
+    return Findings(goals, tuple(sections), values)
+
+
+def _coverage(settings: Settings, context: Context) -> dict[str, int]:
+    """Number of the simulated rigs whose truth lies in the 95 % region, by group of parameters."""
+    found = []
+    for seed in range(settings.rigs):
+        context.progress(f"rig {seed + 1} of {settings.rigs}")
+        found.append(simulated_rig.error_probabilities(seed))
+    return {name: sum(each[name] < 0.95 for each in found) for name in found[0]}
+
+
+def _coverage_goals(inside: Mapping[str, int], rigs: int) -> tuple[Goal, ...]:
+    """The lowest and highest count lie in the central 99.5 % of the binomial distribution."""
+    low, high = stats.binom.interval(0.995, rigs, 0.95)
+    return (
+        at_least(f"Of {rigs} rigs those with the truth in the 95 % region, the fewest", min(inside.values()), low),
+        at_most(f"Of {rigs} rigs those with the truth in the 95 % region, the most", max(inside.values()), high),
+    )
+
+
+def _planes_goal(planes: Mapping[float, NDArray[np.float64]]) -> Goal:
+    corners, both = planes.get(simulated_rig.COARSE_PX, next(iter(planes.values())))
+    name = "Position error of a coarse time-of-flight camera, corners / with planes"
+    return at_least(name, _rms(corners) / _rms(both), 2)
+
+
+def _coverage_section(inside: Mapping[str, int], rigs: int) -> Section:
+    columns = (Column("parameters"), Column(f"inside, of {rigs}"))
+    return Section("Coverage", (Table("Rigs with the truth in the 95 % region", columns, tuple(inside.items())),))
+
+
+def _planes_section(planes: Mapping[float, NDArray[np.float64]]) -> Section:
+    columns = (
+        Column("corners to", "px", ".1f"), Column("from"), Column("rms", "mm", ".2f"),
+        Column("median", "mm", ".2f"), Column("smallest", "mm", ".2f"), Column("largest", "mm", ".2f"),
+    )  # fmt: skip
+    rows = tuple(
+        (sigma, name, _rms(errors), float(np.median(errors)), float(errors.min()), float(errors.max()))
+        for sigma, both in planes.items()
+        for name, errors in zip(("corners", "corners and planes"), both)
+    )
+    return Section("Planes", (Table("Position error of a coarse time-of-flight camera", columns, rows),))
+
+
+def _rms(errors: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(np.square(errors))))
+
+
+def _published(data: Path) -> Section:
+    """Calibrations of the published boards beside the published parameters."""
+    views, published = published_boards.circles(data / FOLDERS[0])
+    rows = _intrinsics("circle grid", calibrate(_task("camera", (640, 480), BROWN_CONRADY, views)), published.matrix)
+    sides = {side: SensorTask(640, 480) for side in ("left", "right")}
+    stereo = calibrate(Task(sides, published_boards.stereo(data / FOLDERS[1]), (), "left"))
+    views, cameras = published_boards.azure(data / FOLDERS[2])
+    color = calibrate(_task("color", (4096, 3072), RATIONAL, [view for view in views if view.sensor == "color"]))
+    rows += _intrinsics("Azure Kinect, colour", color, cameras["color"].matrix)
     fx, fy, cx, cy = cameras["infrared"].matrix.tolist()
     known = Camera(1024, 1024, fx, fy, cx, cy, Lens(cameras["infrared"].lens))
     infrared = SensorTask(1024, 1024, RATIONAL, (known,), fixed_intrinsics=True)
     both = Task(
         {"color": SensorTask(4096, 3072, RATIONAL), "infrared": infrared}, views, (), "color", min_views_fixed=1
     )
-    _place("Azure Kinect, infrared to colour", calibrate(both), "infrared")
+    columns = (
+        Column("data"), Column("parameter"), Column("found", "px", ".2f"), Column("±", "px", ".2f"),
+        Column("published", "px", ".2f"),
+    )  # fmt: skip
+    texts = (
+        _extrinsics("Stereo pair", stereo, "right"),
+        assess(stereo, 0.4, 3.0).verdict,
+        _extrinsics("Azure Kinect, infra-red to colour", calibrate(both), "infrared"),
+    )
+    return Section("Published boards", (Table("Intrinsics", columns, tuple(rows)), *texts))
 
 
-def _alone(name: str, size: tuple[int, int], kind: LensKind, views: list[CornerView]) -> Task:
+def _task(name: str, size: tuple[int, int], kind: LensKind, views: list[CornerView]) -> Task:
     return Task({name: SensorTask(*size, kind)}, views, (), name)
 
 
-def _matrix(what: str, solution: Solution, published: np.ndarray) -> None:
-    print(f"\n{what}")
-    for parameter, other in zip(solution.parameters[:4], published.tolist(), strict=True):
-        print(f"  {parameter.name:12} {parameter.value:9.2f} ± {parameter.sigma:.2f}   published {other:9.2f}")
-    print(f"  {assess(solution, 1.0, 3.0).verdict}")
+def _intrinsics(data: str, solution: Solution, published: NDArray[np.float64]) -> list[tuple[Cell, ...]]:
+    pairs = zip(solution.parameters[:4], published.tolist(), strict=True)
+    return [(data, one.name, one.value, one.sigma, other) for one, other in pairs]
 
 
-def _place(what: str, solution: Solution, sensor: str) -> None:
+def _extrinsics(name: str, solution: Solution, sensor: str) -> str:
     turn, move = pose.to_rotation_vector(solution.cameras[sensor].T_rs)
     sigma = {each.name: each.sigma for each in solution.parameters}
-    print(f"\n{what}: {np.round(move * 1e3, 2)} mm, {np.round(np.degrees(turn), 3)} degrees")
-    print("  ±", [round(sigma[f"{sensor}.{axis}"] * 1e3, 2) for axis in "xyz"], "mm")
-
-
-def _rates() -> None:
-    found = [simulated_rig.surprises(seed) for seed in range(simulated_rig.SEEDS)]
-    print(f"\nTruth inside the 95 % region, of {len(found)} simulated rigs")
-    for what in found[0]:
-        print(f"  {what:18} {sum(each[what] < 0.95 for each in found)}")
-
-
-def _planes() -> None:
-    print("\nError of where a coarse time-of-flight camera stands [mm], median and range over the seeds")
-    for corner_sigma in (0.3, simulated_rig.COARSE_PX, 1.0):
-        errors = [simulated_rig.tof_errors(seed, corner_sigma) for seed in range(simulated_rig.PLANE_SEEDS)]
-        corners, both = np.array(errors).T * 1e3
-        rms = np.sqrt(np.mean(corners**2)), np.sqrt(np.mean(both**2))
-        print(
-            f"  corners to {corner_sigma:.1f} px: alone {np.median(corners):.2f} ({corners.min():.2f} to "
-            f"{corners.max():.2f}), with planes {np.median(both):.2f} ({both.min():.2f} to {both.max():.2f}); "
-            f"root mean squares {rms[0]:.2f} / {rms[1]:.2f} = {rms[0] / rms[1]:.1f}"
-        )
-
-
-if __name__ == "__main__":
-    main()
+    spread = [round(sigma[f"{sensor}.{axis}"] * 1e3, 2) for axis in "xyz"]
+    return f"{name}: T = {np.round(move * 1e3, 2)} ± {spread} mm, rotation {np.round(np.degrees(turn), 3)} degrees."

@@ -1,13 +1,11 @@
-"""What `abs-service calibrate noise` finds on simulated walls and real static parts, and a sensor's own deviations.
+"""Noise calibration of simulated walls and of the static parts of real sequences, and consistency of a sensor's own σ.
 
-  python -m evaluation.calibration.noise_calibration [DATA] [--only walls petit o3r]
-
-DATA is the folder of data sets with sl_rgbd_deform_petit (frames 200 to 319 of a PrimeSense-type sensor; hands squeeze
-a toy on a table) and tof_ifm_o3r (one frame of an ifm O3R); without it there are the simulated walls only.
+Real data are sl_rgbd_deform_petit (frames 200 to 319 of a PrimeSense-type sensor; hands squeeze a toy on a table) and
+tof_ifm_o3r (one frame of an ifm O3R); without them there are the simulated walls alone.
 """
 
-import argparse
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 
 from abs_service.calibration.noise import measurement, sigma_consistency
 from abs_service.calibration.shots import sequences
+from abs_service.report.content import Cell, Column, Section, Table
 from calib.camera import Camera
 from calib.noise.base import pixels_where
 from calib.noise.per_pixel import PerPixel
@@ -26,11 +25,12 @@ from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
 from drivers.o3r.buffers import O3rBuffers
 from drivers.simulated.address import parse
+from evaluation.experiment import Context, Findings, Goal, at_most
 
-#: The paper's calibration (5.1): distances [m] and reflectivities of the simulated walls, and frames of each.
-DISTANCES, MATERIALS, FRAMES = (0.7, 1.0, 1.3, 1.6, 1.9), (0.9, 0.5, 0.3), 30
+#: The paper's calibration (5.1): distances [m] and reflectivities of the simulated walls.
+DISTANCES, MATERIALS = (0.7, 1.0, 1.3, 1.6, 1.9), (0.9, 0.5, 0.3)
 
-#: What the simulated time-of-flight heads err by systematically.
+#: Systematic errors of the simulated heads, as keys of their addresses.
 HEADS = {
     "tof, no systematic error": "sensors=tof&tof=176x144",
     "tof, offset, dark and wiggling": "sensors=tof&tof=176x144&offset=0.02&dark=-8&wiggle=0.002",
@@ -38,15 +38,15 @@ HEADS = {
     "structured light": "sensors=structured_light&structured_light=320x240",
 }
 
-#: Bins of distance [mm] and the deviations [mm] that were measured in them with everything that moves left in.
+#: Bins of distance [mm], and published standard deviations [mm] in them with moving parts included.
 BINS = ((450, 550), (550, 650), (650, 800), (800, 1000), (1000, 1300), (1300, 1700), (2200, 2800), (2800, 3500))
 WITH_MOTION = (0.41, 0.50, 0.85, 3.68, 2.00, 2.33, 8.70, 12.27)
 
 PETIT = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
 
 
-def walls(query: str) -> tuple[measurement.Found, Any]:
-    """Calibrates on walls at known distances, turned by 4°."""
+def walls(query: str, count: int) -> tuple[measurement.Found, Any]:
+    """Calibrates on walls at known distances, turned by 4°, with `count` frames of each; returns the true head too."""
     found, depths, head = [], [], None
     for depth in DISTANCES:
         for number, reflectivity in enumerate(MATERIALS):
@@ -54,8 +54,8 @@ def walls(query: str) -> tuple[measurement.Found, Any]:
             uri = f"simulated://wall?distance={depth}&reflectivity={reflectivity}&tilt=4&seed={seed}&{query}"
             simulation = parse(uri).build()
             ((name, head),) = simulation.heads.items()
-            frames = (frame for k in range(FRAMES) for frame in simulation.frames(k))
-            found += sequences.of_frames(f"{depth} m, {reflectivity}", frames, {name: head.camera}, "", FRAMES)
+            frames = (frame for k in range(count) for frame in simulation.frames(k))
+            found += sequences.of_frames(f"{depth} m, {reflectivity}", frames, {name: head.camera}, "", count)
             # The head may sit beside the rig's origin, where the wall is as far as the address says.
             depths.append(depth - float(head.camera.center[0]) * math.tan(math.radians(4)))
     region = np.ones(found[0].lengths.shape[1:], bool)
@@ -124,50 +124,74 @@ def o3r(data: Path) -> list[sigma_consistency.Claim]:
     return found
 
 
-def _print_walls() -> None:
-    print("| sensor | model | σ, 99 % | μ, 99 % | σ, rms | μ, rms | within σ | within 1.96 σ | fixed pattern |")
-    print("|---|---|---|---|---|---|---|---|---|")
-    for name, query in HEADS.items():
-        found, head = walls(query)
-        sigma, mu, sigma_rms, mu_rms = errors(found, head)
+TITLE = "Noise calibration on walls and static parts"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        frames: of each simulated wall.
+        heads: names in `HEADS`.
+    """
+
+    frames: int = 30
+    heads: tuple[str, ...] = tuple(HEADS)
+
+
+QUICK = Settings(8, ("tof, offset, dark and wiggling",))
+
+_WALLS = (
+    Column("sensor"), Column("model"), Column("error of σ, 99 %", "%", ".1f"), Column("error of μ, 99 %", "mm", ".2f"),
+    Column("error of σ, rms", "%", ".1f"), Column("error of μ, rms", "mm", ".2f"), Column("within σ", "", ".3f"),
+    Column("within 1.96 σ", "", ".3f"), Column("fixed pattern", "mm", ".2f"),
+)  # fmt: skip
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Calibrates every simulated head, and measures the real data in the data folder."""
+    rows: list[tuple[Cell, ...]] = []
+    goals: list[Goal] = []
+    values = {}
+    for name in settings.heads:
+        context.progress(name)
+        found, head = walls(HEADS[name], settings.frames)
+        values[name] = sigma, mu, sigma_rms, mu_rms = errors(found, head)
         fixed = float(np.median([row.fixed for _, row in found.rows])) * 1e3
-        quality = found.chosen.quality
-        print(
-            f"| {name} | {found.chosen.candidate.name} | {sigma:.1f} % | {mu:.2f} mm | {sigma_rms:.1f} % "
-            f"| {mu_rms:.2f} mm | {quality.within_one:.3f} | {quality.within_95:.3f} | {fixed:.2f} mm |",
-            flush=True,
-        )
+        fit = found.chosen.quality
+        model = found.chosen.candidate.name
+        rows.append((name, model, sigma, mu, sigma_rms, mu_rms, fit.within_one, fit.within_95, fixed))
+        goals.append(at_most(f"{name}: error of σ in 99 % of the pixels", sigma, 10, "%"))
+        goals.append(at_most(f"{name}: error of μ in 99 % of the pixels", mu, 1, "mm"))
+    sections = [Section("Simulated walls", (Table("Errors over all pixels and sequences", _WALLS, tuple(rows)),))]
+    if context.data is not None and (context.data / "sl_rgbd_deform_petit").is_dir():
+        context.progress("static parts of the real sequence")
+        sections.append(_petit_section(context.data))
+    if context.data is not None and (context.data / "tof_ifm_o3r").is_dir():
+        sections.append(_o3r_section(context.data))
+    return Findings(tuple(goals), tuple(sections), values)
 
 
-def _print_petit(data: Path) -> None:
+def _petit_section(data: Path) -> Section:
     static, one = petit(data)
-    print(f"\nsteps: {static.steps.growth * 1e3:.2f} mm at 1 m, ∝ x²; digits of {static.steps.digit * 1e3:.2g} mm\n")
-    print("| z mm | static σ mm | with motion, published | with motion, here | not static | pixels |")
-    print("|---|---|---|---|---|---|")
-    for (low, high), published, (still, moving, share, n) in zip(BINS, WITH_MOTION, by_distance(static, one)):
-        print(f"| {low} to {high} | {still:.2f} | {published:.2f} | {moving:.2f} | {share:.0%} | {n} |")
+    growth_mm, digit_mm = static.steps.growth * 1e3, static.steps.digit * 1e3
+    steps = f"Quantisation steps: {growth_mm:.2f} mm at 1 m, ∝ x²; digits of {digit_mm:.2g} mm."
+    columns = (
+        Column("z", "mm"), Column("static σ", "mm", ".2f"), Column("with motion, published", "mm", ".2f"),
+        Column("with motion, here", "mm", ".2f"), Column("not static", "", ".0%"), Column("pixels"),
+    )  # fmt: skip
+    rows = tuple(
+        (f"{low} to {high}", still, published, moving, share, n)
+        for (low, high), published, (still, moving, share, n) in zip(BINS, WITH_MOTION, by_distance(static, one))
+    )
+    return Section("Static parts of a real sequence", (steps, Table("Standard deviation of z", columns, rows)))
 
 
-def _print_o3r(data: Path) -> None:
-    print("\n| distance | pixels | within σ | within 1.96 σ | residual / claimed |")
-    print("|---|---|---|---|---|")
-    for claim in o3r(data):
-        print(f"| {claim.name} | {claim.pixels} | {claim.within_one:.3f} | {claim.within_95:.3f} | {claim.ratio:.2f} |")
-
-
-def main() -> None:
-    """Prints the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("data", nargs="?", type=Path, metavar="DATA")
-    parser.add_argument("--only", nargs="+", choices=("walls", "petit", "o3r"), default=["walls", "petit", "o3r"])
-    arguments = parser.parse_args()
-    if "walls" in arguments.only:
-        _print_walls()
-    if arguments.data is not None and "petit" in arguments.only:
-        _print_petit(arguments.data)
-    if arguments.data is not None and "o3r" in arguments.only:
-        _print_o3r(arguments.data)
-
-
-if __name__ == "__main__":
-    main()
+def _o3r_section(data: Path) -> Section:
+    columns = (
+        Column("distance"), Column("pixels"), Column("within σ", "", ".3f"), Column("within 1.96 σ", "", ".3f"),
+        Column("residual / stated σ", "", ".2f"),
+    )  # fmt: skip
+    rows = tuple((one.name, one.pixels, one.within_one, one.within_95, one.ratio) for one in o3r(data))
+    return Section("ifm O3R: consistency of the sensor's own σ", (Table("By distance", columns, rows),))

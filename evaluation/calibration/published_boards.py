@@ -1,4 +1,4 @@
-"""Published data sets of boards as views, and what was published with them."""
+"""Published data sets of boards as views, with the published parameters."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ CHARUCO = Charuco(14, 9, 0.04, 0.03, "5x5_1000")
 
 @dataclass(frozen=True)
 class Published:
-    """A camera as somebody published it.
+    """Published parameters of a camera.
 
     Attributes:
         matrix: fx, fy, cx, cy (4,) [px].

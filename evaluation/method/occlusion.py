@@ -1,84 +1,103 @@
-"""A hand crosses the sheet and hides a quarter of it: the error of what remains visible, and of what it hides.
+"""A hand passes in front of the sheet: error of the visible and of the occluded vertices.
 
-  python -m evaluation.method.occlusion [--seeds 1 2 3] [--frames 240]
-
-The same frames with and without the hand. Which vertices are hidden from the time-of-flight head is the simulator's
-knowledge, not the tracker's.
+The same frames with and without the hand. The simulator's geometry decides which vertices are occluded in the
+time-of-flight head, not the tracker.
 """
 
-import argparse
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.report.content import Column, Section, Table
 from drivers.simulated.simulation import Simulation
-from evaluation.sequences import expose, track
-from tests.tracker.driving import default_plan, rig_of, simulate
+from evaluation.experiment import Context, Findings, at_most
+from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
 
-#: Frames in which less of the sheet is hidden do not count as occluded.
-LEAST_SHARE = 0.05
+TITLE = "Occlusion: a hand passes in front of the sheet"
+
+#: Frames with a smaller share of occluded vertices are ignored.
+MIN_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        seeds: of the simulated sequences, added to the context's seed.
+        frames: of each sequence; the hand passes at about the 130th.
+    """
+
+    seeds: tuple[int, ...] = (1, 2, 3)
+    frames: int = 240
+
+
+QUICK = Settings((1,), 140)
 
 
 @dataclass(frozen=True)
 class Occlusion:
-    """What a passing hand does to one sequence.
+    """Errors in the frames in which the hand occludes part of the sheet.
 
     Attributes:
-        share: largest part of the vertices that it hides.
-        plain_mm: mean vertex error without the hand in the frames in which it would hide something [mm].
-        visible_mm: with the hand, of the vertices that stay visible [mm].
-        hidden_mm: with the hand, of those that it hides [mm].
+        share: largest share of occluded vertices.
+        plain_mm: mean vertex error without the hand [mm].
+        visible_mm: with the hand, of the visible vertices [mm].
+        occluded_mm: with the hand, of the occluded vertices [mm].
     """
 
     share: float
     plain_mm: float
     visible_mm: float
-    hidden_mm: float
+    occluded_mm: float
 
 
-def occlusion(seed: int, frames: int) -> Occlusion:
+def run(settings: Settings, context: Context) -> Findings:
     """Tracks the demo rig's sheet with and without the hand."""
+    found = {}
+    for seed in settings.seeds:
+        context.progress(f"seed {context.seed + seed}")
+        found[context.seed + seed] = measure(context.seed + seed, settings.frames)
+    ratios = [one.visible_mm / one.plain_mm for one in found.values()]
+    columns = (
+        Column("seed"), Column("occluded, maximum", "", ".0%"), Column("without the hand", "mm", ".2f"),
+        Column("visible vertices", "mm", ".2f"), Column("visible / without", "", ".2f"),
+        Column("occluded vertices", "mm", ".2f"),
+    )  # fmt: skip
+    rows = tuple(
+        (seed, one.share, one.plain_mm, one.visible_mm, ratio, one.occluded_mm)
+        for (seed, one), ratio in zip(found.items(), ratios)
+    )
+    return Findings(
+        (at_most("Error of the visible vertices with / without the hand, the largest of the seeds", max(ratios), 1.5),),
+        (Section("Errors", (Table("Mean vertex errors while the hand passes", columns, rows),)),),
+        {str(seed): asdict(one) for seed, one in found.items()},
+    )
+
+
+def measure(seed: int, frames: int) -> Occlusion:
+    """Tracks one sequence with and without the hand."""
     plain = errors(simulate(f"simulated://sheet?seed={seed}"), frames)[0]
-    error, hidden = errors(simulate(f"simulated://sheet?seed={seed}&occluder=hand"), frames)
-    crossed = hidden.mean(axis=1) > LEAST_SHARE
+    error, occluded = errors(simulate(f"simulated://sheet?seed={seed}&occluder=hand"), frames)
+    crossed = occluded.mean(axis=1) > MIN_SHARE
     return Occlusion(
-        share=float(hidden.mean(axis=1).max()),
+        share=float(occluded.mean(axis=1).max()),
         plain_mm=float(plain[crossed].mean()),
-        visible_mm=float(error[crossed][~hidden[crossed]].mean()),
-        hidden_mm=float(error[crossed][hidden[crossed]].mean()),
+        visible_mm=float(error[crossed][~occluded[crossed]].mean()),
+        occluded_mm=float(error[crossed][occluded[crossed]].mean()),
     )
 
 
 def errors(simulation: Simulation, frames: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Error of every vertex [mm] and whether it is hidden from the time-of-flight head, each (frames, n)."""
-    followed = track(rig_of(simulation), default_plan(), expose(simulation, range(frames)))
+    """Error of every vertex [mm], and mask of those occluded in the time-of-flight head, each (frames, n)."""
+    found = track(demo_rig(simulation), demo_plan(), expose(simulation, range(frames)))
     eye = simulation.heads["tof"].camera.center
-    distances, hidden = [], []
-    for k, (estimate, points) in enumerate(zip(followed.estimates, followed.material)):
+    distances, occluded = [], []
+    for k, (estimate, points) in enumerate(zip(found.estimates, found.material)):
         distances.append(np.linalg.norm(estimate.vertices - points, axis=1) * 1e3)
         moment = simulation.scene.at(simulation.time_ns(k) * 1e-9)
-        # A hair's breadth before the sheet, which else would hide its own points.
+        # 1 mm towards the camera, so that the sheet does not occlude its own points.
         before = points + (eye - points) * (1e-3 / np.linalg.norm(eye - points, axis=1, keepdims=True))
-        hidden.append(moment.hidden(before[None], eye)[0])
-    return np.array(distances), np.array(hidden)
-
-
-def main() -> None:
-    """Prints a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--frames", type=int, default=240)
-    arguments = parser.parse_args()
-    print("| seed | hidden at most | without the hand mm | visible vertices mm | ratio | hidden vertices mm |")
-    print("|---|---|---|---|---|---|")
-    for seed in arguments.seeds:
-        found = occlusion(seed, arguments.frames)
-        print(
-            f"| {seed} | {found.share:.0%} | {found.plain_mm:.2f} | {found.visible_mm:.2f} | "
-            f"{found.visible_mm / found.plain_mm:.2f} | {found.hidden_mm:.2f} |"
-        )
-
-
-if __name__ == "__main__":
-    main()
+        occluded.append(moment.hidden(before[None], eye)[0])
+    return np.array(distances), np.array(occluded)

@@ -1,15 +1,10 @@
-"""What each optimiser makes of the demo rig, and what it costs: error, time and effort per frame.
+"""Every optimiser on four scenes: errors, time and effort per frame.
 
-  python -m evaluation.method.optimizers [--only hybrid cma_es] [--scenes demo fast hand turn]
-                                        [--seeds 1 2 3] [--frames 180] [--budget-ms 24]
-
-The scenes: the sheet as it moves in the demo; three times as fast; with a hand that crosses it; and one that turns by
-90° within a quarter of a second, which no motion prior expects. Without `--budget-ms` the search does not look at the
-clock. Times are CPU times of a whole frame on one core, without taking images in and without publishing; a BLAS with
-threads of its own spoils them (OPENBLAS_NUM_THREADS=1).
+The scenes: the demo's sheet; three times as fast; with a hand in front of it; and turned by 90° within a quarter of a
+second, which no motion prior predicts. Without `budget_ms` the search ignores the clock. Times are CPU times of a whole
+frame on one core, without capture and publication.
 """
 
-import argparse
 import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -18,12 +13,16 @@ from functools import partial
 
 import numpy as np
 
+from abs_service.report.content import Cell, Column, Section, Table
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracking.session import OptimizerSettings, Tracking
+from abs_service.tracking.truth import Errors
 from drivers.simulated.simulation import Simulation
-from evaluation.sequences import TruthEvaluator
-from tests.tracker.driving import Step, default_plan, frame_set, mean_errors, rig_of, simulate
+from evaluation.experiment import Context, Findings, Goal, at_most
+from evaluation.sequences import TruthEvaluator, demo_plan, demo_rig, expose, simulate
+
+TITLE = "Optimisers: error, time and effort on four scenes"
 
 SCENES: Mapping[str, str] = {"demo": "", "fast": "&speed=3", "hand": "&occluder=hand", "turn": "&turn=2"}
 OPTIMIZERS: Mapping[str, OptimizerSettings] = {
@@ -32,89 +31,114 @@ OPTIMIZERS: Mapping[str, OptimizerSettings] = {
     "cma": cma.Settings(),
 }
 
-COLUMNS = (
-    "optimizer",
-    "scene",
-    "vertex (surface) error mm",
-    "worst frame mm",
-    "median ms",
-    "95 % ms",
-    "generations",
-    "evaluations",
-    "ended",
-)
+#: The default search.
+DEFAULT = "hybrid"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        seeds: of the simulated sequences, added to the context's seed.
+        frames: of each sequence.
+        scenes: names in `SCENES`.
+        optimizers: names in `OPTIMIZERS`, with the default.
+        budget_ms: time limit of a search [ms].
+    """
+
+    seeds: tuple[int, ...] = (1, 2, 3)
+    frames: int = 180
+    scenes: tuple[str, ...] = tuple(SCENES)
+    optimizers: tuple[str, ...] = tuple(OPTIMIZERS)
+    budget_ms: float = float("inf")
+
+
+QUICK = Settings((1,), 12, ("demo",), ("hybrid", "cma_es"))
 
 
 @dataclass(frozen=True)
 class Run:
-    """What one optimiser made of one sequence.
+    """One optimiser on one sequence.
 
     Attributes:
-        steps: estimates with their errors.
-        times_ms: CPU time of each but the first frame [ms].
+        estimates: of all frames.
+        errors: of the frames whose truth is known.
+        times_ms: CPU time of each frame except the first [ms].
     """
 
-    steps: Sequence[Step]
+    estimates: Sequence[Estimate]
+    errors: Sequence[Errors]
     times_ms: Sequence[float]
 
 
-def track(simulation: Simulation, exposures: Sequence[int], settings: OptimizerSettings, budget_ms: float) -> Run:
-    """Tracks exposures, each with a budget of real time."""
-    tracking = Tracking(rig_of(simulation), default_plan(optimizer=settings))
+_COLUMNS = (
+    Column("optimizer"), Column("scene"), Column("vertex error", "mm", ".2f"), Column("surface error", "mm", ".2f"),
+    Column("worst frame", "mm", ".1f"), Column("median", "ms", ".1f"), Column("95 %", "ms", ".1f"),
+    Column("generations", "", ".1f"), Column("evaluations", "", ".0f"), Column("stop"),
+)  # fmt: skip
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Tracks every scene with every optimiser."""
+    rows: list[tuple[Cell, ...]] = []
+    values: dict[str, dict[str, float]] = {}
+    for scene in settings.scenes:
+        for name in settings.optimizers:
+            context.progress(f"{scene}, {name}")
+            simulations = [
+                simulate(f"simulated://sheet?seed={context.seed + seed}{SCENES[scene]}") for seed in settings.seeds
+            ]
+            search = OPTIMIZERS[name]
+            runs = [track(one, range(settings.frames), search, settings.budget_ms) for one in simulations]
+            values[f"{scene}, {name}"] = figures = _figures(runs)
+            rows.append((name, scene, *figures.values(), _stops([e for one in runs for e in one.estimates[1:]])))
+    goals = tuple(_goal(scene, settings.optimizers, values) for scene in settings.scenes)
+    table = Table(f"Frames {settings.frames}, seeds {len(settings.seeds)}", _COLUMNS, tuple(rows))
+    return Findings(goals, (Section("Errors and effort", (table,)),), values)
+
+
+def track(simulation: Simulation, indices: Sequence[int], settings: OptimizerSettings, budget_ms: float) -> Run:
+    """Tracks exposures, each within a budget of wall-clock time."""
+    tracking = Tracking(demo_rig(simulation), demo_plan(optimizer=settings))
     evaluator = TruthEvaluator(tracking)
-    steps, times = [], []
-    for k in exposures:
-        frames, truth = simulation.expose(k)
-        begin, begin_cpu = time.monotonic(), time.process_time()
-        estimate = tracking.track(frame_set(frames, k), partial(_in_time, begin + budget_ms * 1e-3))
-        times.append((time.process_time() - begin_cpu) * 1e3)
-        steps.append(Step(estimate, evaluator.errors(estimate, truth.points_r)))
-    return Run(steps, times[1:])
+    estimates, errors, times = [], [], []
+    for k in indices:
+        (exposure,) = expose(simulation, [k])
+        start, start_cpu = time.monotonic(), time.process_time()
+        estimates.append(tracking.track(exposure.frames, partial(_in_time, start + budget_ms * 1e-3)))
+        times.append((time.process_time() - start_cpu) * 1e3)
+        errors.append(evaluator.errors(estimates[-1], exposure.points))
+    return Run(estimates, [one for one in errors if one is not None], times[1:])
 
 
 def _in_time(until_s: float) -> bool:
     return time.monotonic() < until_s
 
 
-def row(runs: Sequence[Run]) -> str:
-    """The cells of one optimiser and scene, over all seeds."""
-    steps = [step for run in runs for step in run.steps]
-    times = np.concatenate([run.times_ms for run in runs])
-    vertex_mm, surface_mm = mean_errors(steps)
-    worst_mm = max(step.errors.vertex_mm for step in steps if step.errors is not None)
-    estimates = [step.estimate for run in runs for step in run.steps[1:]]
-    evaluations = np.mean([estimate.evaluations for estimate in estimates])
-    generations = np.mean([estimate.generations for estimate in estimates])
-    return (
-        f"{vertex_mm:.2f} ({surface_mm:.2f}) | {worst_mm:.1f} | {np.median(times):.1f} | "
-        f"{np.quantile(times, 0.95):.1f} | {generations:.1f} | {evaluations:.0f} | {_stops(estimates)}"
-    )
+def _figures(runs: Sequence[Run]) -> dict[str, float]:
+    """Statistics of one optimiser and scene over all seeds, by name."""
+    errors = [error for one in runs for error in one.errors]
+    times = np.concatenate([one.times_ms for one in runs])
+    estimates = [estimate for one in runs for estimate in one.estimates[1:]]
+    return {
+        "vertex_mm": float(np.mean([one.vertex_mm for one in errors])),
+        "surface_mm": float(np.mean([one.surface_mm for one in errors])),
+        "worst_mm": max(one.vertex_mm for one in errors),
+        "median_ms": float(np.median(times)),
+        "p95_ms": float(np.quantile(times, 0.95)),
+        "generations": float(np.mean([estimate.generations for estimate in estimates])),
+        "evaluations": float(np.mean([estimate.evaluations for estimate in estimates])),
+    }
 
 
 def _stops(estimates: Sequence[Estimate]) -> str:
-    """Who found the estimates and why it stopped, the most frequent first."""
+    """Search and stop criterion of the estimates, the most frequent first."""
     found = Counter(f"{estimate.searcher} {estimate.stop}" for estimate in estimates)
     return ", ".join(f"{what} {count / len(estimates):.0%}" for what, count in found.most_common())
 
 
-def main() -> None:
-    """Prints a table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=OPTIMIZERS, default=list(OPTIMIZERS))
-    parser.add_argument("--scenes", nargs="+", choices=SCENES, default=list(SCENES))
-    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--frames", type=int, default=180)
-    parser.add_argument("--budget-ms", type=float, default=float("inf"))
-    arguments = parser.parse_args()
-    print(f"| {' | '.join(COLUMNS)} |")
-    print("|---" * len(COLUMNS) + "|")
-    for scene in arguments.scenes:
-        for name in arguments.only:
-            sequences = [simulate(f"simulated://sheet?seed={seed}{SCENES[scene]}") for seed in arguments.seeds]
-            exposures = range(arguments.frames)
-            runs = [track(sequence, exposures, OPTIMIZERS[name], arguments.budget_ms) for sequence in sequences]
-            print(f"| {name} | {scene} | {row(runs)} |", flush=True)
-
-
-if __name__ == "__main__":
-    main()
+def _goal(scene: str, optimizers: Sequence[str], values: Mapping[str, Mapping[str, float]]) -> Goal:
+    best = min(values[f"{scene}, {name}"]["vertex_mm"] for name in optimizers)
+    name = f"{scene}: vertex error of {DEFAULT} / of the best optimiser"
+    return at_most(name, values[f"{scene}, {DEFAULT}"]["vertex_mm"] / best, 1.1)

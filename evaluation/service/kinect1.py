@@ -1,20 +1,37 @@
-"""What receiving a Kinect v1 costs and loses, on unmodified libusb with an emulated camera behind it.
+"""CPU time and losses of receiving a Kinect v1, through unmodified libusb from an emulated camera."""
 
-python -m evaluation.service.kinect1 --seconds 20
-"""
-
-import argparse
 import json
 import sys
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
+from abs_service.report.content import Cell, Column, Section, Table
 from drivers.kinect1 import unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.packets import DEPTH
+from evaluation.experiment import Context, Findings, UnavailableError, at_least
 from tests.drivers.kinect1 import testbed
 from tests.drivers.kinect1.endurance import Outcome
+
+TITLE = "Kinect v1: whole images and CPU time, by emulated cameras"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        duration_s: of each case [s].
+        cases: number of the rows of `CASES` that are measured, from the first on.
+    """
+
+    duration_s: float = 20.0
+    cases: int = 6
+
+
+QUICK = Settings(3.0, 1)
 
 #: Streams, and the share of packets lost by each camera.
 CASES = (
@@ -26,32 +43,46 @@ CASES = (
     ("depth,color", (0.0, 0.0)),
 )
 
-
-def main() -> None:
-    """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=20.0, help="length of each case")
-    seconds = parser.parse_args().seconds
-    print("| cameras | streams | packets lost | whole | whole of those in time | CPU per stream | emulator |")
-    print("|---|---|---|---|---|---|---|")
-    for streams, losses in CASES:
-        outcomes = _measure(streams, losses, seconds)
-        delivered, shown = sum(one.delivered for one in outcomes), sum(one.shown for one in outcomes)
-        in_time = shown - sum(one.late for one in outcomes)
-        count = len(losses) * len(streams.split(","))
-        cpu, emulator = (outcomes[0].cpu_s / count, outcomes[0].emulator_cpu_s / count)
-        whole, punctual = delivered / shown, min(delivered / in_time, 1)
-        print(
-            f"| {len(losses)} | {streams} | {losses[0]:.0%} | {whole:.2%} | {punctual:.2%} "
-            f"| {cpu / outcomes[0].duration_s:.1%} of a core | {emulator / outcomes[0].duration_s:.1%} |",
-            flush=True,
-        )
-    print(f"\nunpacking a depth image and looking its distances up: {_unpacking_ms():.2f} ms")
+_COLUMNS = (
+    Column("cameras"), Column("streams"), Column("packets lost", "", ".0%"), Column("whole images", "", ".2%"),
+    Column("whole of those in time", "", ".2%"), Column("CPU per stream", "of a core", ".1%"),
+    Column("emulator", "of a core", ".1%"),
+)  # fmt: skip
 
 
-def _measure(streams: str, losses: tuple[float, ...], seconds: float) -> list[Outcome]:
-    program = [sys.executable, "-m", "tests.drivers.kinect1.endurance", str(seconds), *map(str, losses)]
-    done = testbed.run([*program, "--streams", streams], timeout_s=seconds + 120, cameras=len(losses))
+def run(settings: Settings, context: Context) -> Findings:
+    """Receives from every case's cameras.
+
+    Raises:
+        UnavailableError: umockdev is not installed.
+    """
+    if reason := testbed.why_not():
+        raise UnavailableError(reason)
+    rows: list[tuple[Cell, ...]] = []
+    for streams, losses in CASES[: settings.cases]:
+        context.progress(f"{streams}, {len(losses)} cameras")
+        rows.append(_row(streams, losses, settings.duration_s))
+    in_time = [float(row[4]) for row, (_, losses) in zip(rows, CASES) if not any(losses)]  # type: ignore[arg-type]
+    text = f"Unpacking a depth image and looking up its distances takes {_unpacking_ms():.2f} ms."
+    return Findings(
+        (at_least("Whole images of those in time without lost packets, the lowest share", min(in_time), 0.99),),
+        (Section("Received images", (Table("Every case", _COLUMNS, tuple(rows)), text)),),
+        {"rows": rows},
+    )
+
+
+def _row(streams: str, losses: tuple[float, ...], duration_s: float) -> tuple[Cell, ...]:
+    outcomes = _measure(streams, losses, duration_s)
+    delivered, shown = sum(one.delivered for one in outcomes), sum(one.shown for one in outcomes)
+    in_time = shown - sum(one.late for one in outcomes)
+    count = len(losses) * len(streams.split(","))
+    cpu, emulator = (each / count / outcomes[0].duration_s for each in (outcomes[0].cpu_s, outcomes[0].emulator_cpu_s))
+    return (len(losses), streams, losses[0], delivered / shown, min(delivered / in_time, 1.0), cpu, emulator)
+
+
+def _measure(streams: str, losses: tuple[float, ...], duration_s: float) -> list[Outcome]:
+    program = [sys.executable, "-m", "tests.drivers.kinect1.endurance", str(duration_s), *map(str, losses)]
+    done = testbed.run([*program, "--streams", streams], timeout_s=duration_s + 120, cameras=len(losses))
     if done.returncode != 0:
         raise RuntimeError(done.stderr)
     return [Outcome(**json.loads(line)) for line in done.stdout.splitlines()]
@@ -65,7 +96,3 @@ def _unpacking_ms() -> float:
     for _ in range(100):
         unpacking.depth(packed, table, DEPTH.height, DEPTH.width)
     return 10 * (time.process_time() - begin_s)
-
-
-if __name__ == "__main__":
-    main()

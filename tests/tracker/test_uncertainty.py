@@ -154,12 +154,14 @@ def test_the_truth_is_inside_the_95_percent_region_as_often_as_it_should_be():
         assert min(one.vertices, one.theta) >= 0.95
         assert one.sensed >= 0.85
         assert one.directions > 12
-        assert one.said_mm == pytest.approx(one.true_mm, rel=0.15)
+        assert one.predicted_mm == pytest.approx(one.true_mm, rel=0.15)
     assert np.mean([one.sensed for one in found]) == pytest.approx(0.95, abs=0.025)
     assert np.mean([one.vertices for one in found]) <= 0.985
-    assert np.mean([one.said_mm for one in found]) == pytest.approx(np.mean([one.true_mm for one in found]), rel=0.07)
+    assert np.mean([one.predicted_mm for one in found]) == pytest.approx(
+        np.mean([one.true_mm for one in found]), rel=0.07
+    )
 
 
 def test_a_vertex_without_the_noise_of_its_mesh_would_claim_too_much():
     found = coverage("simulated://sheet?seed=14", 8)
-    assert found.bare < 0.93 < found.vertices
+    assert found.theta_only < 0.93 < found.vertices
