@@ -11,6 +11,9 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+
 # The same examples on every machine and in every run; the first one may have to wait for a kernel to compile.
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("repeatable")
@@ -64,6 +67,20 @@ def endpoint():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture
+def open_bus(endpoint):
+    """Opens buses of the rig "demo"; the first is the router. All are closed after the test."""
+    opened = []
+
+    def open_bus():
+        opened.append(ZenohBus.open("demo", endpoint, Role.CLIENT if opened else Role.ROUTER))
+        return opened[-1]
+
+    yield open_bus
+    for bus in reversed(opened):
+        bus.close()
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from drivers.contract.device import Device
+from tests.bus.loopback import LoopbackBus
 from tests.drivers import benches
 from tests.drivers.conformance import Bench, Ear, Fault, eventually
-from tests.service.loopback import LoopbackBus
 
 
 @pytest.fixture(params=sorted(module.name for module in pkgutil.iter_modules(benches.__path__)))

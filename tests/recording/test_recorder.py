@@ -12,7 +12,7 @@ from abs_service.capture import sensor_metadata
 from abs_service.wire import message_header
 from calib.camera import Camera
 from drivers.encoding import codec
-from tests.service.recording import DEPTH, Rig, depth, metadata, read, recordings
+from tests.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
 
 
 def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):

@@ -20,7 +20,7 @@ from abs_service.tracking.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import Tracking, streams
 from drivers.contract.frame import Kind
 from drivers.encoding import codec
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 from tests.tracker.driving import default_plan, rig_of, simulate
 
 SIMULATION = simulate("simulated://sheet?seed=1")

@@ -34,7 +34,7 @@ from drivers.contract.device import AddressError, DeviceError, DeviceInfo, Devic
 from drivers.contract.frame import Frame, Kind
 from drivers.encoding.codec import CodecError
 from drivers.encoding.sensor_model import decode_camera
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
 

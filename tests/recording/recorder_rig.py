@@ -14,7 +14,7 @@ from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 
 DEPTH = keys.image("tof", "depth")
 

@@ -3,7 +3,7 @@
 import queue
 import threading
 
-from tests.service.recording import DEPTH, Rig, depth, metadata, read, recordings
+from tests.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
 
 
 class SlowFile:

@@ -7,7 +7,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import STATE
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import reinitialize
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 
 STATES = deformation_state_pb2.DeformationState.DESCRIPTOR.full_name
 

@@ -12,7 +12,7 @@ from abs_service import cli, config
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import free_path
 from drivers.simulated.address import parse
-from tests.service.takes import WALL_NS, write_take
+from tests.commands.simulated_recording import WALL_NS, write_take
 
 COUNT = 20
 SIMULATION = parse("simulated://sheet?seed=1").build()

@@ -14,7 +14,7 @@ from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import Child, State
 from abs_service.tracking.tracker_log import EstimateReport
-from tests.service.idle import Idle
+from tests.supervision.idle_process import Idle
 
 S = 1_000_000_000
 

@@ -13,9 +13,9 @@ from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.base import SensorFit
 from abs_service.tracking.noise_monitor import MINIMUM_INLIER_SHARE, MINIMUM_RESIDUALS, WINDOW_NS, NoiseMonitor
 from abs_service.tracking.session import Tracking
-from tests.service.loopback import LoopbackBus
-from tests.service.test_estimates import ESTIMATE
+from tests.bus.loopback import LoopbackBus
 from tests.tracker.driving import default_plan, drive, rig_of, simulate
+from tests.tracking.test_estimate_messages import ESTIMATE
 
 PERIOD_NS = 33_000_000
 OK, WARNING = Message.LEVEL_OK, Message.LEVEL_WARNING

@@ -2,7 +2,7 @@ from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus.health import PERIOD_NS, Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 
 
 class Rig:

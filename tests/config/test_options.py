@@ -24,8 +24,8 @@ from drivers.simulated.address import parse
 from drivers.simulated.sensors.exposure import Head
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
 from drivers.simulated.simulation import Simulation
-from tests.service.options import OPTIONS, PACKAGES
-from tests.service.takes import write_take
+from tests.commands.simulated_recording import write_take
+from tests.config.options import OPTIONS, PACKAGES
 
 #: From the last moment of rest until everything moves.
 EXPOSURES = range(28, 40)
@@ -87,15 +87,9 @@ def take(folder):
 
 
 def test_every_part_has_a_rig_in_which_it_runs():
-    """A new module with `Settings` belongs into `tests/service/options.py`."""
+    """A new module with `Settings` belongs into `tests/config/options.py`."""
     there = {f"{package}.{name}" for package in PACKAGES.values() for name in plugins.available(package)}
     assert {option.module for option in OPTIONS.values()} == there
-
-
-def test_the_readme_names_every_part():
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    rows = "".join(line for line in readme.splitlines() if line.startswith("| `"))
-    assert [option.module for option in OPTIONS.values() if f"`{option.part.partition('.')[2]}`" not in rows] == []
 
 
 def parts(rig):

@@ -21,8 +21,8 @@ from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
 from abs_service.wire import estimate_messages
-from tests.service.idle import Idle
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
+from tests.supervision.idle_process import Idle
 
 RIG = """
 version = 1

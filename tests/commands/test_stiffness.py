@@ -10,7 +10,7 @@ import pytest
 from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
 from drivers.simulated.address import parse
-from tests.service.takes import write_take
+from tests.commands.simulated_recording import write_take
 
 ROOT = Path(__file__).parents[2]
 TOML = (ROOT / "examples" / "gravity.toml").read_text(encoding="utf-8")

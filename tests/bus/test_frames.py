@@ -15,7 +15,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
-from tests.service.loopback import LoopbackBus
+from tests.bus.loopback import LoopbackBus
 
 
 def frame(seq, sensor="tof", stream="depth", epoch=0):
