@@ -12,7 +12,7 @@ from drivers.kinect1 import unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.packets import DEPTH
 from evaluation.experiment import Context, Findings, UnavailableError, at_least
-from tests.drivers.kinect1 import testbed
+from tests.drivers.kinect1.emulation import testbed
 from tests.drivers.kinect1.endurance import Outcome
 
 TITLE = "Kinect v1: whole images and CPU time, by emulated cameras"

@@ -11,7 +11,7 @@ from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.replay import Recording
-from tests.drivers import o3r_buffer
+from tests.drivers.o3r import pcic_messages
 
 CAMERA = """\
 [depth]
@@ -109,14 +109,14 @@ def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
 def test_a_recording_of_another_program_brings_its_calibration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "o3r.data").write_bytes(o3r_buffer.exposure(3) + o3r_buffer.exposure(4))
+    (tmp_path / "o3r.data").write_bytes(pcic_messages.exposure(3) + pcic_messages.exposure(4))
     arguments = ["import", str(tmp_path / "o3r.data"), "--layout", "o3r", "--out", str(tmp_path / "out.mcap")]
     assert cli.main([*arguments, "--camera", "camera.toml"]) == Exit.USER
     assert "--camera: a recording with layout o3r needs none" in capsys.readouterr().err
     assert cli.main(arguments) == Exit.OK
     assert "2 depth, 2 depth/deviation, 2 depth/amplitude, 2 depth/confidence images" in capsys.readouterr().out
     recording = Recording(tmp_path / "out.mcap")
-    assert recording.cameras["depth"].fx == o3r_buffer.LENS[0]
+    assert recording.cameras["depth"].fx == pcic_messages.LENS[0]
     deviations = [frame for frame in frames_of(tmp_path / "out.mcap") if frame.kind == Kind.DEVIATION]
     assert [frame.unit for frame in deviations] == ["m", "m"]
 

@@ -1,8 +1,8 @@
 """A rig of two emulated Kinects and a simulated time-of-flight camera that look at the same simulated sheet.
 
-The emulated cameras show films, made beforehand, of the scene that the simulated device sees. Its scene begins with its
-first exposure; so whoever runs this listens for that on the bus and lets the films play from then on. The sheet moves
-slowly: the films have few images per second, and a machine that is late must not show another place.
+The emulated cameras play sequences that were rendered from the scene of the simulated device. The scene starts with
+its first exposure, which this process waits for on the bus to start the sequences. The sheet moves slowly, because the
+sequences have a low frame rate, and a busy machine must not display an outdated pose.
 
   umockdev-run … -- python -m tests.system.kinects FOLDER ENDPOINT      prints every estimate as `run` does
 """
@@ -15,19 +15,19 @@ from pathlib import Path
 
 from calib import pose
 from drivers.simulated import address
-from tests.drivers.kinect1 import studio
-from tests.drivers.kinect1.testbed import SERIALS, Server
+from tests.drivers.kinect1.emulation import rendered_images
+from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
 from tests.system.running import START_S, RigListener, wait_until
 
 SCENE = "simulated://sheet?seed=1&sensors=tof&speed=0.05"
 
-#: Length and rate of the films.
-FILM_S, FILM_HZ = 60.0, 2
+#: Length and frame rate of the sequences.
+SEQUENCE_S, SEQUENCE_HZ = 60.0, 2
 
-#: Estimates with every camera after which all is said, and how long they are waited for [s].
+#: Number of estimates with every camera that are sufficient, and timeout for them [s].
 ESTIMATES, PATIENCE_S = 30, 30.0
 
-#: Where the Kinects are, on both sides of the time-of-flight camera, and what they are called.
+#: Names and poses of the Kinects, on both sides of the time-of-flight camera.
 POSES = {name: pose.look_at((x, -0.05, 0.0), (0.0, 0.0, 1.0)) for name, x in (("left", -0.25), ("right", 0.25))}
 
 
@@ -40,7 +40,7 @@ def write_rig(path: Path, endpoint: str) -> None:
         "sigma = [[1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14], [5.0e-4, 0.0, 0.0, 0.0]]\n",
     ]
     for (name, T_rs), serial in zip(POSES.items(), SERIALS):
-        T_rc = T_rs @ studio.PLANE.color_camera().T_rs
+        T_rc = T_rs @ rendered_images.PLANE.color_camera().T_rs
         parts += [
             f'[devices.{name}]\nuri = "kinect1://{serial}"\n',
             f'[sensors.{name}_depth]\ndevice = "{name}"\nhead = "depth"\ncamera = {{ T_rs = {T_rs.tolist()} }}',
@@ -59,19 +59,19 @@ def write_rig(path: Path, endpoint: str) -> None:
 
 
 def main(folder: Path, endpoint: str) -> None:
-    """Makes the films, runs the rig, lets the films play and ends the rig when it has tracked for a while."""
+    """Renders the sequences, runs the rig, plays the sequences and stops the rig when it has tracked for a while."""
     scene = address.parse(SCENE).build().scene
-    films = [folder / f"{name}.npz" for name in POSES]
-    for film, T_rs in zip(films, POSES.values()):
-        studio.shoot(film, scene, T_rs, FILM_S, FILM_HZ)
+    sequences = [folder / f"{name}.npz" for name in POSES]
+    for sequence, T_rs in zip(sequences, POSES.values()):
+        rendered_images.render(sequence, scene, T_rs, SEQUENCE_S, SEQUENCE_HZ)
     rig = folder / "rig.toml"
     write_rig(rig, endpoint)
-    with Server("--films", *map(str, films)) as server:
+    with Server("--sequences", *map(str, sequences)) as server:
         command = [sys.executable, "-m", "abs_service", "run", str(rig), "--json"]
         with subprocess.Popen(command) as process, RigListener(endpoint, rig="kinects") as listener:
             wait_until(lambda: listener.frames("tof/depth/image"), START_S, "an image of the simulated camera")
             first = listener.frames("tof/depth/image")[0]
-            server.tell(f"play {first.header.t_host_ns - round(first.seq * 1e9 / 30)} {FILM_HZ}")
+            server.send(f"play {first.header.t_host_ns - round(first.seq * 1e9 / 30)} {SEQUENCE_HZ}")
             wait_until(listener.states, START_S, "an estimate")
             # TRACKING means with every camera: on a busy machine images are late, so it may take a while.
             enough, end_s = listener.tracks_since(0, ESTIMATES), time.monotonic() + PATIENCE_S

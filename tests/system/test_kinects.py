@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from tests.drivers.kinect1 import testbed
+from tests.drivers.kinect1.emulation import testbed
 from tests.system.kinects import ESTIMATES
 
 pytestmark = [

@@ -1,4 +1,4 @@
-"""Receives emulated cameras in real time for a while and says what came, as one line of JSON per camera.
+"""Receives emulated cameras in real time and prints the outcome as one line of JSON per camera.
 
 Run it under umockdev: `testbed.run([sys.executable, "-m", "tests.drivers.kinect1.endurance", SECONDS, …])`.
 """
@@ -14,27 +14,27 @@ from drivers.contract.device import Device, DeviceState, Truth
 from drivers.contract.frame import Frame
 from drivers.kinect1 import open_device
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.kinect1.emulator import EmulatedKinect, noise
-from tests.drivers.kinect1.packing import unpack
-from tests.drivers.kinect1.testbed import SERIALS, Server
+from tests.drivers.kinect1.emulation.bit_packing import unpack
+from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect, noise
+from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
 
-#: Until compilers and caches have done what they do once [s].
+#: Warm-up of compilers and caches [s].
 WARM_UP_S = 3.0
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of one camera.
+    """Outcome of one camera.
 
     Attributes:
         delivered: frames, of all its streams.
-        shown: images from the first to the last delivered one of each stream.
-        late: images that came when no transfer was waiting, because this process did not get the processor.
-        torn: delivered frames that are none of the images that were shown.
-        dropped: images, as the driver counts them.
-        cpu_s: processor time of the whole process [s].
-        emulator_cpu_s: of the emulator's [s].
-        duration_s: how long it took [s].
+        shown: emulated images from the first to the last delivered one of each stream.
+        late: images without a pending transfer, because this process was not scheduled.
+        torn: delivered frames that match no emulated image.
+        dropped: number of images that the driver counts as dropped.
+        cpu_s: CPU time of this process [s].
+        emulator_cpu_s: CPU time of the emulator [s].
+        duration_s: duration [s].
     """
 
     delivered: int
@@ -48,10 +48,10 @@ class Outcome:
 
 
 class Auditor:
-    """A sink that checks each frame and keeps none.
+    """A sink that checks each frame and stores none.
 
     Args:
-        kinect: what is shown; None if the pixels shall not be looked at, which costs time.
+        kinect: the emulated camera; None to skip the comparison of pixels.
     """
 
     def __init__(self, kinect: EmulatedKinect | None) -> None:
@@ -75,41 +75,41 @@ class Auditor:
 
     @property
     def shown(self) -> int:
-        """Images from the first to the last delivered one."""
+        """Number of emulated images from the first to the last delivered one."""
         return sum(seqs[-1] - seqs[0] + 1 for seqs in self._seqs.values())
 
 
 def _checksums(kinect: EmulatedKinect) -> dict[str, set[int]]:
     table = ReferencePlane().table()
-    depth = (table[unpack(image, 11)] for image in kinect.films["depth"].images)
-    infrared = (unpack(image, 10).astype("<u2") for image in kinect.films["ir"].images)
+    depth = (table[unpack(image, 11)] for image in kinect.packet_streams["depth"].images)
+    infrared = (unpack(image, 10).astype("<u2") for image in kinect.packet_streams["ir"].images)
     return {
         "depth": {zlib.crc32(image.tobytes()) for image in depth},
         "ir": {zlib.crc32(image.tobytes()) for image in infrared},
-        "bayer": {zlib.crc32(image) for image in kinect.films["color"].images},
+        "bayer": {zlib.crc32(image) for image in kinect.packet_streams["color"].images},
     }
 
 
 def receive(server: Server, losses: list[float], streams: str, seconds: float, audit: bool) -> list[Outcome]:
-    """Receives cameras that lose such shares of their packets."""
+    """Receives cameras with the given fractions of packet loss."""
     devices: list[Device] = []
     auditors = [Auditor(noise(seed=index + 1) if audit else None) for index in range(len(losses))]
     for index, (auditor, share) in enumerate(zip(auditors, losses)):
         devices.append(open_device(f"kinect1://{SERIALS[index]}?streams={streams}", time.monotonic_ns))
-        server.tell(f"lose {index} {share}")
+        server.send(f"lose {index} {share}")
         devices[-1].start(auditor)
     time.sleep(WARM_UP_S)
-    begin_s, cpu_s, emulator_cpu_s = time.monotonic(), time.process_time(), float(server.tell("cpu"))
+    begin_s, cpu_s, emulator_cpu_s = time.monotonic(), time.process_time(), float(server.send("cpu"))
     time.sleep(seconds)
     cpu_s = time.process_time() - cpu_s
-    emulator_cpu_s = float(server.tell("cpu")) - emulator_cpu_s
+    emulator_cpu_s = float(server.send("cpu")) - emulator_cpu_s
     duration_s = time.monotonic() - begin_s
     for device in devices:
         device.stop()
     outcomes = []
     for index, (device, auditor) in enumerate(zip(devices, auditors)):
         dropped = sum(device.counters.values()) - device.counters["frames"]
-        late = int(server.tell(f"late {index}"))
+        late = int(server.send(f"late {index}"))
         counts = (auditor.frames.total(), auditor.shown, late, auditor.torn, dropped)
         outcomes.append(Outcome(*counts, cpu_s, emulator_cpu_s, duration_s))
         device.close()

@@ -1,4 +1,4 @@
-"""What may happen to a camera, on unmodified libusb: each function is one story, run under umockdev by its name.
+"""Scenarios on unmodified libusb under umockdev, one function each, run by name.
 
 umockdev-run … -- python -m tests.drivers.kinect1.scenarios NAME
 """
@@ -19,65 +19,65 @@ from drivers.contract.discovery import Availability
 from drivers.contract.frame import Frame
 from drivers.kinect1 import discover, open_device, unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.conformance import eventually, resources
-from tests.drivers.kinect1.emulator import noise
-from tests.drivers.kinect1.listener import Listener
-from tests.drivers.kinect1.testbed import SERIALS, Server
+from tests.drivers.conformance.bench import eventually, resources
+from tests.drivers.kinect1.emulation.emulated_camera import noise
+from tests.drivers.kinect1.emulation.testbed import SERIALS, Server
+from tests.drivers.recording_sink import RecordingSink
 
 TABLE = ReferencePlane().table()
 
 
 def streams() -> None:
-    """Depth and colour arrive bit for bit as they were shown, none is missing, and nothing is left behind."""
+    """Depth and colour are bit-exact and complete, and no resources leak."""
     with Server("--patient"):
         held: list[Counter[str]] = []
         for _ in range(4):
             device = open_device("kinect1://", time.monotonic_ns)
-            listener = watch(device, each=8)
+            sink = watch(device, each=8)
             device.controls.set("exposure_s", 0.01)
             assert device.controls.get("exposure_s") == pytest.approx(0.01, abs=1e-4)
             device.close()
-            assert [state for state, _ in listener.states] == ["opening", "streaming", "closed"]
-            compare(listener.frames)
+            assert [state for state, _ in sink.states] == ["opening", "streaming", "closed"]
+            compare(sink.frames)
             for stream in ("depth", "bayer"):
-                seqs = [frame.seq for frame in listener.of(stream)]
+                seqs = [frame.seq for frame in sink.of(stream)]
                 assert seqs == list(range(len(seqs)))
             held.append(resources())
         assert not held[-1] - held[0], held[-1] - held[0]
 
 
 def infrared() -> None:
-    """The other use of the colour pipe."""
+    """Infra-red images on the colour endpoint."""
     with Server("--patient"):
         device = open_device(f"kinect1://{SERIALS[0]}?streams=ir", time.monotonic_ns)
-        listener = Listener()
-        device.start(listener)
-        listener.wait(lambda: len(listener.frames) >= 3)
+        sink = RecordingSink()
+        device.start(sink)
+        sink.wait(lambda: len(sink.frames) >= 3)
         device.close()
-        film = noise().films["ir"]
-        for frame in listener.frames:
-            shown = np.frombuffer(film.shown(frame.t_device_ticks // 2_000_000), np.uint8)
+        stream = noise().packet_streams["ir"]
+        for frame in sink.frames:
+            shown = np.frombuffer(stream.shown(frame.t_device_ticks // 2_000_000), np.uint8)
             np.testing.assert_array_equal(frame.data, unpacking.infrared(shown, 488, 640))
 
 
 def loss() -> None:
-    """With one packet in a hundred lost most images are dropped and counted; only whole ones arrive."""
+    """With 1 % packet loss most images are dropped and counted; only complete ones are delivered."""
     with Server("--patient") as server:
         device = open_device("kinect1://", time.monotonic_ns)
-        listener = Listener()
-        server.tell("lose 0 0.01")
-        device.start(listener)
-        listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= 4)
+        sink = RecordingSink()
+        server.send("lose 0 0.01")
+        device.start(sink)
+        sink.wait(lambda: min(len(sink.of("depth")), len(sink.of("bayer"))) >= 4)
         device.stop()
-        compare(listener.frames)
+        compare(sink.frames)
         counters = device.counters
-        last = {stream: listener.of(stream)[-1].seq for stream in ("depth", "bayer")}
-        missing = sum(seq + 1 - len(listener.of(stream)) for stream, seq in last.items())
+        last = {stream: sink.of(stream)[-1].seq for stream in ("depth", "bayer")}
+        missing = sum(seq + 1 - len(sink.of(stream)) for stream, seq in last.items())
         assert 0 < missing <= counters["lost_packets"] <= missing + 150
         assert counters["bad_header"] == counters["wrong_size"] == counters["resynchronised"] == 0
         gauges = device.gauges
         assert gauges["depth.missing_packets"] > 0.005 * 242 * last["depth"]
-        server.tell("lose 0 0")
+        server.send("lose 0 0")
         again = watch(device, each=8)
         compare(again.frames)
         device.close()
@@ -87,28 +87,28 @@ def disturbance() -> None:
     """Packets that the host reports as damaged are not used, whatever they hold: their images are dropped."""
     with Server("--patient") as server:
         device = open_device("kinect1://?streams=color", time.monotonic_ns)
-        listener = Listener()
-        device.start(listener)
-        listener.wait(lambda: len(listener.frames) >= 3)
-        server.tell("disturb 0")
+        sink = RecordingSink()
+        device.start(sink)
+        sink.wait(lambda: len(sink.frames) >= 3)
+        server.send("disturb 0")
         assert eventually(lambda: device.counters["lost_packets"] >= 20)
         device.close()
-        compare(listener.frames)
+        compare(sink.frames)
         assert device.gauges["bayer.missing_packets"] >= 20
 
 
 def unplugging() -> None:
-    """The device fails and says why; plugged in again it is found and opened, by the same number."""
+    """An unplugged device fails with a reason; plugged in again it is found and opened by its serial number."""
     with Server("--patient") as server:
         device = open_device("kinect1://", time.monotonic_ns)
-        listener = watch(device, each=2)
-        server.tell("unplug 0")
-        assert "unplugged" in listener.wait_for(DeviceState.FAILED)
+        sink = watch(device, each=2)
+        server.send("unplug 0")
+        assert "unplugged" in sink.wait_for(DeviceState.FAILED)
         device.close()
         assert discover(1.0) == []
         with pytest.raises(DeviceError, match="not attached"):
             open_device(f"kinect1://{SERIALS[0]}", time.monotonic_ns)
-        server.tell("plug 0")
+        server.send("plug 0")
         assert [found.info.serial for found in discover(1.0)] == [SERIALS[0]]
         device = open_device(f"kinect1://{SERIALS[0]}", time.monotonic_ns)
         compare(watch(device, each=2).frames)
@@ -116,20 +116,20 @@ def unplugging() -> None:
 
 
 def kernel_driver() -> None:
-    """The kernel's webcam driver gives way; where it must not, the message says how to send it away."""
+    """The kernel's webcam driver is detached; if that fails, the message names the remedy."""
     with Server("--patient") as server:
-        server.tell("driver 0 gspca_kinect")
+        server.send("driver 0 gspca_kinect")
         assert discover(1.0)[0].availability == Availability.READY
         device = open_device("kinect1://", time.monotonic_ns)
         compare(watch(device, each=2).frames)
         device.close()
-        server.tell("driver 0 stubborn")
+        server.send("driver 0 stubborn")
         with pytest.raises(DeviceError, match="modprobe -r gspca_kinect"):
             open_device("kinect1://", time.monotonic_ns)
 
 
 def permission() -> None:
-    """Whoever may not open the camera is told the rule that allows it, and where it belongs."""
+    """Missing permission: the message contains the udev rule and its path."""
     with Server("--patient") as server, nobody(server.root):
         (found,) = discover(1.0)
         assert found.availability == Availability.NO_PERMISSION, found
@@ -140,59 +140,59 @@ def permission() -> None:
 
 
 def in_use() -> None:
-    """Who comes second is told so, and the first does not notice."""
+    """A second open fails with the reason; the first user is not affected."""
     with Server("--patient"):
         device = open_device("kinect1://", time.monotonic_ns)
-        listener = watch(device, each=2)
+        sink = watch(device, each=2)
         assert discover(1.0)[0].availability == Availability.BUSY
         with pytest.raises(DeviceError, match="another program"):
             open_device("kinect1://", time.monotonic_ns)
-        count = len(listener.frames)
-        listener.wait(lambda: len(listener.frames) > count + 2)
+        count = len(sink.frames)
+        sink.wait(lambda: len(sink.frames) > count + 2)
         device.close()
 
 
 def two() -> None:
-    """Two cameras in one program, each with its own images; one may go while the other stays."""
+    """Two cameras in one process with separate images; unplugging one does not affect the other."""
     with Server("--patient", "--cameras", "2") as server:
         assert {found.info.serial for found in discover(1.0)} == set(SERIALS)
         devices = [open_device(f"kinect1://{serial}", time.monotonic_ns) for serial in SERIALS]
-        listeners = [watch(device, each=3) for device in devices]
-        server.tell("unplug 0")
-        listeners[0].wait_for(DeviceState.FAILED)
+        sinks = [watch(device, each=3) for device in devices]
+        server.send("unplug 0")
+        sinks[0].wait_for(DeviceState.FAILED)
         devices[0].close()
-        count = len(listeners[1].frames)
-        listeners[1].wait(lambda: len(listeners[1].frames) > count + 4)
+        count = len(sinks[1].frames)
+        sinks[1].wait(lambda: len(sinks[1].frames) > count + 4)
         devices[1].close()
-        for seed, listener in enumerate(listeners, start=1):
-            compare(listener.frames, seed)
+        for seed, sink in enumerate(sinks, start=1):
+            compare(sink.frames, seed)
 
 
-def watch(device: Device, each: int) -> Listener:
-    """A listener that has heard so many images of depth and colour each."""
-    listener = Listener()
-    device.start(listener)
-    listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= each, 60)
-    return listener
+def watch(device: Device, each: int) -> RecordingSink:
+    """A sink that has received so many images of depth and colour each."""
+    sink = RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: min(len(sink.of("depth")), len(sink.of("bayer"))) >= each, 60)
+    return sink
 
 
 def compare(frames: list[Frame], seed: int = 1) -> None:
-    """Asserts that frames are what the emulator showed at their time, bit for bit."""
+    """Asserts that frames are bit-exact copies of the emulated images at their time."""
     assert frames
-    films = noise(seed=seed).films
+    packet_streams = noise(seed=seed).packet_streams
     for frame in frames:
         number = frame.t_device_ticks // 2_000_000
         if frame.stream == "depth":
-            shown = np.frombuffer(films["depth"].shown(number), np.uint8)
+            shown = np.frombuffer(packet_streams["depth"].shown(number), np.uint8)
             np.testing.assert_array_equal(frame.data, unpacking.depth(shown, TABLE, 480, 640))
         else:
-            assert frame.data.tobytes() == films["color"].shown(number)
+            assert frame.data.tobytes() == packet_streams["color"].shown(number)
 
 
 @contextmanager
 def nobody(root: Path):
-    """Becomes a user who may see the testbed but not open the camera."""
-    discover(1.0)  # imports what that user might not even be allowed to read
+    """Switches to a user without permission to open the camera."""
+    discover(1.0)  # imports modules that this user may not be able to read
     (root / "dev/bus/usb/001/002").chmod(0)
     if os.geteuid() != 0:
         yield

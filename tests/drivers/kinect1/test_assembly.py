@@ -1,21 +1,21 @@
-"""Packets become images, and nothing but whole images, whatever happens to them on the way."""
+"""Assembly of packets: only complete images are delivered, for arbitrary damage in transit."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.kinect1.assembly import CAUSES, Assembler
+from drivers.kinect1.assembly import CAUSES, PLACE, SEQ, STATE_SIZE, Assembler, assemble
 from drivers.kinect1.transport.packets import COLOR, DEPTH, INFRARED, PACKET_BYTES, PacketFormat
-from tests.drivers.kinect1.film import Film, begin
+from tests.drivers.kinect1.emulation.packet_stream import PacketStream, begin
 
-#: Images of 4 packets, so that an example of a few packets tells something.
+#: Images of 4 packets, so that short examples contain several images.
 TINY = PacketFormat(endpoint=0x82, base=0x70, payload=20, width=8, height=9, bits=8)
 
 
-def film(form: PacketFormat, images: int = 3, lost: float = 0.0) -> Film:
+def stream_of(form: PacketFormat, images: int = 3, lost: float = 0.0) -> PacketStream:
     generator = np.random.default_rng(7)
-    return Film(form, [generator.bytes(form.image_bytes) for _ in range(images)], lost)
+    return PacketStream(form, [generator.bytes(form.image_bytes) for _ in range(images)], lost)
 
 
 def feed(assembler: Assembler, packets: np.ndarray, lengths: np.ndarray, at_once: int = 64) -> list[tuple]:
@@ -27,8 +27,8 @@ def feed(assembler: Assembler, packets: np.ndarray, lengths: np.ndarray, at_once
     return result
 
 
-def watch(assembler: Assembler, shown: Film, first: int, count: int) -> list[tuple]:
-    """What an assembler makes of so many microframes from the first on; rows count from the first as well."""
+def watch(assembler: Assembler, shown: PacketStream, first: int, count: int) -> list[tuple]:
+    """Images assembled from microframes; rows count from the first one."""
     result = []
     for start in range(first, first + count, 640):
         images = feed(assembler, *shown.microframes(start, min(640, first + count - start)))
@@ -44,7 +44,7 @@ def test_the_formats_are_what_the_camera_sends(form: PacketFormat, packets: int,
 
 @pytest.mark.parametrize("form", [DEPTH, COLOR, INFRARED])
 def test_without_loss_every_image_arrives_as_it_was_shown(form: PacketFormat) -> None:
-    shown, assembler = film(form), Assembler(form)
+    shown, assembler = stream_of(form), Assembler(form)
     images = watch(assembler, shown, 0, 8000)
     assert [image[:3] for image in images] == [(i, i * 2_000_000, shown.shown(i)) for i in range(30)]
     assert [image[3] for image in images] == [begin(i) for i in range(30)]
@@ -52,7 +52,7 @@ def test_without_loss_every_image_arrives_as_it_was_shown(form: PacketFormat) ->
 
 
 def test_one_lost_packet_in_a_hundred_drops_whole_images_and_counts_every_one() -> None:
-    shown, assembler = film(DEPTH, lost=0.01), Assembler(DEPTH)
+    shown, assembler = stream_of(DEPTH, lost=0.01), Assembler(DEPTH)
     images = watch(assembler, shown, 0, 60 * 8000)
     first = (images[0][1]) // DEPTH.period_ticks
     assert all(data == shown.shown(first + seq) for seq, _, data, _ in images)
@@ -65,7 +65,7 @@ def test_one_lost_packet_in_a_hundred_drops_whole_images_and_counts_every_one() 
 
 
 def test_images_of_which_nothing_came_are_counted_by_the_clock() -> None:
-    shown, assembler = film(DEPTH), Assembler(DEPTH)
+    shown, assembler = stream_of(DEPTH), Assembler(DEPTH)
     watch(assembler, shown, 0, begin(3))
     images = watch(assembler, shown, begin(10), 800)
     assert [seq for seq, *_ in images] == [10, 11, 12]
@@ -73,7 +73,7 @@ def test_images_of_which_nothing_came_are_counted_by_the_clock() -> None:
 
 
 def test_the_ticks_may_wrap() -> None:
-    shown, assembler = film(COLOR), Assembler(COLOR)
+    shown, assembler = stream_of(COLOR), Assembler(COLOR)
     wrap = 2**32 // COLOR.period_ticks
     images = watch(assembler, shown, begin(wrap - 1), 1600)
     assert [seq for seq, *_ in images] == list(range(6))
@@ -94,7 +94,7 @@ def test_the_ticks_may_wrap() -> None:
     ],
 )
 def test_a_damaged_packet_drops_its_image_for_its_cause(change, causes: str) -> None:
-    shown, assembler = film(TINY), Assembler(TINY)
+    shown, assembler = stream_of(TINY), Assembler(TINY)
     packets, lengths = shown.microframes(0, 600)
     change(packets, lengths)
     images = feed(assembler, packets, lengths)
@@ -104,14 +104,14 @@ def test_a_damaged_packet_drops_its_image_for_its_cause(change, causes: str) -> 
 
 
 def test_what_is_beyond_the_end_of_a_packet_is_ignored() -> None:
-    shown, assembler = film(DEPTH), Assembler(DEPTH)
+    shown, assembler = stream_of(DEPTH), Assembler(DEPTH)
     packets, lengths = shown.microframes(0, 400)
     lengths[lengths > 0] = PACKET_BYTES
     assert [data for _, _, data, _ in feed(assembler, packets, lengths)] == [shown.shown(0)]
 
 
 def reference(form: PacketFormat, packets: np.ndarray, lengths: np.ndarray) -> tuple[list[bytes], dict[str, int]]:
-    """Images and drops as the text says it, packet by packet, without a counter of images."""
+    """Reference implementation: images and drops, packet by packet, without sequence numbers."""
     images: list[bytes] = []
     dropped: dict[str, int] = dict.fromkeys(CAUSES, 0)
     parts: list[bytes] | None = None  # of the image so far; None while the beginning of one is awaited
@@ -160,7 +160,7 @@ DAMAGE = st.tuples(
 @settings(max_examples=200)
 @given(st.lists(DAMAGE, max_size=8), st.integers(1, 17))
 def test_damaged_packets_are_judged_as_the_reference_does(damages: list, at_once: int) -> None:
-    shown = film(TINY)
+    shown = stream_of(TINY)
     rows = np.concatenate([np.arange(begin(i), begin(i) + TINY.packets) for i in range(10)])
     packets, lengths = (part[rows].copy() for part in shown.microframes(0, 2700))
     for row, (what, value, byte) in damages:
@@ -188,10 +188,12 @@ def test_whatever_comes_over_the_pipe_no_byte_outside_the_image_is_touched(seed:
     packets[plausible, 3] = form.base + generator.choice([1, 2, 2, 5], plausible.sum())
     packets[plausible, 5] = np.arange(plausible.sum()) & 255
     lengths = generator.integers(0, 2**32, 300, np.uint32)
-    assembler = Assembler(form)
-    # The image lies within a larger array whose ends are watched.
+    # The image is a view of a larger array with guard bytes at both ends.
     guarded = np.full(form.image_bytes + 2048, 0xA5, np.uint8)
-    assembler._image = guarded[1024:-1024]
-    feed(assembler, packets, lengths)
+    state = np.zeros(STATE_SIZE, np.int64)
+    state[[PLACE, SEQ]] = -1
+    row = 0
+    while row < len(packets):
+        row = assemble(packets, lengths, row, state, guarded[1024:-1024], form.base, form.payload)
     assert (guarded[:1024] == 0xA5).all()
     assert (guarded[-1024:] == 0xA5).all()

@@ -1,4 +1,4 @@
-"""The control protocol: what the camera is told, and what it may answer."""
+"""Control protocol: commands, and valid and invalid answers."""
 
 import contextlib
 
@@ -10,11 +10,11 @@ from drivers.contract.device import DeviceError
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.commands import ANSWER_BYTES, TIMEOUT_S, Commands, ProtocolError
-from tests.drivers.kinect1.emulator import EmulatedKinect
+from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect
 
 
 class Pipe:
-    """An emulated camera's control pipe, and a clock that moves when somebody sleeps."""
+    """Control endpoint of an emulated camera, with a clock that advances by sleeping."""
 
     def __init__(self, kinect: EmulatedKinect) -> None:
         self.kinect = kinect
@@ -48,10 +48,10 @@ def test_answers_that_take_their_time_are_waited_for() -> None:
 
 
 def test_tags_begin_anew_after_65536_commands(pipe: Pipe) -> None:
-    pipe.commands._tag = 0xFFFF
-    pipe.commands.write_register(0x47, 1)
-    pipe.commands.write_register(0x47, 2)
-    assert pipe.commands._tag == 1
+    for value in range(0x10000):
+        pipe.commands.write_register(0x47, value)
+    pipe.commands.write_register(0x47, 5)  # the emulator and the driver compare tags
+    assert pipe.kinect.registers[0x47] == 5
 
 
 def test_streams_begin_and_end_as_the_camera_wants_it(pipe: Pipe) -> None:
@@ -96,14 +96,14 @@ def test_exposure_and_what_the_color_camera_decides_by_itself(pipe: Pipe) -> Non
 
 @pytest.mark.parametrize("nothing", [b"", bytes(ANSWER_BYTES)])
 def test_no_answer_is_an_error_after_its_time(pipe: Pipe, nothing: bytes) -> None:
-    pipe.kinect.spoil = lambda _: nothing
+    pipe.kinect.corrupt = lambda _: nothing
     with pytest.raises(ProtocolError, match=r"0x02 within 1 s.*power"):
         pipe.commands.read_register(0x15)
     assert pipe.now_ns == pytest.approx(TIMEOUT_S * 1e9, rel=0.05)
 
 
 @pytest.mark.parametrize(
-    "spoil",
+    "corrupt",
     [
         lambda answer: b"XX" + answer[2:],
         lambda answer: answer[:2] + b"\x09" + answer[3:],
@@ -113,8 +113,8 @@ def test_no_answer_is_an_error_after_its_time(pipe: Pipe, nothing: bytes) -> Non
         lambda answer: answer[:5],
     ],
 )
-def test_an_answer_to_something_else_is_refused(pipe: Pipe, spoil) -> None:
-    pipe.kinect.spoil = spoil
+def test_an_answer_to_something_else_is_refused(pipe: Pipe, corrupt) -> None:
+    pipe.kinect.corrupt = corrupt
     with pytest.raises(ProtocolError, match="command 0x02 with tag 0"):
         pipe.commands.read_register(0x15)
 
@@ -122,7 +122,9 @@ def test_an_answer_to_something_else_is_refused(pipe: Pipe, spoil) -> None:
 @given(st.binary(max_size=ANSWER_BYTES), st.sampled_from(["plane", "gain", "exposure", "start"]), st.booleans())
 def test_whatever_it_answers_is_understood_or_an_error_of_the_driver(answer: bytes, what: str, framed: bool) -> None:
     pipe = Pipe(EmulatedKinect({}))
-    pipe.kinect.spoil = lambda good: good[:2] + bytes([len(answer) // 2, 0]) + good[4:8] + answer if framed else answer
+    pipe.kinect.corrupt = lambda good: (
+        good[:2] + bytes([len(answer) // 2, 0]) + good[4:8] + answer if framed else answer
+    )
     actions = {
         "plane": pipe.camera.reference_plane,
         "gain": pipe.camera.infrared_gain,
@@ -131,5 +133,5 @@ def test_whatever_it_answers_is_understood_or_an_error_of_the_driver(answer: byt
     }
     with contextlib.suppress(DeviceError):
         actions[what]()
-    pipe.kinect.spoil = lambda good: good
+    pipe.kinect.corrupt = lambda good: good
     assert pipe.commands.read_register(0x15) == pipe.kinect.registers[0x15]  # the next command is answered

@@ -1,4 +1,4 @@
-"""The device on emulated USB: what it delivers, what it refuses and why, and that it leaves nothing behind."""
+"""The device on fake USB: frames, error messages, and release of resources."""
 
 import errno
 import math
@@ -22,11 +22,12 @@ from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.kinect1 import descriptors
-from tests.drivers.kinect1.emulator import EmulatedKinect, noise
-from tests.drivers.kinect1.fake_usb import FakeBackend, FakeDevice, FakeReader
-from tests.drivers.kinect1.listener import Listener
-from tests.drivers.kinect1.packing import unpack
+from tests.drivers.conformance.bench import eventually
+from tests.drivers.kinect1.emulation import usb_descriptors
+from tests.drivers.kinect1.emulation.bit_packing import unpack
+from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect, noise
+from tests.drivers.kinect1.emulation.fake_usb import FakeBackend, FakeDevice, FakeReader
+from tests.drivers.recording_sink import RecordingSink
 
 SERIAL = "A00363A01234040A"
 BOTH = (Stream.DEPTH, Stream.COLOR)
@@ -44,46 +45,46 @@ def opened(fake: FakeDevice, streams: tuple[Stream, ...] = BOTH, **of_backend: b
 
 def test_depth_in_metres_and_the_mosaic_as_it_was_measured(fake: FakeDevice) -> None:
     fake.pace = math.inf
-    device, listener = opened(fake), Listener()
-    device.start(listener)
-    listener.wait(lambda: min(len(listener.of("depth")), len(listener.of("bayer"))) >= 4)
+    device, sink = opened(fake), RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: min(len(sink.of("depth")), len(sink.of("bayer"))) >= 4)
     device.close()
     table = np.nan_to_num(ReferencePlane().z())
-    films = fake.kinect.films
-    for frame in listener.of("depth")[:4]:
-        raw = unpack(films["depth"].shown(frame.t_device_ticks // 2_000_000), 11)
+    packet_streams = fake.kinect.packet_streams
+    for frame in sink.of("depth")[:4]:
+        raw = unpack(packet_streams["depth"].shown(frame.t_device_ticks // 2_000_000), 11)
         assert (frame.kind, frame.geometry, frame.encoding) == (Kind.DEPTH, Geometry.Z, "16UC1")
         np.testing.assert_allclose(
             np.nan_to_num(frame.si()).ravel(), np.where(table < 13.1, table, 0)[raw], atol=1.1e-4
         )
-    for frame in listener.of("bayer")[:4]:
+    for frame in sink.of("bayer")[:4]:
         assert (frame.kind, frame.encoding, frame.data.shape) == (Kind.BAYER, "bayer_grbg8", (480, 640))
-        assert frame.data.tobytes() == films["color"].shown(frame.t_device_ticks // 2_000_000)
+        assert frame.data.tobytes() == packet_streams["color"].shown(frame.t_device_ticks // 2_000_000)
         assert frame.calib_id == device.cameras["color"].calib_id
-    assert device.counters["frames"] == len(listener.frames)
+    assert device.counters["frames"] == len(sink.frames)
 
 
 def test_infrared_instead_of_color(fake: FakeDevice) -> None:
     fake.pace = math.inf
-    device, listener = opened(fake, (Stream.IR,)), Listener()
+    device, sink = opened(fake, (Stream.IR,)), RecordingSink()
     assert {camera.height for camera in device.cameras.values()} == {488}
-    device.start(listener)
-    listener.wait(lambda: len(listener.frames) >= 2)
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) >= 2)
     device.close()
-    first = listener.frames[0]
-    raw = unpack(fake.kinect.films["ir"].shown(first.t_device_ticks // 2_000_000), 10)
+    first = sink.frames[0]
+    raw = unpack(fake.kinect.packet_streams["ir"].shown(first.t_device_ticks // 2_000_000), 10)
     np.testing.assert_array_equal(first.data.ravel(), raw)
     assert "exposure_s" not in [control.name for control in device.capabilities.controls]
 
 
 def test_stamps_are_evenly_spaced_and_count_the_first_packet(fake: FakeDevice) -> None:
-    device, listener = opened(fake, (Stream.DEPTH,)), Listener()
-    device.start(listener)
-    listener.wait(lambda: len(listener.frames) >= 10)
+    device, sink = opened(fake, (Stream.DEPTH,)), RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) >= 10)
     device.close()
-    stamps = np.array([frame.t_host_ns for frame in listener.frames]) * 1e-9
+    stamps = np.array([frame.t_host_ns for frame in sink.frames]) * 1e-9
     np.testing.assert_allclose(np.diff(stamps), 1 / 30, atol=5e-3)
-    delays = [frame.t_arrival_ns - frame.t_host_ns for frame in listener.frames]
+    delays = [frame.t_arrival_ns - frame.t_host_ns for frame in sink.frames]
     assert 25e6 < np.median(delays) < 45e6  # the last packet comes 242 microframes after the first
     assert device.gauges["clock.depth/depth.steps"] == 0
 
@@ -104,18 +105,18 @@ def test_controls_reach_the_camera(fake: FakeDevice) -> None:
 
 
 def test_pulling_the_plug_fails_the_device_and_plugging_it_in_lets_it_be_opened_again(fake: FakeDevice) -> None:
-    device, listener = opened(fake), Listener()
-    device.start(listener)
-    listener.wait(lambda: len(listener.frames) > 0)
+    device, sink = opened(fake), RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) > 0)
     fake.plugged = False
-    assert "unplugged" in listener.wait_for(DeviceState.FAILED)
+    assert "unplugged" in sink.wait_for(DeviceState.FAILED)
     device.close()
     with pytest.raises(DeviceError, match="no kinect1 device is attached"):
         opened(fake)
     fake.plugged = True
-    device, listener = opened(fake), Listener()
-    device.start(listener)
-    listener.wait(lambda: len(listener.frames) > 0)
+    device, sink = opened(fake), RecordingSink()
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) > 0)
     device.close()
     assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
 
@@ -123,17 +124,16 @@ def test_pulling_the_plug_fails_the_device_and_plugging_it_in_lets_it_be_opened_
 def test_closing_from_within_the_sink_lets_go_of_the_camera(fake: FakeDevice) -> None:
     device = opened(fake)
 
-    class Impatient(Listener):
+    class Impatient(RecordingSink):
         def on_frame(self, frame) -> None:
             super().on_frame(frame)
             device.close()
 
-    listener = Impatient()
-    device.start(listener)
-    listener.wait(lambda: len(listener.frames) > 0)
-    device._thread.join(10)
-    assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
-    assert len(listener.frames) == 1
+    sink = Impatient()
+    device.start(sink)
+    sink.wait(lambda: len(sink.frames) > 0)
+    assert eventually(lambda: (fake.opened, fake.claims, fake.readers) == (0, 0, 0))
+    assert len(sink.frames) == 1
     assert fake.kinect.registers[0x06] == 0
 
 
@@ -237,7 +237,7 @@ def test_whatever_follows_the_scheme_is_an_address_or_an_error_of_the_driver(res
 
 @given(st.binary(max_size=40))
 def test_a_camera_that_tells_a_garbled_number_is_listed_all_the_same(garbled: bytes) -> None:
-    with mock.patch.object(descriptors, "string", return_value=garbled):
+    with mock.patch.object(usb_descriptors, "string", return_value=garbled):
         (found,) = find(lambda: FakeBackend([FakeDevice(EmulatedKinect({}), "")]))
     assert found.info.serial.isalnum() or found.info.serial == ""
 

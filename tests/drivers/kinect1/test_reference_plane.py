@@ -1,4 +1,4 @@
-"""Raw values become metres by the device's own calibration, and none of them is lost on the way."""
+"""Conversion of raw values to metres with the factory calibration, without loss."""
 
 import dataclasses
 import struct

@@ -1,0 +1,55 @@
+"""The device supervisor reopens an unplugged device of every driver: same device, later epoch."""
+
+import pkgutil
+from collections.abc import Iterator
+from importlib import import_module
+
+import pytest
+
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.capture import device_supervisor
+from abs_service.capture.device_supervisor import DeviceSupervisor
+from drivers.contract.device import Device
+from tests.bus.loopback import LoopbackBus
+from tests.drivers.conformance import benches
+from tests.drivers.conformance.bench import Bench, Fault, eventually
+from tests.drivers.recording_sink import RecordingSink
+
+
+@pytest.fixture(params=sorted(module.name for module in pkgutil.iter_modules(benches.__path__)))
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """The fake of each driver, one after the other."""
+    with import_module(f"tests.drivers.conformance.benches.{request.param}").bench() as bench:
+        yield bench
+
+
+def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(device_supervisor, "FIRST_BACKOFF_S", 0.1)
+    opened: list[tuple[str, str]] = []
+    faults = iter([Fault.UNPLUG])
+
+    def open_device(uri: str) -> Device:
+        device = bench.open(next(faults, Fault.NONE))
+        opened.append((uri, device.info.uri))
+        heads.update({stream.sensor: stream.sensor for stream in device.capabilities.streams})
+        return device
+
+    heads: dict[str, str] = {}
+    sink, clock = RecordingSink(), WallClock()
+    health = Health(LoopbackBus(), "capture", HeaderFactory("demo", clock))
+    supervisor = DeviceSupervisor(
+        "cam", "any://", open_device, lambda device: None, sink, heads, health, clock.monotonic
+    )
+    supervisor.start()
+    try:
+        assert eventually(lambda: len({frame.epoch for frame in list(sink.frames)}) == 2)
+        assert sink.receives(2)
+    finally:
+        supervisor.close(10)
+    epochs = [frame.epoch for frame in sink.frames]
+    assert epochs == sorted(epochs)
+    assert health._counters["device.cam.reconnects"] == 1
+    assert opened[0][0] == "any://"
+    assert opened[1][0] == opened[0][1], "by the address of this very device, whatever the first one left open"
+    assert health._counters["device.cam.frames"] >= len(sink.frames)

@@ -1,0 +1,17 @@
+"""The loss monitor warns once per window, and clears the warning."""
+
+from drivers.kinect1.transport.loss_monitor import CONDITION, WINDOW_NS, LossMonitor
+
+
+def test_losses_that_matter_are_told_and_taken_back() -> None:
+    now_ns, heard = 0, []
+    monitor = LossMonitor(lambda: now_ns, lambda condition, message: heard.append((condition, message)))
+    monitor.update(100, 100)  # too early to judge
+    assert heard == []
+    for delivered, dropped in ((580, 20), (1120, 80), (1700, 100), (2300, 100)):
+        now_ns += WINDOW_NS
+        monitor.update(delivered, dropped)
+    assert [condition for condition, _ in heard] == [CONDITION] * 2
+    assert "60 of 600 images" in heard[0][1]
+    assert "USB controller" in heard[0][1]
+    assert heard[1][1] == ""

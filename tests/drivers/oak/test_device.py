@@ -1,0 +1,349 @@
+"""The OAK driver over the real depthai, without a device: a recording that depthai plays, and what depthai promises."""
+
+import json
+import os
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock, create_autospec
+
+import numpy as np
+import pytest
+
+from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
+from drivers.contract.discovery import Availability
+from drivers.contract.frame import Kind
+from drivers.oak import discover, eeprom, library, live, open_device, pipelines, playback
+from drivers.oak.address import parse
+from drivers.oak.controls import make
+from drivers.oak.device import OakDevice
+from drivers.oak.messages import Queue, from_img_frame
+from drivers.oak.picture import Picture
+from drivers.oak.recording import OakRecording
+from drivers.oak.roles import ROLES
+from drivers.simulated.address import parse as parse_simulated
+from tests.drivers.recording_sink import RecordingSink
+from tests.sample import oak
+
+try:
+    dai = library.load()
+except SdkMissingError as error:
+    pytest.skip(f"{error}, or  make all", allow_module_level=True)
+
+SAMPLE = Path(__file__).parents[3] / "recordings" / "sample_oak"
+URI = f"oak://?recording={SAMPLE}"
+
+
+def test_what_depthai_plays_is_what_it_recorded(tmp_path: Path) -> None:
+    simulation = parse_simulated("simulated://sheet?sensors=tof&tof=32x24&rate=15").build()
+    camera = simulation.heads["tof"].camera
+    depths = [frame for k in range(30) for frame in simulation.frames(k) if frame.kind == Kind.DEPTH]
+    oak.record(tmp_path / "tof_depth.mcap", [oak.message(frame, camera, 0) for frame in depths])
+    recorded = {frame.seq: frame for frame in OakRecording(tmp_path).frames()}
+    receiver = RecordingSink()
+    device = open_device(f"oak://?recording={tmp_path}&loop=0", time.monotonic_ns)
+    try:
+        assert device.state == DeviceState.CLOSED
+        assert [stream.key for stream in device.capabilities.streams] == [("tof", "depth")]
+        device.start(receiver)
+        receiver.wait(lambda: receiver.states[-1] == (DeviceState.CLOSED, "the recording has ended"))
+    finally:
+        device.close()
+    assert [state for state, _ in receiver.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
+    assert len(recorded) == 30
+    assert len(receiver.frames) == device.counters["frames"] > 10
+    for frame in receiver.frames:
+        same = recorded[frame.seq]
+        np.testing.assert_array_equal(frame.data, same.data)
+        assert (frame.t_device_ticks, frame.exposure_s) == (same.t_device_ticks, same.exposure_s)
+        assert frame.calib_id == same.calib_id
+        assert frame.t_host_ns <= frame.t_arrival_ns
+
+
+def test_streams_of_one_exposure_have_one_time_and_starting_again_is_a_new_epoch() -> None:
+    receiver = RecordingSink()
+    device = open_device(URI, time.monotonic_ns)
+    try:
+        for epoch in range(3):
+            device.start(receiver)
+            device.start(receiver)  # it runs already
+            receiver.wait(partial(has_frames, receiver, epoch, 9))
+            device.stop()
+            assert receiver.settle() == len(receiver.frames)
+    finally:
+        device.close()
+        device.close()
+    with pytest.raises(DeviceError, match="closed"):
+        device.start(receiver)
+    times: dict[tuple[int, int], set[int]] = {}
+    for frame in receiver.frames:
+        times.setdefault((frame.epoch, frame.seq), set()).add(frame.t_host_ns)
+    assert {frame.epoch for frame in receiver.frames} == {0, 1, 2}
+    assert all(max(stamps) - min(stamps) < 1e6 for stamps in times.values())
+
+
+def has_frames(receiver: RecordingSink, epoch: int, number: int) -> bool:
+    return sum(frame.epoch == epoch for frame in receiver.frames) >= number
+
+
+def test_a_device_that_goes_away_fails_and_leaves_nothing_behind() -> None:
+    threads = len(os.listdir("/proc/self/task"))
+    receiver = RecordingSink()
+    connection = live_connection()
+    device = OakDevice(connection, time.monotonic_ns)
+    device.start(receiver)
+    receiver.wait(lambda: len(receiver.frames) > 5)
+    connection.close()
+    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.FAILED)
+    assert "the device is gone" in receiver.states[-1][1]
+    device.close()
+    deadline = time.monotonic() + 10
+    while len(os.listdir("/proc/self/task")) > threads and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert len(os.listdir("/proc/self/task")) <= threads
+
+
+def live_connection() -> Any:
+    """What plays, as if its end were the loss of a device."""
+    return replace(playback.connect(parse(URI), SAMPLE), ended="")
+
+
+def test_a_stream_that_never_delivers_is_named() -> None:
+    silent = MagicMock()
+    silent.get.return_value = None
+    connection = live_connection()
+    connection = replace(connection, queues={**connection.queues, ROLES["tof_confidence"]: silent})
+    with pytest.raises(DeviceError, match=r"tof/confidence delivers nothing for 0.1 s"):
+        OakDevice(connection, time.monotonic_ns, first_s=0.1)
+
+
+def test_a_message_that_is_no_image_is_counted_and_the_stream_goes_on() -> None:
+    class Odd:
+        """A queue whose third message is no image."""
+
+        def __init__(self, queue: Queue) -> None:
+            self.queue, self.count = queue, 0
+
+        def get(self, timeout_s: float) -> Picture | None:
+            self.count += 1
+            return from_img_frame(dai.IMUData()) if self.count == 3 else self.queue.get(timeout_s)
+
+        def clear(self) -> None:
+            self.queue.clear()
+
+    connection = live_connection()
+    connection = replace(connection, queues={role: Odd(queue) for role, queue in connection.queues.items()})
+    device, receiver = OakDevice(connection, time.monotonic_ns), RecordingSink()
+    try:
+        device.start(receiver)
+        receiver.wait(lambda: len(receiver.frames) > 9)
+        assert device.counters["undecodable"] == len(connection.queues)
+    finally:
+        device.close()
+
+
+def test_the_calibration_is_depthais_own() -> None:
+    simulation = parse_simulated("simulated://sheet?tof=88x72&color=128x96").build()
+    cameras = {0: simulation.heads["tof"].camera, 2: simulation.heads["color"].camera}
+    handler = oak.calibration(cameras)
+    turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    A, B = dai.CameraBoardSocket.CAM_A, dai.CameraBoardSocket.CAM_B
+    handler.setCameraIntrinsics(B, [[9.0, 0, 4], [0, 9, 3], [0, 0, 1]], 8, 6)
+    handler.setCameraExtrinsics(B, dai.CameraBoardSocket.CAM_C, turn, [1.0, -2.0, 3.0], [1.0, -2.0, 3.0])
+    handler.setStereoLeft(A, turn)
+    poses = eeprom.parse(json.dumps(handler.eepromToJson()))
+    for reference in (0, 1, 2):
+        for socket in (0, 1, 2):
+            theirs = handler.getCameraExtrinsics(
+                dai.CameraBoardSocket(socket), dai.CameraBoardSocket(reference), unit=dai.LengthUnit.METER
+            )
+            np.testing.assert_allclose(poses.between(reference, socket), theirs, atol=1e-6)
+    np.testing.assert_allclose(poses.rectified(0)[:3, :3], handler.getStereoLeftRectificationRotation())
+
+
+def test_projection_between_cameras_agrees_with_depthais() -> None:
+    """depthai projects a pixel and its depth from one image into another by itself."""
+    read = OakRecording(SAMPLE)
+    tof, color = read.cameras["tof"], read.cameras["color"]
+    pixel, z = np.array([30.0, 50.0]), 1.1
+    point = tof.directions(pixel) / tof.directions(pixel)[2] * z
+
+    def transformation(camera: Any) -> Any:
+        matrix = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
+        made = dai.ImgTransformation(camera.width, camera.height, matrix)
+        T = camera.T_rs.copy()
+        T[:3, 3] *= 100
+        made.setExtrinsics(dai.Extrinsics(T.tolist(), dai.CameraBoardSocket.CAM_A))
+        return made
+
+    theirs = transformation(tof).projectPointTo(transformation(color), dai.Point2f(*pixel), 1000 * z)
+    np.testing.assert_allclose(color.project(point), (theirs.x, theirs.y), atol=0.6)
+
+
+def test_no_device_is_said_at_once_and_nobody_is_called() -> None:
+    assert os.environ["DEPTHAI_TELEMETRY"] == "0"
+    assert os.environ["DEPTHAI_PROTOCOL"] == "usb"
+    assert discover(0.2) == []
+    with pytest.raises(DeviceError, match="no oak device is attached"):
+        open_device("oak://", time.monotonic_ns)
+    with pytest.raises(DeviceError, match="oak://18443010: no such device is attached"):
+        open_device("oak://18443010", time.monotonic_ns)
+
+
+@pytest.mark.parametrize(
+    ("uri", "complaint"),
+    [
+        ("oak://?speed=2", "unknown key 'speed'; allowed are color, dots"),
+        ("oak://?mode=lidar", "mode = 'lidar' must be one of auto, tof, stereo"),
+        ("oak://?fps=1000", "fps = '1000' must be a number from 1 to 120"),
+        ("oak://?dots=bright", "dots = 'bright' must be a number from 0 to 1"),
+        ("oak://?size=big", "size = 'big' must be a width and a height"),
+        ("oak://1844/x", "all that may stand before"),
+        ("oak://?recording=nowhere", "nowhere"),
+    ],
+)
+def test_a_wrong_address_is_never_tried_again(uri: str, complaint: str) -> None:
+    with pytest.raises(AddressError, match=complaint):
+        open_device(uri, time.monotonic_ns)
+
+
+def test_the_network_is_searched_only_if_the_address_asks() -> None:
+    assert not parse("oak://18443010E1A2B3C4").network
+    assert parse("oak://192.168.1.44").network
+    assert parse("oak://?network=1").network
+
+
+def mock_device(platform: str, tof: bool) -> Any:
+    """A device with the methods of the real one, and no others."""
+    device = create_autospec(dai.Device, instance=True)
+    kinds = dai.CameraSensorType
+    cameras = [(dai.CameraBoardSocket.CAM_C, kinds.COLOR)]
+    cameras += [(dai.CameraBoardSocket.CAM_A, kinds.TOF)] if tof else []
+    features = []
+    for socket, kind in cameras:
+        camera = dai.CameraFeatures()
+        camera.socket, camera.supportedTypes, camera.sensorName = socket, [kind], "sensor"
+        features.append(camera)
+    device.getConnectedCameraFeatures.return_value = features
+    pair = dai.StereoPair()
+    pair.left, pair.right = dai.CameraBoardSocket.CAM_B, dai.CameraBoardSocket.CAM_D
+    device.getStereoPairs.return_value = [] if tof else [pair]
+    device.getPlatform.return_value = getattr(dai.Platform, platform)
+    device.getIrDrivers.return_value = [] if tof else [("driver", 0, 0)]
+    device.setIrLaserDotProjectorIntensity.return_value = True
+    return device
+
+
+def mock_pipeline() -> tuple[Any, list[Any]]:
+    """A pipeline whose nodes have the methods and outputs of the real ones."""
+    nodes: list[Any] = []
+
+    def create(kind: Any) -> Any:
+        node = create_autospec(kind, instance=True)
+        node.build.return_value = node
+        nodes.append(node)
+        return node
+
+    pipeline = MagicMock()
+    pipeline.create.side_effect = create
+    return pipeline, nodes
+
+
+@pytest.mark.parametrize(("platform", "output"), [("RVC2", "rawDepth"), ("RVC4", "depth")])
+def test_time_of_flight_takes_depth_before_the_filters_where_it_exists(platform: str, output: str) -> None:
+    pipeline, nodes = mock_pipeline()
+    built = pipelines.build(dai, mock_device(platform, tof=True), pipeline, parse("oak://?range=low&fps=20"))
+    tof, color = nodes
+    assert built.streams[ROLES["tof_depth"]] is getattr(tof, output)
+    assert built.streams[ROLES["tof_amplitude"]] is tof.amplitude
+    assert (ROLES["tof_confidence"] in built.streams) == (platform == "RVC4")
+    assert bool(built.filters) == (platform == "RVC4")
+    tof.build.assert_called_once_with(dai.CameraBoardSocket.CAM_A, profile=dai.ToFConfig.Profile.LOW_RANGE, fps=20.0)
+    assert tof.setInitialConfig.call_args[0][0].enableOpticalCorrection is True
+    assert built.streams[ROLES["color"]] is color.requestOutput.return_value
+
+
+def test_stereo_gives_depth_in_the_view_of_the_left_image() -> None:
+    pipeline, nodes = mock_pipeline()
+    built = pipelines.build(dai, mock_device("RVC2", tof=False), pipeline, parse("oak://?color=0"))
+    left, right, stereo = nodes
+    left.build.assert_called_once_with(dai.CameraBoardSocket.CAM_B)
+    right.build.assert_called_once_with(dai.CameraBoardSocket.CAM_D)
+    assert {role.kind for role in built.streams} == {Kind.DEPTH, Kind.IR}
+    assert built.streams[ROLES["left"]] is stereo.rectifiedLeft
+    aligned = stereo.setDepthAlign.call_args[0][0]
+    assert aligned == dai.StereoDepthConfig.AlgorithmControl.DepthAlign.RECTIFIED_LEFT
+
+
+@pytest.mark.parametrize(("mode", "tof"), [("tof", False), ("stereo", True)])
+def test_a_mode_that_the_device_lacks_is_refused_with_what_it_has(mode: str, tof: bool) -> None:
+    with pytest.raises(DeviceError, match=f"mode = {mode} needs a camera that the device lacks; it has CAM_C: sensor"):
+        pipelines.build(dai, mock_device("RVC2", tof), mock_pipeline()[0], parse(f"oak://?mode={mode}"))
+
+
+def test_controls_reach_every_camera_behind_depth() -> None:
+    device, (pipeline, nodes) = mock_device("RVC2", tof=False), mock_pipeline()
+    address = parse("oak://?dots=0.4")
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    assert controls.get("laser_power") == 0.4
+    device.setIrLaserDotProjectorIntensity.assert_called_once_with(0.4)
+    controls.set("exposure_s", 0.004)
+    assert controls.get("auto_exposure") is False
+    for camera in nodes[:2]:
+        (message,) = camera.inputControl.createInputQueue.return_value.send.call_args[0]
+        assert message.getExposureTime().total_seconds() == 0.004
+    with pytest.raises(ControlError, match=r"must be a number from 2e-05 to 0.033 s"):
+        controls.set("exposure_s", 1.0)
+    with pytest.raises(ControlError, match="no such control"):
+        controls.set("color.focus", 1)
+
+
+def test_the_range_can_be_changed_while_it_runs() -> None:
+    device, (pipeline, nodes) = mock_device("RVC2", tof=True), mock_pipeline()
+    address = parse("oak://")
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    controls.set("modulation", "high")
+    (config,) = nodes[0].inputConfig.createInputQueue.return_value.send.call_args[0]
+    assert config.profile == dai.ToFConfig.Profile.HIGH_RANGE
+    assert controls.get("modulation") == "high"
+
+
+def test_a_sync_role_is_taken_by_the_device_or_not_at_all() -> None:
+    device, (pipeline, _) = mock_device("RVC2", tof=True), mock_pipeline()
+    address = parse("oak://")
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    device.setExternalFrameSyncRole.return_value = (True, "")
+    controls.set("sync_role", "slave")
+    device.setExternalFrameSyncRole.assert_called_once_with(dai.ExternalFrameSyncRole.SLAVE)
+    device.setExternalFrameSyncRole.return_value = (False, "no cable")
+    with pytest.raises(DeviceError, match="sync_role = master: no cable"):
+        controls.set("sync_role", "master")
+    assert controls.get("sync_role") == "slave"
+
+
+@pytest.mark.parametrize(
+    ("status", "state", "availability"),
+    [
+        ("X_LINK_SUCCESS", "X_LINK_UNBOOTED", Availability.READY),
+        ("X_LINK_SUCCESS", "X_LINK_BOOTED", Availability.BUSY),
+        ("X_LINK_INSUFFICIENT_PERMISSIONS", "X_LINK_UNBOOTED", Availability.NO_PERMISSION),
+    ],
+)
+def test_what_is_attached_says_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, status: str, state: str, availability: Availability
+) -> None:
+    info = dai.DeviceInfo("18443010E1A2B3C4")
+    info.status, info.state = getattr(dai.XLinkError_t, status), getattr(dai.XLinkDeviceState, state)
+    monkeypatch.setattr(dai.Device, "getAllConnectedDevices", lambda: [info])
+    (found,) = live.discover(0.1)
+    assert (found.availability, found.info.uri) == (availability, "oak://18443010E1A2B3C4")
+    assert bool(found.remedy) == (availability != Availability.READY)
+
+
+def test_a_sync_role_that_the_device_refuses_is_said() -> None:
+    device = mock_device("RVC2", tof=True)
+    device.setExternalFrameSyncRole.return_value = (False, "no M8 connector")
+    with pytest.raises(DeviceError, match="sync = master: no M8 connector"):
+        live._run(dai, device, parse("oak://?sync=master"))

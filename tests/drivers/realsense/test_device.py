@@ -1,0 +1,290 @@
+"""The RealSense driver on librealsense itself: its software device, and its recorder and player."""
+
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.contract.controls import ControlKind
+from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
+from drivers.contract.frame import Geometry, Kind
+from drivers.realsense import library, open_device
+from drivers.realsense.address import parse
+from drivers.realsense.controls import make
+from drivers.realsense.device import RealsenseDevice
+from drivers.realsense.frame_queue import FrameQueue
+from drivers.realsense.opening import device_info, discover, of_device
+from drivers.realsense.picture import Picture, pixels
+from drivers.realsense.profiles import Stream, wanted
+from drivers.realsense.streams import ROLES, StreamError
+from tests.drivers.realsense.software_camera import SIZE, SoftwareCamera
+from tests.drivers.recording_sink import RecordingSink
+
+try:
+    rs = library.load()
+except SdkMissingError as error:
+    pytest.skip(f"{error}, or  make all", allow_module_level=True)
+
+
+@pytest.fixture
+def camera() -> Iterator[SoftwareCamera]:
+    software = SoftwareCamera()
+    yield software
+    software.halt()
+
+
+@pytest.fixture
+def device(camera: SoftwareCamera) -> Iterator[RealsenseDevice]:
+    opened = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
+    yield opened
+    opened.close()
+
+
+def test_every_stream_arrives_in_si_units_on_the_cameras_clock(camera: SoftwareCamera, device: RealsenseDevice) -> None:
+    receiver = RecordingSink()
+    device.start(receiver)
+    for number in range(5):
+        camera.show(number, 2_000.0 + 33.333 * number)
+        receiver.wait(lambda number=number: len(receiver.frames) == 4 * (number + 1))
+    frames = {(frame.kind, frame.seq): frame for frame in receiver.frames}
+    depth = frames[Kind.DEPTH, 3]
+    assert depth.si()[5, 5] == pytest.approx(1003 * 0.0005)
+    assert np.all(np.isnan(depth.si()[0]))
+    assert (depth.geometry, depth.tick_hz, depth.t_device_ticks) == (Geometry.Z, 1e6, 2_099_999)
+    assert depth.clock_domain == "realsense"
+    assert {frames[kind, 3].sensor for kind in (Kind.IR, Kind.CONFIDENCE)} == {"depth"}
+    assert frames[Kind.COLOR, 3].encoding == "rgb8"
+    assert frames[Kind.COLOR, 3].data.shape == (48, 64, 3)
+    assert device.info.serial == "0001"
+    assert device.counters["frames"] == 20
+
+
+def test_the_colour_camera_is_where_librealsense_says(device: RealsenseDevice) -> None:
+    point = [0.1, -0.05, 0.8]
+    depth, color = (
+        stream.profile for used in device._used for stream in used.streams if stream.role.stream in {"depth", "color"}
+    )
+    moved = rs.rs2_transform_point_to_point(depth.get_extrinsics_to(color), point)
+    expected = rs.rs2_project_point_to_pixel(color.get_intrinsics(), moved)
+    np.testing.assert_allclose(device.cameras["color"].project(np.array(point)), expected, atol=1e-3)
+
+
+@pytest.mark.parametrize("model", ["modified_brown_conrady", "inverse_brown_conrady"])
+def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> None:
+    camera = SoftwareCamera(model=model)
+    device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
+    intrinsics = device._used[0].streams[0].profile.get_intrinsics()
+    for point in ([0.1, -0.05, 0.8], [-0.3, 0.2, 0.8]):
+        expected = rs.rs2_project_point_to_pixel(intrinsics, point)
+        np.testing.assert_allclose(device.cameras["depth"].project(np.array(point)), expected, atol=0.01)
+
+
+def test_an_unknown_lens_is_refused() -> None:
+    camera = SoftwareCamera(model="ftheta")
+    with pytest.raises(DeviceError, match="distortion 'ftheta' is none of brown conrady"):
+        of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
+
+
+def test_host_times_follow_the_exposures_and_starting_again_is_a_new_epoch(
+    camera: SoftwareCamera, device: RealsenseDevice
+) -> None:
+    receiver = RecordingSink()
+    camera.run()
+    for epoch in range(3):
+        device.start(receiver)
+        device.start(receiver)
+        receiver.wait(lambda epoch=epoch: sum(frame.epoch == epoch for frame in receiver.frames) > 20)
+        device.stop()
+        assert device.state == DeviceState.CLOSED
+        assert receiver.settle() == len(receiver.frames)
+    assert all(abs(frame.t_arrival_ns - frame.t_host_ns) < 0.5e9 for frame in receiver.frames)
+    device.close()
+    device.close()
+    with pytest.raises(DeviceError, match="closed"):
+        device.start(receiver)
+
+
+def test_the_sink_may_stop_the_device(camera: SoftwareCamera, device: RealsenseDevice) -> None:
+    class Stopper(RecordingSink):
+        def on_frame(self, frame: Any) -> None:
+            super().on_frame(frame)
+            device.stop()
+
+    receiver = Stopper()
+    camera.run()
+    device.start(receiver)
+    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.CLOSED)
+    assert receiver.settle() == 1
+
+
+def test_nothing_is_left_behind(camera: SoftwareCamera) -> None:
+    camera.run()
+    resources = []
+    for _ in range(6):
+        device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
+        receiver = RecordingSink()
+        device.start(receiver)
+        receiver.wait(lambda receiver=receiver: len(receiver.frames) > 0)
+        device.close()
+        resources.append(threading.active_count() + len(os.listdir("/proc/self/fd")))
+    assert resources[-1] <= resources[1]
+
+
+def test_a_camera_that_is_gone_fails(camera: SoftwareCamera, device: RealsenseDevice) -> None:
+    device._camera = SimpleNamespace(is_connected=lambda: False)
+    receiver = RecordingSink()
+    device.start(receiver)
+    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.FAILED)
+    assert receiver.states[-1] == (DeviceState.FAILED, "the camera is gone")
+
+
+def test_what_librealsense_recorded_is_played(tmp_path: Path, camera: SoftwareCamera) -> None:
+    path = tmp_path / "take.db3"
+    recorder = rs.recorder(str(path), camera.device)
+    sensors, queue = recorder.query_sensors(), rs.frame_queue(100)
+    for sensor in sensors:
+        sensor.open(sensor.get_stream_profiles())
+        sensor.start(queue)
+    for number in range(20):
+        camera.show(number, 2_000.0 + 20 * number)
+        time.sleep(0.02)
+    for sensor in sensors:
+        sensor.stop()
+        sensor.close()
+    recorder = sensors = sensor = None  # the file is complete when nothing holds the recorder
+    device = open_device(f"realsense://?recording={path}", time.monotonic_ns)
+    receiver = RecordingSink()
+    try:
+        assert device.info.model == "software camera"
+        device.start(receiver)
+        receiver.wait(lambda: receiver.states[-1] == (DeviceState.CLOSED, "the recording has ended"))
+    finally:
+        device.close()
+    depths = [frame for frame in receiver.frames if frame.kind == Kind.DEPTH]
+    assert [int(frame.data[5, 5]) for frame in depths] == [1000 + frame.seq for frame in depths]
+    assert {frame.key for frame in receiver.frames} == {stream.key for stream in device.capabilities.streams}
+    assert len(depths) >= 3  # it plays in real time, and a busy machine is late
+
+
+@pytest.mark.parametrize(
+    ("uri", "complaint"),
+    [
+        ("realsense://?speed=2", "unknown key 'speed'; allowed are color, depth"),
+        ("realsense://?depth=big", "depth = 'big' must be a width and a height"),
+        ("realsense://?fps=0", "fps = '0' must be a whole number from 1 to 999"),
+        ("realsense://?ir=2", "ir = '2' must be 0 or 1"),
+        ("realsense://1/2", "all that may stand before"),
+        ("realsense://?recording=nowhere.db3", "nowhere.db3 cannot be played"),
+    ],
+)
+def test_a_wrong_address_is_never_tried_again(uri: str, complaint: str) -> None:
+    with pytest.raises(AddressError, match=complaint):
+        open_device(uri, time.monotonic_ns)
+
+
+def test_no_camera_is_said() -> None:
+    assert discover(0.1) == []
+    with pytest.raises(DeviceError, match="no realsense device is attached"):
+        open_device("realsense://", time.monotonic_ns)
+    with pytest.raises(DeviceError, match="realsense://123 is not attached"):
+        open_device("realsense://123", time.monotonic_ns)
+
+
+def offer(kind: str, size: tuple[int, int], fps: int, encoding: str) -> Stream:
+    profile = SimpleNamespace(
+        width=lambda: size[0], height=lambda: size[1], fps=lambda: fps, format=lambda: SimpleNamespace(name=encoding)
+    )
+    return Stream(ROLES[kind, 0], profile, encoding)
+
+
+def test_of_many_profiles_the_address_chooses_one_of_each_stream() -> None:
+    offers = [offer("depth", (640, 480), fps, "z16") for fps in (30, 60)]
+    offers += [offer("color", (640, 480), 30, name) for name in ("y16", "bgr8", "rgb8")]
+    offers += [offer("infrared", (640, 480), 30, "y8")]
+    assert wanted(offers, parse("realsense://")) == [offers[0], offers[4], offers[5]]
+    assert wanted(offers, parse("realsense://?fps=60&color=0&ir=0")) == [offers[1]]
+    with pytest.raises(DeviceError, match="depth/depth has no 1280x720 at 30; it has: 640x480 at 30, 640x480 at 60"):
+        wanted(offers, parse("realsense://?depth=1280x720"))
+
+
+class Options:
+    """A sensor with the options of a D435, as the SDK has them."""
+
+    def __init__(self) -> None:
+        option = rs.option
+        self.ranges = {option.exposure: (1, 165000, 1), option.gain: (16, 248, 1), option.laser_power: (0, 360, 30)}
+        self.ranges |= {option.enable_auto_exposure: (0, 1, 1), option.inter_cam_sync_mode: (0, 2, 1)}
+        self.values = dict.fromkeys(self.ranges, 0.0)
+
+    def supports(self, key: Any) -> bool:
+        return key in self.ranges
+
+    def is_option_read_only(self, key: Any) -> bool:
+        return False
+
+    def get_option_range(self, key: Any) -> Any:
+        low, high, step = self.ranges[key]
+        return SimpleNamespace(min=low, max=high, step=step, default=low)
+
+    def get_option(self, key: Any) -> float:
+        return self.values[key]
+
+    def set_option(self, key: Any, value: float) -> None:
+        if key == rs.option.gain:
+            raise RuntimeError("Failed to set control: device is busy")
+        self.values[key] = value
+
+
+def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
+    sensor = Options()
+    controls = make(rs, "realsense://1", {0: (sensor, ROLES["depth", 0]), 1: (sensor, ROLES["color", 0])})
+    assert {info.name: info.kind for info in controls.infos}["sync_role"] == ControlKind.CHOICE
+    controls.set("exposure_s", 0.0085)
+    assert sensor.values[rs.option.exposure] == 8500
+    controls.set("color.exposure_s", 0.0085)
+    assert sensor.values[rs.option.exposure] == 85
+    controls.set("laser_power", 0.55)
+    assert sensor.values[rs.option.laser_power] == 210
+    controls.set("sync_role", "slave")
+    assert (sensor.values[rs.option.inter_cam_sync_mode], controls.get("sync_role")) == (2, "slave")
+    controls.set("auto_exposure", True)
+    assert controls.get("auto_exposure") is True
+    with pytest.raises(ControlError, match=r"must be a number from 1e-06 to 0.165 s"):
+        controls.set("exposure_s", 1.0)
+    with pytest.raises(DeviceError, match="realsense://1: another program uses it"):
+        controls.set("gain", 20.0)
+
+
+def test_an_inbox_keeps_the_newest_and_counts_the_rest() -> None:
+    inbox: FrameQueue[int] = FrameQueue(2)
+    for number in range(5):
+        inbox.put(number)
+    inbox.end("over")
+    assert inbox.ended() == ""
+    assert [inbox.take(0), inbox.take(0), inbox.take(0)] == [3, 4, None]
+    assert (inbox.dropped(), inbox.dropped(), inbox.ended()) == (3, 0, "over")
+
+
+@given(
+    st.sampled_from(["z16", "y8", "y16", "raw8", "rgb8", "bgr8", "yuyv", ""]), st.integers(-2, 20), st.integers(-2, 20),
+    st.integers(-1, 80), st.binary(max_size=600), st.sampled_from([Kind.DEPTH, Kind.IR, Kind.CONFIDENCE, Kind.COLOR]),
+)  # fmt: skip
+def test_any_bytes_are_an_image_or_refused(
+    name: str, width: int, height: int, stride: int, data: bytes, kind: Kind
+) -> None:
+    picture = Picture(name, width, height, stride, np.frombuffer(data, np.uint8), 0, 0.0, "", 0.001, 0.0, 0.0)
+    with contextlib.suppress(StreamError):
+        assert pixels(picture, kind)[1].shape[:2] == (height, width)
+
+
+def test_the_software_camera_has_the_size_it_says(device: RealsenseDevice) -> None:
+    assert {(stream.width, stream.height) for stream in device.capabilities.streams} == {SIZE}
