@@ -11,6 +11,7 @@ from abs_service.pairing.image_decoders import BAYER_ORDERS, kinds
 from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
+from calib.noise.grey import GaussianGrey
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
@@ -31,7 +32,7 @@ class FrameBuilder:
         bayer: order of the colour filters in a Bayer mosaic's upper left corner, row by row.
 
     Raises:
-        ArgumentError: an unknown geometry or order.
+        ArgumentError: an unknown geometry or order, or a reference that measures no distances.
     """
 
     def __init__(self, rig: Rig, reference: str, geometry: str, bayer: str):
@@ -49,6 +50,9 @@ class FrameBuilder:
         #: Stream of every argument that has one.
         self._arguments = {name: f"{reference}/{kind}" for name, kind in own.items()}
         self._arguments = {name: stream for name, stream in self._arguments.items() if stream in self._streams}
+        if "depth_m" not in self._arguments:
+            raise ArgumentError(f'noise: sensor "{reference}" finds the object, so it needs a noise model of distances')
+        self._grey = {sensor.head for sensor in rig.sensors.values() if isinstance(sensor.noise, GaussianGrey)}
         if len(pictures) == 1:
             self._arguments["image"] = pictures[0]
         self._last_ns: int | None = None
@@ -112,7 +116,7 @@ class FrameBuilder:
         shape = array.shape[:2] if kind == Kind.COLOR and array.ndim == 3 else array.shape
         if shape != (camera.height, camera.width):
             raise ArgumentError(f"{label} has shape {array.shape}, the camera has {camera.height} × {camera.width}")
-        pixels, encoding = self._pixels(kind, array, label)
+        pixels, encoding = self._pixels(head, kind, array, label)
         is_depth = kind == Kind.DEPTH
         return Frame(
             sensor=head,
@@ -128,7 +132,7 @@ class FrameBuilder:
             calib_id=camera.calib_id,
         )
 
-    def _pixels(self, kind: Kind, array: NDArray[Any], label: str) -> tuple[NDArray[Any], str]:
+    def _pixels(self, head: str, kind: Kind, array: NDArray[Any], label: str) -> tuple[NDArray[Any], str]:
         """The pixels as a frame holds them, and their encoding."""
         if kind in (Kind.DEPTH, Kind.DEVIATION):
             return _metres(array, label), "32FC1"
@@ -138,12 +142,12 @@ class FrameBuilder:
             return np.ascontiguousarray(array), f"bayer_{self._bayer}8"
         if kind == Kind.COLOR and array.ndim == 3 and array.shape[2] == 3 and array.dtype == np.uint8:
             return np.ascontiguousarray(array), "rgb8"
-        if kind == Kind.COLOR and array.ndim == 2 and array.dtype.str[1:] in _GREY:
+        if kind == Kind.COLOR and array.ndim == 2 and head in self._grey and array.dtype.str[1:] in _GREY:
             return np.ascontiguousarray(array, f"<{array.dtype.str[1:]}"), _GREY[array.dtype.str[1:]]
         if kind in (Kind.COLOR, Kind.BAYER):
             raise ArgumentError(
-                f"{label} holds {array.dtype} of shape {array.shape}, must be uint8, 0…255: red, green, blue in "
-                "the last axis, or one channel if the noise model is Grey or Bayer"
+                f"{label} holds {array.dtype} of shape {array.shape}, must be uint8, 0…255, of shape "
+                "(height, width, 3); (height, width) if its noise model is Grey or Bayer"
             )
         if array.dtype.kind not in "uif":
             raise ArgumentError(f"{label} holds {array.dtype}, must be numbers")
