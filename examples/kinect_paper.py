@@ -17,7 +17,7 @@ camera = a.Camera(640, 480, fx=528.0144, fy=528.0144, cx=320, cy=240)
 tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs(4, 4))
 for path in sorted(folder.glob("depth_*.png")):
     number = path.stem.removeprefix("depth_")
-    depth_m = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) * 0.0001
+    depth_m = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) * 0.0001
     image = cv2.imread(str(folder / f"color_{number}.jpg"), cv2.IMREAD_COLOR_RGB)
     estimate = tracker.track(depth_m, time_s=int(number) / 30, image=image)
     column, row = camera.project(estimate.vertices).round().astype(int).T

@@ -18,7 +18,7 @@ noise = a.noise.StructuredLight(floor=0.001)  # fur is finer than the mesh
 tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs(6, 6), noise=noise, priors={"stretch": 0.1})
 for path in sorted(folder.glob("depth_mm_*.png")):
     number = path.stem.removeprefix("depth_mm_")
-    depth_m = cv2.imread(str(path), cv2.IMREAD_UNCHANGED) * 0.001
+    depth_m = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) * 0.001
     image = cv2.imread(str(folder / f"color_{number}.png"), cv2.IMREAD_COLOR_RGB)
     mask = cv2.imread(str(folder / f"sponge_{number}.png"), cv2.IMREAD_GRAYSCALE)
     estimate = tracker.track(depth_m, time_s=int(number) / 30, image=image, mask=mask)
