@@ -21,17 +21,17 @@ from abs_service.supervision.exit_codes import Exit, is_for_user
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
-    "run": "track live: devices, trackers and recorder, supervised, with a table of how they are",
+    "run": "track live: devices, trackers and recorder, supervised, with a status table",
     "replay": "track a recording again, frame by frame",
-    "check": "say what a configuration describes, or what is wrong with it",
-    "devices": "what is attached, and what to do about what cannot be used",
-    "calibrate": "where the sensors of a rig are, how they project and how they err",
+    "check": "validate a configuration and print what it describes",
+    "devices": "list attached devices, with a remedy for those that cannot be used",
+    "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
     "import": "turn a folder of images into a recording",
-    "recover": "repair recordings that were cut short",
+    "recover": "recover truncated or damaged recordings",
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
-    "reinitialize": "tell a running tracker to look for its object anew",
+    "reinitialize": "make a running tracker detect its object again",
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
@@ -49,7 +49,7 @@ examples:
   abs-service check rig.toml             what that file describes, without touching a device
   abs-service replay recordings/x.mcap   the same estimates again, from a file
 
-abs-service COMMAND --help says more about each command.
+abs-service COMMAND --help describes each command.
 """
 
 
@@ -92,8 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="abs-service",
         usage="abs-service [--help] [--version] COMMAND …",
-        description="Tells every other program, live, how the thing in front of depth cameras deforms.\n\n"
-        + _listed(COMMANDS),
+        description="Publishes, in real time, how the object in view of depth cameras deforms.\n\n" + _listed(COMMANDS),
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,4 +1,4 @@
-"""From the configuration to what a tracker is made of."""
+"""Composition root: makes the parts of a tracker from the configuration."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -89,7 +89,7 @@ def noise(settings: Any, range_m: float | None) -> Noise:
     """The noise model of one sensor, from the `Settings` of a module of `calib.noise`.
 
     Raises:
-        PlanError: the sensor is said to have a range of distances, but measures none.
+        PlanError: `range_m` is given for a sensor that measures no distances.
         NoiseError: the model cannot be made.
     """
     made = settings.build()
@@ -99,7 +99,7 @@ def noise(settings: Any, range_m: float | None) -> Noise:
 
 
 def texture(settings: Any) -> ImageNoise:
-    """The noise model of what a depth sensor sees of the surface besides its distance.
+    """Noise model of the texture channel of a depth sensor.
 
     Raises:
         PlanError: it is one of distances or of light barriers.
@@ -131,7 +131,7 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
 
 
 def synchroniser(config: ServiceConfig, tracker: str, sensors: Iterable[Sensor]) -> Synchroniser:
-    """What makes frame sets for one tracker, from the sensors that it uses."""
+    """The synchroniser of one tracker."""
     return Synchroniser(
         config.reference(tracker),
         streams(sensors),

@@ -1,1 +1,1 @@
-"""Everything between the processes: sessions, publications, subscriptions and queries, and frames on top of them."""
+"""Communication between the processes: sessions, publishers, subscriptions, queries, and frames on top of them."""

@@ -1,4 +1,4 @@
-"""What the service needs of a transport. `ZenohBus` keeps this promise between processes, tests keep it within one."""
+"""Interface of the message transport. `ZenohBus` implements it between processes, the tests within one process."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Protocol
 
 
 class Priority(StrEnum):
-    """Which of several waiting messages goes first; names and order are zenoh's."""
+    """Transmission priority of a message; names and order are zenoh's."""
 
     REAL_TIME = "REAL_TIME"
     DATA_HIGH = "DATA_HIGH"
@@ -17,12 +17,12 @@ class Priority(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """How a topic travels. Nothing ever blocks the publisher: what the network cannot take is dropped.
+    """Quality of service of a topic. Publishers never block: on congestion, messages are dropped.
 
     Attributes:
-        priority: which messages go first.
+        priority: transmission priority.
         express: do not wait for a batch to fill.
-        history: messages that a subscriber who asks for history gets when it arrives late.
+        history: past messages that a late subscriber may request.
     """
 
     priority: Priority
@@ -38,13 +38,13 @@ IMAGES = Qos(Priority.DATA_LOW)
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One message as it arrived.
+    """A received message.
 
     Attributes:
         topic: key below the rig.
-        message: full name of its protobuf type, "" if the publisher did not say.
+        message: full name of its protobuf type, "" if the publisher gave none.
         payload: the message.
-        attachment: what came with it; b"" if nothing did.
+        attachment: bytes sent along with it; b"" if there are none.
     """
 
     topic: str
@@ -54,7 +54,7 @@ class Sample:
 
     @property
     def size(self) -> int:
-        """Bytes it occupies, about."""
+        """Approximate size in memory [bytes]."""
         return len(self.payload) + len(self.attachment) + 200
 
 
@@ -67,22 +67,22 @@ class Publisher(Protocol):
 
 
 class Subscription(Protocol):
-    """Something declared on a bus that can be taken back; closing the bus takes back everything."""
+    """A declaration on a bus that can be undone; closing the bus undoes all."""
 
     def close(self) -> None:
-        """Takes it back; may be called again."""
+        """Undoes the declaration; may be called again."""
         ...
 
 
 class Bus(Protocol):
-    """One rig's topics, as one process sees them."""
+    """Topics of one rig, as seen by one process."""
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
-        """Declares that this process sends messages of type `message` on `topic`."""
+        """A publisher of messages of type `message` on `topic`."""
         ...
 
     def latched_publisher(self, topic: str, message: str) -> Publisher:
-        """Like `publisher`, for what changes seldom: the last message also answers whoever asks for the topic."""
+        """Like `publisher`, but also answers queries with the last message; for data that changes rarely."""
         ...
 
     def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
@@ -90,7 +90,7 @@ class Bus(Protocol):
         ...
 
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
-        """All answers to a query for the topics that match; empty, at once, if nobody answers."""
+        """All answers to a query for the topics that match; empty at once if there is no queryable."""
         ...
 
     def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
@@ -98,11 +98,11 @@ class Bus(Protocol):
         ...
 
     def declare_liveliness(self, component: str) -> Subscription:
-        """Lets others see that this component runs, until its process ends, cleanly or not."""
+        """Declares a liveliness token, valid until the process ends, cleanly or not."""
         ...
 
     def watch_liveliness(self, on_change: Callable[[str, bool], None]) -> Subscription:
-        """Calls `on_change(component, alive)` for every component there is and whenever one comes or goes."""
+        """Calls `on_change(component, alive)` for every live component, and at every change."""
         ...
 
     def close(self) -> None:

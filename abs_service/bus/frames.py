@@ -1,4 +1,4 @@
-"""Frames on the bus: a sink that publishes what a device delivers, and a subscriber that gives frames back."""
+"""Frames on the bus: a sink that publishes the frames of a device, and a subscriber that decodes them."""
 
 import threading
 from collections import Counter
@@ -13,18 +13,18 @@ from drivers.contract.device import DeviceState, Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 
-#: Frames per stream that may wait to be published. More would only make them old.
+#: Queue length per stream. A longer queue would only add latency.
 DEPTH = 4
 
 
 class FramePublisher:
-    """Takes what one device delivers and publishes it from a thread of its own; a `drivers.contract.device.Sink`.
+    """Publishes the frames of one device from a thread of its own; a `drivers.contract.device.Sink`.
 
-    The device is never held up: if publishing falls behind, the oldest frame of the stream is dropped and counted.
+    The device is never blocked: if publishing falls behind, the oldest frame of the stream is dropped and counted.
 
     Args:
         bus: where to publish.
-        headers: writes the headers.
+        headers: makes the message headers.
         device: name of the device in the configuration; its truth is published under it.
     """
 
@@ -63,7 +63,7 @@ class FramePublisher:
         """See `drivers.contract.device.Sink.on_warning`; warnings travel in the health, too."""
 
     def close(self) -> None:
-        """Publishes what waits and ends the thread; may be called again."""
+        """Publishes the queued frames and ends the thread; may be called again."""
         self._queue.close()
         self._thread.join()
 
@@ -101,7 +101,7 @@ class FramePublisher:
 class FrameSubscriber:
     """Receives the newest frames of some streams, in the order of arrival.
 
-    A reader that is too slow loses the oldest, counted, never the present. What cannot be decoded is counted too.
+    A slow reader loses the oldest frames, counted. Messages that cannot be decoded are counted, too.
 
     Args:
         bus: where the frames are published.
@@ -120,16 +120,16 @@ class FrameSubscriber:
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Frames that newer ones pushed out unseen, by topic."""
+        """Frames dropped from the full queue, by topic."""
         return self._queue.dropped
 
     @property
     def malformed(self) -> Mapping[str, int]:
-        """Messages that hold no frame of their topic, by topic; `last_error` says why."""
+        """Messages that hold no frame of their topic, by topic; `last_error` has the reason."""
         return dict(self._malformed)
 
     def take(self, timeout_s: float | None = None) -> Frame | None:
-        """The next frame; None once `timeout_s` is over, after `close`, or if what came was malformed."""
+        """The next frame; None once `timeout_s` is over, after `close`, or if the message was malformed."""
         entry = self._queue.take(timeout_s)
         if entry is None:
             return None
@@ -145,7 +145,7 @@ class FrameSubscriber:
         return frame
 
     def close(self) -> None:
-        """Ends the subscriptions and wakes whoever waits in `take`."""
+        """Ends the subscriptions and wakes threads that wait in `take`."""
         for subscription in self._subscriptions:
             subscription.close()
         self._queue.close()

@@ -1,4 +1,4 @@
-"""How a component is: what it counted and measured, and whether it needs help; once a second and at every change."""
+"""Health of a component: counters, gauges, labels and level; published once a second and at every change of level."""
 
 import threading
 from collections import Counter
@@ -15,7 +15,7 @@ PERIOD_NS = 1_000_000_000
 
 
 class Level(IntEnum):
-    """How much attention a condition needs."""
+    """Severity of a condition."""
 
     OK = 1
     WARNING = 2
@@ -32,13 +32,13 @@ _WIRE = {
 class Health:
     """The health of one component.
 
-    Numbers may be entered from any thread. The component's own loop calls `tick`, so that a component that hangs falls
-    silent. A component has several conditions (one per device, say); the worst is its level.
+    Values may be set from any thread. The component's own loop calls `tick`, so that the health of a component that
+    hangs stops. A component has several conditions (one per device, say); the worst is its level.
 
     Args:
         bus: where to publish.
         component: capture, record, run or track/<tracker>.
-        headers: writes the headers; its clock decides when a second is over.
+        headers: makes the message headers; its clock times the period.
     """
 
     def __init__(self, bus: Bus, component: str, headers: HeaderFactory) -> None:
@@ -61,7 +61,7 @@ class Health:
             self._counters[name] += number
 
     def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
-        """Sets counters to totals that somebody else counts; a total that fell (a new epoch, say) is ignored."""
+        """Sets counters to totals counted elsewhere; a smaller total, as after a new epoch, is ignored."""
         with self._lock:
             for name, total in totals.items():
                 self._counters[prefix + name] = max(self._counters[prefix + name], total)
@@ -80,12 +80,12 @@ class Health:
             self._gauges[name] = (total - before) * 1e9 / (now_ns - then_ns) if now_ns > then_ns else 0.0
 
     def label(self, name: str, value: str) -> None:
-        """Sets a name: the file being written, a device's state."""
+        """Sets a text value, such as the file being written or a device's state."""
         with self._lock:
             self._labels[name] = value
 
     def report(self, condition: str, level: Level, message: str = "") -> None:
-        """Says how one condition is, in plain words; a change of level is published at once, all else with `tick`."""
+        """Sets one condition; a change of its level is published at once, all else with `tick`."""
         with self._lock:
             before, _ = self._conditions.get(condition, (Level.OK, ""))
             self._conditions[condition] = (level, message)
@@ -94,16 +94,16 @@ class Health:
 
     @property
     def level(self) -> Level:
-        """The worst condition's level."""
+        """Level of the worst condition."""
         with self._lock:
             return max((level for level, _ in self._conditions.values()), default=Level.OK)
 
     def due(self) -> bool:
-        """Whether a second is over since `tick` last published: the moment to enter gauges."""
+        """True if `tick` will publish: the moment to update gauges."""
         return self._headers.clock.monotonic() >= self._next_ns
 
     def tick(self) -> None:
-        """Publishes if a second is over."""
+        """Publishes if the period of one second is over."""
         if self.due():
             # From second to second, not from call to call, unless whole seconds were missed.
             self._next_ns = max(self._next_ns + PERIOD_NS, self._headers.clock.monotonic())

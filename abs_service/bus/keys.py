@@ -1,4 +1,4 @@
-"""Names on the wire: a zenoh key is `abs/<rig>/<topic>`, the topic of a recording is `/<topic>`."""
+"""Keys and topics: a zenoh key is `abs/<rig>/<topic>`, the topic of a recording is `/<topic>`."""
 
 import re
 
@@ -10,7 +10,7 @@ TRANSFORMS = "tf"
 #: Coordinate frame that all poses and vertices refer to.
 RIG_FRAME = "rig"
 
-#: First parts of topics that no sensor, device or tracker may be called.
+#: First parts of topics, not allowed as names of sensors, devices and trackers.
 RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "health", "live"})
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
@@ -24,7 +24,7 @@ def check_name(name: str) -> str:
     """Returns `name` if a rig, sensor, stream, device or tracker may be called so.
 
     Raises:
-        KeyNameError: it is empty, reserved, or holds a character that means something in a key.
+        KeyNameError: it is empty, reserved, or holds a character with a meaning in keys.
     """
     if not _NAME.fullmatch(name):
         raise KeyNameError(f"{name!r} is no name: letters, digits, - and _, beginning with a letter or digit")
@@ -39,7 +39,7 @@ def image(sensor: str, stream: str) -> str:
 
 
 def info(image_topic: str) -> str:
-    """Topic of a recording that holds what the attachments of `image_topic` said."""
+    """Topic of a recording with the attachments of `image_topic`."""
     return image_topic.removesuffix("image") + "info"
 
 
@@ -54,7 +54,7 @@ def model(sensor: str) -> str:
 
 
 def truth(device: str) -> str:
-    """Topic of what a simulated device knows."""
+    """Topic of the ground truth of a simulated device."""
     return f"{device}/truth"
 
 
@@ -69,12 +69,12 @@ def mesh(tracker: str) -> str:
 
 
 def topology(tracker: str) -> str:
-    """Topic of what does not change of a tracker's mesh."""
+    """Topic of a tracker's mesh topology."""
     return f"{tracker}/topology"
 
 
 def reinitialize(tracker: str) -> str:
-    """Topic on which a tracker is told to look for its object anew: an absmsg.v1.Header of whoever says so."""
+    """Topic of requests to detect a tracker's object again: an absmsg.v1.Header of the sender."""
     return f"{tracker}/reinitialize"
 
 
@@ -89,7 +89,7 @@ def live(component: str) -> str:
 
 
 def is_image(topic: str) -> bool:
-    """Whether a topic carries images, whose attachments describe them."""
+    """True if the messages of a topic are images, whose attachments describe them."""
     return topic.count("/") == 2 and topic.endswith("/image")
 
 
@@ -102,7 +102,7 @@ def topic(rig: str, key: str) -> str:
     """The topic of a key of `rig`; inverse of `key`.
 
     Raises:
-        KeyNameError: the key is none of this rig's.
+        KeyNameError: the key belongs to another rig.
     """
     prefix = f"{ROOT}/{rig}/"
     if not key.startswith(prefix) or len(key) == len(prefix):

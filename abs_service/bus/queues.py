@@ -1,6 +1,6 @@
-"""Bounded queues between threads. None ever blocks the side that puts; each counts what it drops, by key.
+"""Bounded queues between threads. The producer never blocks; dropped items are counted by key.
 
-zenoh has channels of its own, but they do not say what they dropped, and one cannot wait on them for a limited time.
+zenoh's own channels neither count what they drop nor allow a wait with a timeout.
 """
 
 import threading
@@ -12,10 +12,10 @@ T = TypeVar("T")
 
 
 class LatestQueue(Generic[T]):
-    """Keeps the newest `depth` items of every key: for readers that want the present, not the past.
+    """Keeps the newest `depth` items of every key: for consumers that need current data.
 
     Args:
-        depth: items kept per key, at least one; one more pushes out the oldest of that key.
+        depth: items kept per key, at least one; a further one replaces the oldest of that key.
     """
 
     def __init__(self, depth: int) -> None:
@@ -28,7 +28,7 @@ class LatestQueue(Generic[T]):
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Items that were pushed out before anyone took them, by key."""
+        """Items dropped for newer ones, by key."""
         with self._changed:
             return dict(self._dropped)
 
@@ -47,7 +47,7 @@ class LatestQueue(Generic[T]):
             self._changed.notify()
 
     def take(self, timeout_s: float | None = None) -> tuple[str, T] | None:
-        """The item that waits longest, with its key; None once `timeout_s` is over or the queue is closed and empty."""
+        """The oldest item, with its key; None once `timeout_s` is over or the queue is closed and empty."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._closed, timeout_s)
             if not self._items:
@@ -57,19 +57,19 @@ class LatestQueue(Generic[T]):
             return key, item
 
     def close(self) -> None:
-        """Refuses further items and wakes whoever waits; what is queued can still be taken."""
+        """Ignores further items and wakes waiting threads; queued items can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
 
 class BoundedQueue(Generic[T]):
-    """Keeps everything in order up to a size: for the recorder, which wants all of it.
+    """A FIFO queue bounded by size: for the recorder, which needs every item.
 
-    A full queue refuses the newcomer, so that what is kept has no holes but at the end.
+    A full queue drops the new item, so that the queued ones have no gaps.
 
     Args:
-        capacity: largest sum of the items' sizes that may wait [bytes].
+        capacity: largest sum of the sizes of the queued items [bytes].
     """
 
     def __init__(self, capacity: int) -> None:
@@ -88,13 +88,13 @@ class BoundedQueue(Generic[T]):
 
     @property
     def is_drained(self) -> bool:
-        """Whether nothing waits and nothing will come any more."""
+        """True if the queue is closed and empty."""
         with self._changed:
             return self._closed and not self._items
 
     @property
     def size(self) -> int:
-        """Sum of the sizes of the items that wait [bytes]."""
+        """Sum of the sizes of the queued items [bytes]."""
         with self._changed:
             return self._size
 
@@ -111,7 +111,7 @@ class BoundedQueue(Generic[T]):
             self._changed.notify()
 
     def take(self, timeout_s: float | None = None) -> T | None:
-        """The item that waits longest; None once `timeout_s` is over or the queue is closed and empty."""
+        """The oldest item; None once `timeout_s` is over or the queue is closed and empty."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._closed, timeout_s)
             if not self._items:
@@ -121,7 +121,7 @@ class BoundedQueue(Generic[T]):
             return item
 
     def close(self) -> None:
-        """Refuses further items and wakes whoever waits; what is queued can still be taken."""
+        """Ignores further items and wakes waiting threads; queued items can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()

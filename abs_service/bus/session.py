@@ -1,4 +1,4 @@
-"""Opens zenoh sessions: explicit endpoints, no discovery, errors that say what to change."""
+"""Opens zenoh sessions: explicit endpoints, no discovery, actionable errors."""
 
 import json
 import re
@@ -6,9 +6,9 @@ from enum import StrEnum
 
 import zenoh
 
-#: Without a keep-alive for this long the other side counts as gone [ms].
+#: Lease: a peer without a keep-alive for this long is disconnected [ms].
 LEASE_MS = 2000
-#: How long a client looks for its router [ms].
+#: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
 #: Two publishing processes fit into the 64 MB that a container has by default; without room, TCP takes over.
 SHARED_MEMORY_POOL_BYTES = 30 << 20
@@ -21,14 +21,14 @@ class BusError(Exception):
 
 
 class Role(StrEnum):
-    """What a process is to the others."""
+    """Role of a process in the zenoh network."""
 
     ROUTER = "router"  # listens on the endpoint; exactly one process of a rig
     CLIENT = "client"  # connects to it
 
 
 def open_session(endpoint: str, role: Role, shared_memory: bool = True) -> zenoh.Session:
-    """Opens a session. Close it before the interpreter exits: zenoh hangs there if it is still open.
+    """Opens a session. Close it before the interpreter exits, or zenoh hangs at exit.
 
     Args:
         endpoint: where the router listens, such as tcp/127.0.0.1:7447.
@@ -66,7 +66,7 @@ def _explain(error: str, role: Role) -> str:
         return "the address is in use; is another abs-service running? Stop it or choose another port"
     if role is Role.CLIENT:
         return f"nothing answers there within {CONNECT_TIMEOUT_MS / 1000:g} s; start `abs-service run` or use --listen"
-    # zenoh appends its own source lines, which help nobody here.
+    # zenoh appends its own source lines, which are of no use here.
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
 
 

@@ -1,4 +1,4 @@
-"""From the monotonic clock, with which everything is measured, to the wall clock, which people and files read."""
+"""Conversion of monotonic to wall-clock time, and message headers."""
 
 import time
 import uuid
@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from absmsg.v1 import common_pb2
 
-#: A change of the offset that no slewing explains within a second [ns].
+#: A larger change of the offset within a second is a step, not slewing [ns].
 STEP_NS = 50_000_000
 
 
@@ -34,14 +34,14 @@ class WallClock:
         return t_host_ns + self._offset_ns
 
     def measure(self) -> int:
-        """Measures the offset anew and returns by how much it changed [ns]; counts a change beyond `STEP_NS`."""
+        """Measures the offset again and returns its change [ns]; counts a change beyond `STEP_NS`."""
         offset_ns = self._read_offset()
         change_ns, self._offset_ns = offset_ns - self._offset_ns, offset_ns
         self.steps += abs(change_ns) > STEP_NS
         return change_ns
 
     def _read_offset(self) -> int:
-        # Of a few readings, the one that the scheduler disturbed least.
+        # Of a few readings, the one with the shortest duration: the least disturbed by the scheduler.
         best_ns, offset_ns = None, 0
         for _ in range(5):
             before, wall, after = self.monotonic(), self._wall(), self.monotonic()
@@ -51,12 +51,12 @@ class WallClock:
 
 
 class HeaderFactory:
-    """Writes the header of every message that one process sends.
+    """Makes the headers of all messages of one process.
 
     Args:
         rig: name of the rig.
         clock: gives the stamps.
-        boot_id: tells this process from its predecessor; new with each `HeaderFactory` unless given.
+        boot_id: identifies the process instance; new with each `HeaderFactory` unless given.
     """
 
     def __init__(self, rig: str, clock: WallClock, boot_id: str | None = None) -> None:
@@ -71,5 +71,5 @@ class HeaderFactory:
         return header
 
     def now(self, seq: int, frame_id: str = "") -> common_pb2.Header:
-        """The header of a message about this very moment."""
+        """The header of a message about the present moment."""
         return self.at(self.clock.monotonic(), seq, frame_id)

@@ -16,7 +16,7 @@ from drivers.contract.callbacks import from_non_daemon_thread
 _log = logging.getLogger(__name__)
 
 ENCODING = "application/protobuf"
-#: Period in which the last state's number is repeated, so that a late or unlucky subscriber notices [s].
+#: Period in which the last state's number is repeated, so that a subscriber notices a loss [s].
 HEARTBEAT_S = 0.5
 
 _PRIORITIES = {
@@ -28,7 +28,7 @@ _PRIORITIES = {
 
 
 class ZenohBus:
-    """One rig's topics on a zenoh session; keeps the promises of `contract.Bus`.
+    """One rig's topics on a zenoh session; implements `contract.Bus`.
 
     Args:
         session: an open session; the bus closes it.
@@ -88,7 +88,7 @@ class ZenohBus:
     def subscribe(self, pattern: str, on_sample: Callable[[Sample], None]) -> Subscription:
         """See `contract.Bus.subscribe`."""
 
-        # The bytes are copied here, in zenoh's thread, so that a slow reader never holds shared memory.
+        # The bytes are copied here, in zenoh's thread, so that a slow subscriber never holds shared memory.
         def on_zenoh_sample(sample: zenoh.Sample) -> None:
             on_sample(self._sample(sample))
 
@@ -128,7 +128,7 @@ class ZenohBus:
         self.close()
 
     def _keep(self, declared: Any) -> Subscription:
-        # zenoh takes back a token, and may take back the rest, when Python forgets the object.
+        # zenoh undeclares a token, and possibly others, when Python collects the object.
         self._kept.append(_Declared(declared))
         return self._kept[-1]
 
@@ -178,7 +178,7 @@ class _Declared:
         self._undeclare: Callable[[], None] = declared.undeclare
 
     def close(self) -> None:
-        # zenoh refuses to take back twice what it may do once.
+        # zenoh raises when something is undeclared twice.
         undeclare, self._undeclare = self._undeclare, _nothing
         undeclare()
 

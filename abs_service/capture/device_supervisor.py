@@ -1,6 +1,6 @@
-"""Keeps a device delivering: opens it, starts it, and does both again when it fails or falls silent.
+"""Opens and starts a device, and reopens it when it fails or stalls.
 
-No driver reconnects by itself: this is the one place that decides when to try again, with whom, and in which epoch.
+Drivers do not reconnect: retries, backoff, the expected serial number and the epoch are decided here.
 """
 
 import logging
@@ -14,7 +14,7 @@ from drivers.contract.device import Device, DeviceError, DeviceState, FinalError
 
 _log = logging.getLogger(__name__)
 
-#: Pause before a failed device is opened again: doubles with each failure in a row, up to the longest [s].
+#: Backoff before a failed device is reopened: doubles with each consecutive failure, up to the longest [s].
 FIRST_BACKOFF_S, LONGEST_BACKOFF_S = 0.5, 10.0
 
 _LEVELS = {
@@ -28,22 +28,22 @@ _LEVELS = {
 
 
 class DeviceSupervisor:
-    """Looks after one device from a thread of its own, because opening may take long.
+    """Supervises one device from a thread of its own, because opening may take long.
 
     Args:
         name: name of the device in the configuration.
-        uri: its address. Once it was open, only the device of the same serial number will do.
+        uri: its address. After the first opening, only the same serial number is accepted.
         open_device: opens the device at an address.
-        on_open: told of each opened device before it starts. A `DeviceError` that is not final is a failure like any
-            other; everything else that it raises becomes `fatal_error` and ends the supervisor.
-        sink: where the frames go, under the names of the rig.
-        heads: names in the rig of the device's heads; frames of others are not wanted.
+        on_open: called with each opened device before it starts. A `DeviceError` that is not final is retried; any
+            other exception becomes `fatal_error` and ends the supervisor.
+        sink: receives the frames, with the sensor names of the rig.
+        heads: sensor names by head of the device; frames of other heads are dropped.
         health: of the component.
         clock: CLOCK_MONOTONIC [ns].
 
     Attributes:
-        finished: the device has come to its end by itself, as a recording does.
-        fatal_error: why the device cannot be used at all; None if it can.
+        finished: the device has ended by itself, as a recording does.
+        fatal_error: the error after which no retry helps; None if there is none.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class DeviceSupervisor:
         self._clock = clock
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
-        self._previous: Counter[str] = Counter()  # what earlier openings of the device counted
+        self._previous: Counter[str] = Counter()  # counters of earlier openings
         self.finished = False
         self.fatal_error: Exception | None = None
 
@@ -77,7 +77,7 @@ class DeviceSupervisor:
         self._thread.start()
 
     def close(self, timeout_s: float) -> None:
-        """Stops and closes the device; a driver that does not return is left behind after `timeout_s`."""
+        """Stops and closes the device; a driver that does not return within `timeout_s` is abandoned."""
         self._stop.set()
         self._thread.join(timeout_s)
 
@@ -92,7 +92,7 @@ class DeviceSupervisor:
             except DeviceError as error:
                 delivered, reason = False, str(error)
             except Exception as error:
-                # A driver's mistake must not take the other devices down.
+                # A bug in a driver must not stop the other devices.
                 _log.exception("device %s", self._name)
                 delivered, reason = False, repr(error)
             if self._stop.is_set() or self.finished or self.fatal_error:
@@ -104,7 +104,7 @@ class DeviceSupervisor:
             self._stop.wait(backoff_s)
 
     def _run_once(self) -> tuple[bool, str]:
-        """Serves the device until it fails or shall stop; returns whether it delivered anything, and why it ended."""
+        """Runs the device until it fails or is stopped; returns True if it delivered, and why it ended."""
         self._report_state(DeviceState.OPENING, "")
         device = self._open_device(self._uri)
         streams = device.capabilities.streams if device.capabilities.regular else ()
@@ -131,7 +131,7 @@ class DeviceSupervisor:
         return stall_detector.delivered, reason
 
     def _check_serial(self, device: Device) -> None:
-        """Remembers who the device is: from now on no other will do, whatever the configuration leaves open."""
+        """Checks the serial number against that of the first opening."""
         info = device.info
         if self._serial not in {"", info.serial}:
             raise DeviceError(f"{self._uri} is device {info.serial} now; {self._serial} is awaited, plug that one in")

@@ -1,4 +1,4 @@
-"""What a rig says about itself, apart from images and estimates: calibrations, noise models, poses, configuration."""
+"""Messages with the metadata of a rig: calibrations, noise models, poses, configuration, schema."""
 
 import hashlib
 from collections.abc import Mapping
@@ -20,12 +20,12 @@ from calib.lens import Lens
 from drivers.contract.host_clock import host_clock
 from drivers.encoding.mcap_file import file_descriptor_set
 
-#: What `foxglove.CameraCalibration` calls the lens models.
+#: Names of the lens models in `foxglove.CameraCalibration`.
 _DISTORTION_MODELS = {Lens.name: "rational_polynomial", KannalaBrandt.name: "kannala_brandt"}
 
 
 def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:
-    """A camera as viewers understand it; its pose is in `transforms`."""
+    """A camera as a message for viewers; its pose is in `transforms`."""
     K = [camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0]
     message = CameraCalibration(
         frame_id=sensor,
@@ -42,7 +42,7 @@ def calibration(sensor: str, camera: Camera, wall_ns: int) -> CameraCalibration:
 
 
 def transforms(cameras: Mapping[str, Camera], wall_ns: int) -> FrameTransforms:
-    """Where the sensors are in the rig, by sensor name."""
+    """Poses of the sensors in the rig as a message, from their cameras by sensor name."""
     message = FrameTransforms()
     for sensor, camera in cameras.items():
         transform = message.transforms.add(parent_frame_id=keys.RIG_FRAME, child_frame_id=sensor)
@@ -58,14 +58,14 @@ def transforms(cameras: Mapping[str, Camera], wall_ns: int) -> FrameTransforms:
 def sensor_model(
     header: common_pb2.Header, sensor: str, camera: Camera, noise: Mapping[str, Any]
 ) -> sensor_model_pb2.SensorModel:
-    """Everything the likelihood needs of a sensor beside its images.
+    """Camera and noise model of a sensor as a message.
 
     Args:
-        header: who speaks and when.
+        header: of the message.
         sensor: its name.
         camera: its projection.
         noise: `type` and parameters of the noise model and the outliers' share and range, as in TOML; empty if the
-            sensor has none. Only what is made of numbers is told, arrays row by row.
+            sensor has none. Only numbers and arrays of numbers are included, row by row.
     """
     message = sensor_model_pb2.SensorModel(
         header=header,
@@ -96,7 +96,7 @@ def _numbers(value: Any) -> list[float]:
 
 
 def config(header: common_pb2.Header, toml: str) -> sensor_model_pb2.Config:
-    """The effective configuration."""
+    """The effective configuration as a message."""
     digest = hashlib.sha256(toml.encode()).hexdigest()
     return sensor_model_pb2.Config(header=header, toml=toml, sha256=digest, version=abs_service.__version__)
 

@@ -1,4 +1,4 @@
-"""What a device says and for how long it has said nothing, seen from whoever keeps it."""
+"""Detects streams that stall, from the arrival times of their frames."""
 
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -8,28 +8,28 @@ from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import DeviceState, Sink, Truth
 from drivers.contract.frame import Frame
 
-#: After so many of its periods without a frame, and not sooner than the time beside [ns], a stream is stalled.
+#: A stream without a frame for so many periods, and at least so long [ns], is stalled.
 STALL_PERIODS, STALL_NS = 5, 1_000_000_000
-#: Likewise, after which its device is opened again.
+#: Likewise, for the device to be reopened.
 REOPEN_PERIODS, REOPEN_NS = 10, 5_000_000_000
-#: What a device may need from the state STREAMING to the first frame of a stream [ns].
+#: Longest time from the state STREAMING to the first frame of a stream [ns].
 WARM_UP_NS = 10_000_000_000
 
 
 class StallDetector:
-    """A sink that speaks the names of the rig and notes when what came last.
+    """A sink that translates head names to sensor names and notes the arrival of frames.
 
     Args:
         sink: where wanted frames go.
-        heads: names in the rig of the device's heads; frames of others are counted and left out.
-        streams: those that have to come at their rates; none if silence is no fault.
+        heads: sensor names by head of the device; frames of other heads are dropped and counted.
+        streams: those that are monitored; none if the device delivers irregularly.
         clock: CLOCK_MONOTONIC [ns].
-        first_epoch: what is added to the device's epochs.
+        first_epoch: added to the device's epochs.
 
     Attributes:
-        unwanted: frames left out.
-        delivered: whether any frame came.
-        state: what the device reported last, and why.
+        unwanted: frames of heads that the rig does not use.
+        delivered: True after the first frame.
+        state: last state reported by the device, and its reason.
     """
 
     def __init__(
@@ -81,13 +81,13 @@ class StallDetector:
         self._sink.on_warning(condition, message)
 
     def take_warnings(self) -> Mapping[str, str]:
-        """What was said of each condition since the last call."""
+        """Warnings since the last call, by condition."""
         with self._lock:
             warnings, self._warnings = self._warnings, {}
         return warnings
 
     def check(self) -> tuple[DeviceState, str]:
-        """STREAMING if all streams keep coming; STALLED or FAILED if one does not, by how long, and why in words."""
+        """STREAMING if no stream stalls, otherwise STALLED or FAILED; and the reason."""
         if self.state[0] != DeviceState.STREAMING:
             return self.state
         now_ns = self._clock()

@@ -1,4 +1,4 @@
-"""From calibration files, and rig files that name one, to what is known of the sensors."""
+"""Reads calibrations from calibration files and rig files."""
 
 import os
 import tomllib
@@ -27,7 +27,7 @@ class StoredCalibrationError(Exception):
 
 
 def load(path: Path) -> RigCalibration:
-    """What a calibration file says of the sensors, or a rig file together with the calibration file that it names.
+    """The calibration in a calibration file, or in a rig file with the calibration file that it names.
 
     Raises:
         ConfigError: the file, or the one that it names, cannot be used.
@@ -55,7 +55,7 @@ def _raw(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return {}  # reading it as a calibration will say what is wrong
+        return {}  # reported when it is read as a calibration
 
 
 def _known(name: str, table: Any, evidence: SensorEvidence, path: Path) -> SensorCalibration:

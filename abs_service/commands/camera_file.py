@@ -59,7 +59,7 @@ class DepthTable(ColorTable):
     """The depth sensor.
 
     Attributes:
-        depth_scale: length of one unit of the images [m]; None takes what the layout usually has.
+        depth_scale: length of one unit of the images [m]; None for the default of the layout.
         geometry: which length they hold.
         invalid: the value that means "no return".
     """
@@ -89,7 +89,7 @@ def load(path: Path) -> CameraFile:
     """Reads a camera file: JSON if its name ends in `.json`, TOML otherwise.
 
     Raises:
-        CameraFileError: the file cannot be read, or says something that is not allowed.
+        CameraFileError: the file cannot be read, or has invalid keys or values.
     """
     try:
         text = path.read_text(encoding="utf-8")

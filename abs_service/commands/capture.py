@@ -3,7 +3,7 @@
   abs-service capture rig.toml                                 for the rig that `abs-service run` hosts elsewhere
   abs-service capture rig.toml --listen tcp/0.0.0.0:7447       alone; the others connect to this process
 
-A device that fails is opened again, first soon, then less and less often.
+A device that fails is reopened, with exponential backoff.
 """
 
 import argparse
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Captures until told to stop."""
+    """Captures until SIGTERM or SIGINT."""
     rig = rig_process.load_config(arguments)
     stop = rig_process.stop_on_signals()
     clock = WallClock()
@@ -109,7 +109,7 @@ def _tick(
     change_ns = clock.measure()
     if clock.steps > steps:
         health.count("clock_steps")
-        health.report("clock", Level.WARNING, f"somebody set the clock by {change_ns / 1e9:+.3f} s; stamps follow it")
+        health.report("clock", Level.WARNING, f"the wall clock was set by {change_ns / 1e9:+.3f} s; stamps follow it")
     else:
         health.report("clock", Level.OK)
     _count(publishers, health)
@@ -126,11 +126,11 @@ def _count(publishers: Mapping[str, FramePublisher], health: Health) -> None:
 
 
 class MetadataPublisher:
-    """Announces the configuration, and calibration, noise and pose of every sensor as soon as its device is open.
+    """Publishes the configuration, and calibration, noise model and pose of every sensor whose device is open.
 
     Args:
-        bus: where.
-        headers: writes the headers.
+        bus: of the rig.
+        headers: makes the message headers.
         rig: the configuration.
     """
 
@@ -145,7 +145,7 @@ class MetadataPublisher:
         self._lock = threading.Lock()
 
     def add_device(self, name: str, device: Device) -> None:
-        """Learns the sensors of an opened device and announces them.
+        """Adds the sensors of an opened device and publishes their metadata.
 
         Raises:
             HeadError: the configuration names a head that the device does not have.
@@ -156,7 +156,7 @@ class MetadataPublisher:
         self.publish()
 
     def publish(self) -> None:
-        """Announces everything that is known, stamped now."""
+        """Publishes all metadata, stamped now."""
         with self._lock:
             header = self._headers.now(self._seq)
             self._seq += 1

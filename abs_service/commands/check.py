@@ -1,4 +1,4 @@
-"""Says what a configuration describes, or all that is wrong with it. No device is touched and nothing is started.
+"""Validates a configuration and prints what it describes. No device is touched and nothing is started.
 
   abs-service check                 the simulated demo rig
   abs-service check rig.toml        your own
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
-    """What a configuration describes, as plain data.
+    """Description of a configuration as plain data.
 
     Args:
         rig: the configuration.
@@ -178,7 +178,7 @@ def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]])
 
 
 def _camera(rig: config.ServiceConfig, name: str) -> dict[str, str]:
-    """Where the two parts of a sensor's calibration come from: a calibration file, this file, or the device."""
+    """Origins of a sensor's intrinsics and pose: a calibration file, this file, or the device."""
     camera, origin = rig.sensors[name].camera, rig.calibration
     found: dict[str, str] = {}
     for part, key in (("projection", "fx"), ("pose", "T_rs")):

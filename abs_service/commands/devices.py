@@ -72,7 +72,7 @@ def as_dict(one: Found) -> dict[str, Any]:
 
 
 def description(device: Device) -> dict[str, Any]:
-    """What an opened device can do, as plain data."""
+    """Capabilities of an opened device as plain data."""
     controls = []
     for info in device.controls.infos:
         # JSON has no infinity, which stands for "no limit".
@@ -82,7 +82,7 @@ def description(device: Device) -> dict[str, Any]:
 
 
 def changes(before: Sequence[Found], after: Sequence[Found]) -> Iterator[tuple[str, Found]]:
-    """Who came ("+"), went ("-") or is in another state ("~") than before."""
+    """Devices that were added ("+"), removed ("-") or changed ("~")."""
     old = {(one.info.uri, one.info.serial): one for one in before}
     new = {(one.info.uri, one.info.serial): one for one in after}
     yield from (("-", one) for key, one in old.items() if key not in new)

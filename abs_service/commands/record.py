@@ -24,9 +24,9 @@ from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from drivers.encoding.mcap_file import Compression
 
-#: Time to write what still waits when told to stop [s].
+#: Time to drain the queue at the end [s].
 DRAIN_S = 2.5
-#: How far recording steps back for capture and tracking where cores are scarce: it has a queue, they have no time.
+#: Niceness: capture and tracking go first where cores are scarce; recording has a queue.
 NICE = 5
 
 
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Records until told to stop."""
+    """Records until SIGTERM or SIGINT."""
     rig = rig_process.load_config(arguments)
     settings = _settings(rig)
     stop = rig_process.stop_on_signals()
@@ -49,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments) as bus:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
-        # Beside the recording, which must not wait for what may take minutes.
+        # In parallel: it may take minutes.
         threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
@@ -75,7 +75,7 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
     except OSError as error:
         raise DirectoryError(f'record.directory = "{table.directory}": cannot be made: {error.strerror}') from None
     try:
-        tempfile.TemporaryFile(dir=table.directory).close()  # permissions do not tell of read-only file systems
+        tempfile.TemporaryFile(dir=table.directory).close()  # permissions do not show read-only file systems
     except OSError as error:
         raise DirectoryError(f'record.directory = "{table.directory}": cannot be written: {error.strerror}') from None
     return RecorderSettings(

@@ -1,4 +1,4 @@
-"""Saves what can be read of recordings that were cut short or damaged.
+"""Recovers truncated or damaged recordings.
 
   abs-service recover recordings/x.mcap.active   what a crash left; becomes recordings/x.mcap
   abs-service recover recordings/x.mcap          a damaged file; the result is recordings/x.recovered.mcap
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Recovers every file, whatever happens to the others, and says what was saved and what was not."""
+    """Recovers each file independently and prints what was recovered and what was lost."""
     exit_code = Exit.OK
     for path in arguments.files:
         try:

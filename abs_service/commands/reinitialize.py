@@ -1,4 +1,4 @@
-"""Tells a running tracker to look for its object anew: makes a new mesh of what its region shows now.
+"""Makes a running tracker detect its object again, with a new mesh of what its region shows now.
 
   abs-service reinitialize                  the tracker of the demo rig that `abs-service run` shows elsewhere
   abs-service reinitialize rig.toml sheet   one tracker of that rig
@@ -18,7 +18,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import rig_process
 from abs_service.supervision.exit_codes import Exit
 
-#: How long the tracker may take to find an object [s].
+#: Timeout of the detection [s].
 TIMEOUT_S = 10.0
 
 
@@ -52,7 +52,7 @@ def _reinitialize(bus: Bus, tracker: str, headers: HeaderFactory) -> int:
     bus.subscribe(keys.state(tracker), on_state)
     command = bus.publisher(keys.reinitialize(tracker), common_pb2.Header.DESCRIPTOR.full_name, EVENTS)
     if not received.wait(TIMEOUT_S):
-        print(f'tracker "{tracker}" says nothing: does it run, and do its sensors deliver?')
+        print(f'tracker "{tracker}" publishes nothing: does it run, and do its sensors deliver?')
         return Exit.FAILED
     command.put(headers.now(0).SerializeToString())
     if not renewed.wait(TIMEOUT_S):

@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def notes(recording: Recording) -> list[str]:
-    """What somebody who replays a recording should know about it."""
+    """Notes on truncation and damage of a recording."""
     if not recording.truncated:
         return []
     found = [f"{recording.path} was never finished; what follows is up to where it breaks off"]

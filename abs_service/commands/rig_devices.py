@@ -36,7 +36,7 @@ def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> N
 
 
 def cameras(rig: config.ServiceConfig, name: str, device: Device) -> dict[str, Camera]:
-    """The cameras of a device's sensors, by their names in the rig: the device's own with what the rig file says.
+    """Cameras of a device's sensors by sensor name: the device's own, overridden by the rig file.
 
     Raises:
         HeadError: the configuration names a head that the device does not have.

@@ -1,4 +1,4 @@
-"""What every process of a rig has in common: its arguments, its session and how it is told to stop."""
+"""Common parts of the processes of a rig: arguments, bus session, signals."""
 
 import argparse
 import os

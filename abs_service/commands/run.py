@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Runs a rig until told to stop, until its devices are at their end, or until nothing can go on."""
+    """Runs a rig until SIGTERM or SIGINT, the end of its devices, or a failure."""
     rig = effective(rig_process.load_config(arguments), arguments)
     stop = rig_process.stop_on_signals()
     gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
@@ -74,14 +74,14 @@ def run(arguments: argparse.Namespace) -> int:
         display.close(session.view())
     refused = supervisor.misconfigured()
     if refused is not None:
-        # The child has read a file of ours that nobody else knows.
+        # The child has read a temporary file of ours.
         reason = refused.reason.rpartition("abs-service: error: ")[2]
         raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
     return supervisor.exit_code() or Exit.OK
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
-    """The configuration with what the command line says in its place.
+    """The configuration, overridden by the command line.
 
     Raises:
         KeyNameError: the rig cannot be called so.
@@ -133,7 +133,7 @@ def file(rig: config.ServiceConfig) -> Iterator[Path]:
 
 
 def limits(rig: config.ServiceConfig) -> Limits:
-    """How much patience the configuration asks for."""
+    """Limits and timeouts of the configuration."""
     table = rig.run
     seconds = (table.window_s, table.startup_s, table.stall_s, table.stop_s)
     return Limits(table.restarts, *(int(value * 1e9) for value in seconds))

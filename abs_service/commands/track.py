@@ -30,7 +30,7 @@ from calib.camera import Camera
 from calib.rig import Noise, Rig
 from drivers.encoding.sensor_model import decode_camera
 
-#: How long one question for calibrations waits for answers [s].
+#: Timeout of a query for calibrations [s].
 QUERY_S = 0.5
 
 
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tracks until told to stop."""
+    """Tracks until SIGTERM or SIGINT."""
     settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
     plan = wiring.plan(settings, name)
@@ -101,7 +101,7 @@ def _live(
 
 
 def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading.Event) -> dict[str, Camera]:
-    """Asks until every sensor's camera is known, or until told to stop."""
+    """Queries until every sensor's camera is known, or until stopped."""
     cameras: dict[str, Camera] = {}
     while not stop.is_set():
         for sensor in set(sensors) - set(cameras):

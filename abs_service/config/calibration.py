@@ -1,4 +1,4 @@
-"""The tables of a calibration file, and what a configuration remembers of the one it was made with."""
+"""Tables of a calibration file, and its provenance in a merged configuration."""
 
 from typing import Annotated, Any, Literal
 
@@ -65,7 +65,7 @@ class ResidualsTable(Table):
 
 
 class SensorEvidence(Table):
-    """What a calibration file tells of a sensor for people and for later commands; the tracker does not use it.
+    """Supplementary data of a sensor in a calibration file, for people and other commands, not for the tracker.
 
     Attributes:
         factory: the device's own calibration, which the file's takes the place of.
@@ -101,7 +101,7 @@ class CalibrationFile(Table):
 
 
 class SensorOrigin(SensorEvidence):
-    """What a merged configuration remembers of one sensor.
+    """Origin of one sensor's keys in a merged configuration.
 
     Attributes:
         keys: of `[sensors.<name>]` and its `camera` that the calibration file gave.

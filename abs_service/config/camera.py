@@ -1,4 +1,4 @@
-"""What a configuration may say about a camera instead of its factory calibration."""
+"""Camera tables, which override factory calibrations."""
 
 from dataclasses import replace
 from typing import Annotated, Any
@@ -93,7 +93,7 @@ class CameraTable(BaseModel):
         return None if self.fx is None else self.applied_to(_REPLACED)
 
     def applied_to(self, factory: Camera) -> Camera:
-        """The factory calibration with what the table says in its place."""
+        """The factory calibration, overridden by the table."""
         given = {key: getattr(self, key) for key in _MATRIX if getattr(self, key) is not None}
         if given:
             given["lens"] = lens_of(self.lens_model or Lens.name, self.lens or ())

@@ -1,4 +1,4 @@
-"""The one error of a configuration, with all that is wrong with it."""
+"""The error of an invalid configuration, with all problems in it."""
 
 from collections.abc import Collection
 from typing import Any, get_args, get_origin
@@ -9,7 +9,7 @@ from abs_service.config.problems import Key, Problem
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be used; the message names the file and each mistake: key, value, what is allowed."""
+    """A configuration that cannot be used; the message names the file and each problem: key, value, what is allowed."""
 
 
 def error_of(source: str, problems: list[Problem]) -> ConfigError:

@@ -25,7 +25,7 @@ def load_calibration(path: Path) -> CalibrationFile:
 
 
 def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
-    """A rig file with what the calibration file says that its key `calibration` names, in the tables of its sensors.
+    """A rig file merged with the calibration file that its key `calibration` names.
 
     Args:
         rig: what the TOML file holds; returned as it is if it names no calibration file.
@@ -33,8 +33,8 @@ def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
         base: folder that the path of the calibration file starts from.
 
     Raises:
-        ConfigError: the calibration file cannot be used, is about sensors that the rig does not have, or says what the
-            rig file says too.
+        ConfigError: the calibration file cannot be used, is about sensors that the rig does not have, or has
+            keys that the rig file has, too.
     """
     if not isinstance(rig.get("calibration"), str):
         return rig
@@ -78,7 +78,7 @@ def _parse(path: Path, content: bytes) -> CalibrationFile:
 
 
 def _given(calibrated: CalibratedSensor) -> dict[str, Any]:
-    """What the file says of a sensor that a rig file could say; paths absolute, no empty tables."""
+    """Keys of a sensor that a rig file can have; paths absolute, no empty tables."""
     tables = calibrated.model_dump(mode="json", exclude_none=True, include=set(SHARED))
     return {key: value for key, value in tables.items() if value != {}}
 
@@ -107,7 +107,7 @@ def _merged(table: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _origin(path: Path, content: bytes, file: CalibrationFile, given: dict[str, Any]) -> dict[str, Any]:
-    """What the merged configuration remembers of the calibration file."""
+    """The `calibration` table of the merged configuration."""
     origin = CalibrationOrigin(
         file=path.name,
         sha256=hashlib.sha256(content).hexdigest(),

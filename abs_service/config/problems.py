@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in words for the person who wrote it."""
+"""Problems of a configuration as messages for its author."""
 
 import difflib
 import json
@@ -10,13 +10,13 @@ from pydantic import ValidationError
 
 Key = tuple[str | int, ...]
 
-#: Stands for "no value was given", which a TOML file can say and None cannot.
+#: Marks "no value given", which differs from None.
 ABSENT: Any = object()
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: where it is, what was given and what is allowed instead.
+    """One problem: key, value and what is allowed.
 
     Attributes:
         key: path of the key from the root of the table.
@@ -38,7 +38,7 @@ class Problem:
 
 
 class ProblemsError(ValueError):
-    """Several mistakes at once. A `ValueError`, so that pydantic's validators may raise it."""
+    """Several problems at once. A `ValueError`, so that pydantic's validators may raise it."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = tuple(problems)
@@ -52,14 +52,14 @@ def dotted(key: Key) -> str:
 
 
 def allowed_instead(name: str, allowed: Collection[str]) -> str:
-    """What to use instead of an unknown name: the closest allowed one and the list of all."""
+    """Hint for an unknown name: the closest allowed one and the list of all."""
     close = difflib.get_close_matches(name, allowed, n=1)
     guess = f'did you mean "{close[0]}"? ' if close else ""
     return f"{guess}allowed: {', '.join(sorted(allowed)) or 'none'}"
 
 
 def unknown_key(key: Key, allowed: Collection[str]) -> Problem:
-    """The problem of a key that means nothing where it stands."""
+    """The problem of an unknown key."""
     return Problem(key, f"unknown key, {allowed_instead(str(key[-1]), allowed)}")
 
 

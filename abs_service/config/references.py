@@ -1,4 +1,4 @@
-"""Names that one table of a configuration uses for another: each must exist, and none may mean two things."""
+"""Checks of references between tables: each name must exist and be unambiguous."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,9 +7,9 @@ from abs_service.config.problems import Problem, allowed_instead
 
 
 def check(file: dict[str, Any]) -> list[Problem]:
-    """All names in a file that lead nowhere or to two places.
+    """All dangling or ambiguous references in a file.
 
-    Works on the raw tables, so that these mistakes are reported together with all others.
+    Works on the raw tables, so that these problems are reported together with all others.
     """
     return [*_sensors(file), *_references(file), *_trackers(file)]
 

@@ -1,9 +1,9 @@
-"""What all tables of a file have in common."""
+"""Base class of all tables."""
 
 from pydantic import BaseModel, ConfigDict
 
 
 class Table(BaseModel):
-    """What all tables share: they are frozen and know their keys. No logic."""
+    """A frozen table that forbids unknown keys. No logic."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)

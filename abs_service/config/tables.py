@@ -14,7 +14,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class BusTable(Table):
-    """`[bus]`: how the processes of a rig reach each other.
+    """`[bus]`: transport between the processes of a rig.
 
     Attributes:
         endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
@@ -137,12 +137,12 @@ class RecordTable(Table):
 
 
 class RunTable(Table):
-    """`[run]`: how `run` looks after its processes.
+    """`[run]`: limits and timeouts of the supervisor.
 
     Attributes:
         restarts, window_s: a process that needs more restarts than this within this time is given up.
-        startup_s: longest silence of a process that starts or compiles its kernels.
-        stall_s: afterwards, a process that says nothing for this long is restarted.
+        startup_s: timeout for the health of a process that starts or compiles its kernels.
+        stall_s: timeout for its health afterwards; a process that exceeds it is restarted.
         stop_s: time that all processes together have to end in order before they are killed.
     """
 
@@ -154,7 +154,7 @@ class RunTable(Table):
 
 
 class ServiceConfig(Table):
-    """Everything that a rig is: who it is on the wire, its devices, its sensors, its trackers and what it keeps.
+    """A rig: name, devices, sensors, trackers, recorder.
 
     In a file, `calibration` may name a calibration file, whose content is put into the sensors' tables; here it is what
     is remembered of that file.

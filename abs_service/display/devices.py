@@ -1,4 +1,4 @@
-"""What is attached, for people: a table, and below it what to do about each device that cannot be used."""
+"""Attached devices as a table, with a remedy for each one that cannot be used."""
 
 from collections.abc import Sequence
 

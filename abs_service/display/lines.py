@@ -36,7 +36,7 @@ class PlainDisplay:
         print(line(view), file=self._out, flush=True)
 
     def estimate(self, report: EstimateReport) -> None:
-        """Lines tell of the last estimate only."""
+        """Lines show the last estimate only."""
 
     def note(self, text: str) -> None:
         """See `Display`."""
@@ -66,7 +66,7 @@ class JsonDisplay:
         """Nothing to restore."""
 
     def update(self, view: RigView) -> None:
-        """Scripts read estimates, not how things are."""
+        """Only estimates are printed."""
 
     def estimate(self, report: EstimateReport) -> None:
         """See `Display`."""
@@ -82,7 +82,7 @@ class JsonDisplay:
 
 
 def line(view: RigView) -> str:
-    """How things are, in one line."""
+    """State of the rig in one line."""
     parts = [f"{view.elapsed_s:6.1f} s"]
     parts += [f"{stream.name} {stream.rate_hz:.1f} Hz" for stream in view.streams]
     for name, tracker in view.live.trackers.items():

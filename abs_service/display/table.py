@@ -21,7 +21,7 @@ _STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", Sta
 
 
 class TableDisplay:
-    """A table that is drawn anew some times a second, below whatever was said in passing.
+    """A table that is redrawn several times a second, below the notes.
 
     Args:
         console: the terminal.

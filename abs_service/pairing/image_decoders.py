@@ -1,4 +1,4 @@
-"""From the frames of one head to the image of one sensor, one decoder for each kind of sensor."""
+"""Decoders from the frames of a head to the image of a sensor, one per kind of measurement."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -18,7 +18,7 @@ from calib.noise.per_pixel import PerPixel
 from calib.rig import Noise, Sensor
 from drivers.contract.frame import Frame, Geometry, Kind
 
-#: The pattern of channels of an image without colours, and those of the mosaics by what their two upper rows read.
+#: Channel pattern of a single-channel image, and those of the Bayer mosaics by name.
 ONE_CHANNEL = np.zeros((1, 1), np.uint8)
 BAYER_ORDERS: Mapping[str, NDArray[np.uint8]] = {
     order: np.array(["rgb".index(letter) for letter in order], np.uint8).reshape(2, 2)
@@ -27,23 +27,23 @@ BAYER_ORDERS: Mapping[str, NDArray[np.uint8]] = {
 
 
 class ObservationError(ValueError):
-    """A frame that does not fit the rig it is said to come from."""
+    """A frame that does not match the rig's configuration."""
 
 
 class Decoder(Protocol):
-    """Makes the image of one sensor from the frames of its head."""
+    """Decodes the frames of a head to the image of one sensor."""
 
     def decode(self, frames: Mapping[Kind, Frame]) -> Image:
         """The image.
 
         Raises:
-            ObservationError: a frame's encoding does not fit what the sensor is said to measure.
+            ObservationError: a frame's encoding does not match the sensor's noise model.
         """
         ...
 
 
 def kinds(noise: Noise) -> tuple[Kind, ...]:
-    """What frames a sensor needs; the image is of the first one's exposure."""
+    """Kinds of frames that a noise model needs; the first one gives the exposure."""
     match noise:
         case DepthNoise():
             return (Kind.DEPTH, *_auxiliary(noise))
@@ -58,7 +58,7 @@ def kinds(noise: Noise) -> tuple[Kind, ...]:
 
 
 def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
-    """What a depth noise model has to know of a measurement besides its distance."""
+    """Kinds of frames that a depth noise model needs besides the distance."""
     match noise:
         case PerPixel():
             return _auxiliary(noise.law)
@@ -68,7 +68,7 @@ def _auxiliary(noise: DepthNoise) -> tuple[Kind, ...]:
 
 
 def decoder(sensor: Sensor) -> Decoder:
-    """The decoder for what a sensor's noise model is about."""
+    """The decoder for the measurements of a sensor's noise model."""
     match sensor.noise:
         case DepthNoise() as noise:
             return _DepthDecoder(sensor, _auxiliary(noise))
@@ -102,7 +102,7 @@ class _DepthDecoder:
     def _amplitude(
         self, frames: Mapping[Kind, Frame], gain: NDArray[np.float32] | np.float32, shape: tuple[int, ...]
     ) -> NDArray[np.float32]:
-        """What the noise model asks for besides the distance; a σ is one of the same length as the distance."""
+        """Auxiliary input of the noise model: σ, scaled like the distance, or the amplitude; NaN if there is none."""
         if Kind.DEVIATION in self._auxiliary:
             return frames[Kind.DEVIATION].si() * gain
         return frames[Kind.AMPLITUDE].si() if Kind.AMPLITUDE in frames else np.full(shape, np.nan, np.float32)
@@ -115,7 +115,7 @@ class _ColorDecoder:
 
 
 class _GreyDecoder:
-    """Grey as it comes, or the luma of a colour."""
+    """Grey values, or the luma of colours."""
 
     def decode(self, frames: Mapping[Kind, Frame]) -> ChannelImage:
         frame = frames[Kind.COLOR]

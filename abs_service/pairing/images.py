@@ -1,4 +1,4 @@
-"""What sensors measured, one type for each kind of sensor: SI values, radial distances, NaN for what is unknown."""
+"""Measurements, one type per kind of sensor: SI values, radial distances, NaN where unknown."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ LUMA = np.array([0.299, 0.587, 0.114], np.float32)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DepthImage:
-    """What a depth sensor measured.
+    """Image of a depth sensor.
 
     Attributes:
         distance: radial distances (height, width) [m], NaN without return.
@@ -25,14 +25,14 @@ class DepthImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColorImage:
-    """What a colour sensor measured: red, green, blue (height, width, 3) in 0…255."""
+    """Image of a colour sensor: red, green, blue (height, width, 3) in 0…255."""
 
     rgb: NDArray[np.uint8]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelImage:
-    """What a sensor measured whose pixels hold one number each.
+    """Image of a sensor with one value per pixel.
 
     Attributes:
         values: (height, width), NaN where nothing was measured; grey and colour filters in 0…255, others in the
@@ -53,7 +53,7 @@ class ChannelImage:
 
 @dataclass(frozen=True, slots=True)
 class BeamReading:
-    """What a light barrier says."""
+    """Measurement of a light barrier."""
 
     interrupted: bool
 

@@ -1,4 +1,4 @@
-"""From a set of frames to what the tracker compares with: one image per sensor."""
+"""Observations: one decoded image per sensor, from a frame set."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ __all__ = ["Observation", "ObservationError", "Observer", "Source"]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Which exposure an image of the observation comes from, and how well its time is known [ns]."""
+    """Exposure of an image of the observation: number, time and standard deviation of the time [ns]."""
 
     seq: int
     t_host_ns: int
@@ -22,14 +22,14 @@ class Source:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """Everything the sensors of a rig say about one moment.
+    """All measurements of a rig at one moment.
 
     Attributes:
         seq: number of the frame set.
         t_host_ns: the moment, CLOCK_MONOTONIC [ns].
         images: image of every sensor that contributed.
         sources: the exposure each image comes from.
-        missing: sensors that should have contributed and did not.
+        missing: sensors without an image.
     """
 
     seq: int
@@ -40,7 +40,7 @@ class Observation:
 
 
 class Observer:
-    """Makes observations of one rig; keeps per-sensor tables that never change."""
+    """Converts frame sets of one rig to observations; holds constant tables per sensor."""
 
     def __init__(self, rig: Rig):
         self._rig = rig

@@ -1,4 +1,4 @@
-"""Groups frames of several streams that show one moment. No thread, no clock: equal frames, equal sets."""
+"""Groups frames of several streams by exposure time. Deterministic: no thread, no clock."""
 
 from bisect import insort
 from collections import Counter, deque
@@ -10,9 +10,9 @@ from drivers.contract.frame import Frame, FrameSet
 
 Key = tuple[str, str]
 
-#: Frames per stream that may wait for others; a stream that is so far ahead waits in vain.
+#: Queue length per stream.
 DEPTH = 32
-#: Exposures per stream whose numbers are remembered, to recognise a frame that arrives twice.
+#: Sequence numbers remembered per stream, to detect duplicates.
 MEMORY = 256
 
 _NEVER_NS = -(1 << 63)
@@ -68,7 +68,7 @@ class Synchroniser:
         if stream is None:
             self._count(frame.key, "unexpected")
         elif frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
-            # Believing it would make every later frame of this stream stale.
+            # If accepted, it would make every later frame of this stream stale.
             self._count(frame.key, "future")
         else:
             offset_ns = self._offsets_ns.get(frame.sensor, 0)
@@ -78,7 +78,7 @@ class Synchroniser:
     def poll(self, now_ns: int) -> list[FrameSet]:
         """Returns the sets whose deadline is over at `now_ns` (CLOCK_MONOTONIC), with what there is.
 
-        A stream that made one set wait in vain is not waited for again before it has delivered.
+        A stream that was missing in a set is not waited for until it delivers again.
         """
         sets: list[FrameSet] = []
         while self._reference.waiting:
@@ -145,7 +145,7 @@ class Synchroniser:
 
 
 class _Stream:
-    """Frames of one stream that wait, by time, and what is known of the stream."""
+    """Queued frames of one stream, by time, and the state of the stream."""
 
     def __init__(self, key: Key) -> None:
         self.key = key
@@ -158,7 +158,7 @@ class _Stream:
         self._seen: deque[int] = deque(maxlen=MEMORY)
 
     def rejection_cause(self, frame: Frame) -> str:
-        """Why a frame cannot be used; "" if it can."""
+        """Cause for which a frame is rejected; "" if it is accepted."""
         if frame.epoch < self._epoch:
             return "old_epoch"
         if frame.epoch == self._epoch:
@@ -173,7 +173,7 @@ class _Stream:
         return ""
 
     def insert(self, frame: Frame) -> None:
-        """Takes a frame to which there is no rejection_cause; a new epoch forgets what was known of the last one."""
+        """Inserts an accepted frame; a new epoch resets the state of the stream."""
         if frame.epoch > self._epoch:
             self._epoch = frame.epoch
             self._form = _form_of(frame)

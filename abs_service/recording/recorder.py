@@ -1,4 +1,4 @@
-"""Records everything that a rig publishes, byte for byte, and says so if it cannot."""
+"""Records all messages of a rig unchanged; reports losses and failures in its health."""
 
 import shutil
 import threading
@@ -21,15 +21,15 @@ from abs_service.wire import message_header as header
 from abs_service.wire.message_header import MessageHeaderError
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFileError
 
-#: What a file repeats at its start, so that it can be understood without the one before.
+#: Messages repeated at the start of each file, so that every file is self-contained.
 _LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
-#: How long the recorder waits for answers at its start [s].
+#: Timeout of the queries at the start [s].
 QUERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class RecorderSettings:
-    """How to record.
+    """Settings of the recorder.
 
     Attributes:
         directory: where the files go; must exist.
@@ -58,7 +58,7 @@ class Recorder:
     """Writes all messages of a rig to MCAP files, from a thread of its own.
 
     The first error of the disk ends recording: what was written stays, as `*.mcap.active`, for `recovery`, and health
-    says RECORD_FAILED. A recorder that tried again would leave holes that nobody sees.
+    says RECORD_FAILED. A retry would leave unnoticed gaps.
 
     Args:
         bus: the rig.
@@ -89,13 +89,13 @@ class Recorder:
         self._last_seq: dict[str, int] = {}
         self._counts: Counter[str] = Counter()  # of the open file
         self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
-        self._reported_drops: Counter[str] = Counter()  # dropped messages that finished files tell of
+        self._reported_drops: Counter[str] = Counter()  # drops in the metadata of finished files
         self._failed = ""
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
     @property
     def failed(self) -> str:
-        """Why recording ended before `stop`; "" if it did not."""
+        """Error that ended recording before `stop`; "" if there is none."""
         return self._failed
 
     def start(self) -> None:
@@ -116,7 +116,7 @@ class Recorder:
         self._thread.join(timeout_s)
 
     def report(self) -> None:
-        """Enters the numbers into health; call it before `Health.tick`."""
+        """Updates the counters and gauges of health; call it before `Health.tick`."""
         self._health.count_up_to(self._queue.dropped, "dropped.")
         self._health.gauge("queue_bytes", self._queue.size)
         lost = sum(self._queue.dropped.values())
@@ -200,7 +200,7 @@ class Recorder:
             if keys.is_image(sample.topic) and sample.attachment:
                 file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
         except (MessageHeaderError, McapFileError) as error:
-            # Anyone can publish below our keys; that must not end the recording.
+            # Other programs can publish below our keys; that must not end the recording.
             self._health.count("refused")
             self._health.label("refused", str(error))
             return
@@ -232,7 +232,7 @@ class Recorder:
         self._last_seq[topic] = seq
 
     def _summary(self) -> dict[str, str]:
-        """What is in the file, and what should be."""
+        """Counts of messages in the file, and of lost ones."""
         dropped = Counter(self._queue.dropped)
         for topic, number in (dropped - self._reported_drops).items():
             self._counts[f"dropped.{topic}"] = number

@@ -10,7 +10,7 @@ from typing import BinaryIO
 
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
 
-#: Added to the name while the file is written; what still has it when nobody writes was cut short.
+#: Added to the name while the file is written; a file that still has it and is not locked was interrupted.
 ACTIVE = ".active"
 
 
@@ -22,7 +22,7 @@ def open_for_writing(path: Path) -> BinaryIO:
 class RecordingFile:
     """An MCAP file that is called `*.mcap.active` until it is complete.
 
-    The file is locked as long as this process lives and writes, so that nobody takes it for a leftover.
+    The file is locked as long as this process lives and writes, so that no other process recovers it.
 
     Args:
         directory: where it goes.
@@ -73,7 +73,7 @@ class RecordingFile:
         self._file.attach(name, media_type, text.encode(), stamp_ns)
 
     def flush(self) -> None:
-        """Brings everything written so far to the disk, past the caches: neither a kill nor a power cut takes it."""
+        """Flushes to the disk (fdatasync): what was written survives a kill and a power failure."""
         self._file.flush()
         os.fdatasync(self._stream.fileno())
 
@@ -87,14 +87,14 @@ class RecordingFile:
         return self.path
 
     def abandon(self) -> Path:
-        """Closes the file as it is, to be recovered later; returns where it is."""
+        """Closes the file unfinished, to be recovered later; returns its path."""
         with contextlib.suppress(OSError):  # closing tries once more to write what the disk did not take
             self._stream.close()
         return self._active
 
 
 def _free_name(directory: Path, name: str, wall_ns: int) -> Path:
-    """A name that neither a finished nor an unfinished nor a recovered recording has."""
+    """A path that no finished, unfinished or recovered recording uses."""
     start = f"{name}_{datetime.fromtimestamp(wall_ns // 10**9, UTC):%Y-%m-%dT%H-%M-%SZ}"
     taken = {path.name.split(".")[0] for path in directory.iterdir()}
     counter = 1

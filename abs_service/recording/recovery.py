@@ -1,4 +1,4 @@
-"""Saves what can be read of a recording that was cut short or damaged."""
+"""Recovers recordings that are truncated or damaged."""
 
 import contextlib
 import fcntl
@@ -20,20 +20,20 @@ RECOVERING = ".recovering"
 
 
 class RecoveryError(Exception):
-    """A file that cannot be recovered; the message says why."""
+    """A file that cannot be recovered; the message has the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecoveryReport:
-    """What became of one file.
+    """Result of a recovery.
 
     Attributes:
-        source: the file that was read, where it is now; None if everything in it was saved and it is gone.
+        source: path of the original now; None if all of it was recovered and it was deleted.
         target: the file with all that could be read, complete with an index.
         messages: messages saved.
         chunks: chunks saved.
         damaged: chunks and attachments left out because their checksum is wrong.
-        orphans: messages left out because nothing says what they are.
+        orphans: messages left out because their channel is unknown.
         skipped_bytes: bytes that are no record, such as a torn end.
     """
 
@@ -54,7 +54,7 @@ class RecoveryReport:
 
 
 def recover(source: Path) -> RecoveryReport:
-    """Writes all that can be read of `source` to a new file with an index, beside it.
+    """Copies all readable records of `source` to a new indexed file in the same folder.
 
     `x.mcap.active` becomes `x.mcap`, and itself `x.mcap.broken` unless all of it was saved. Of any other file, `x.mcap`
     say, the result is `x.recovered.mcap` and the original stays. The new file has its name only when it is complete; to

@@ -1,4 +1,4 @@
-"""Writes a sound MCAP file with everything that is sound in a damaged one."""
+"""Copies the intact records of a damaged MCAP file to a new one."""
 
 from typing import BinaryIO
 
@@ -11,13 +11,13 @@ from drivers.encoding.mcap_file import CHANNEL_METADATA, McapFileError, file_des
 
 
 class Salvage:
-    """Copies messages, attachments and metadata, unchanged, and counts what it has to leave out.
+    """Copies messages, attachments and metadata unchanged, and counts what is left out.
 
     Attributes:
         messages: messages copied.
         chunks: chunks copied.
-        damaged: chunks and other records left out because they contradict themselves or their checksum.
-        orphans: messages left out because nothing says what they are.
+        damaged: chunks and other records left out because they are malformed or fail their checksum.
+        orphans: messages left out because their channel is unknown.
         skipped_bytes: bytes that are no record.
     """
 
@@ -42,13 +42,13 @@ class Salvage:
         return self._scan.skipped_bytes
 
     def run(self) -> None:
-        """Does it.
+        """Copies everything.
 
         Raises:
             OSError: the output cannot be written.
         """
         self._writer.start(profile="", library="abs-service recover")
-        # A chunk says what its channels are, but may be damaged; so do metadata and, at the end, the index.
+        # Channels are defined in chunks, which may be damaged, and also in metadata and in the index at the end.
         for record in RecordScanner(self._data):
             self._learn(record)
         for record in self._scan:

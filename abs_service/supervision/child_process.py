@@ -1,4 +1,4 @@
-"""Child processes of the supervisor: each in a group of its own, on a lifeline, with its last words kept."""
+"""Child processes of the supervisor: each in its own process group, with a parent watchdog and its last output."""
 
 import contextlib
 import os
@@ -29,25 +29,25 @@ class Process(Protocol):
         ...
 
     def terminate(self) -> None:
-        """Asks it to end in order; harmless if it has."""
+        """Sends SIGTERM; no effect if it has ended."""
         ...
 
     def kill(self) -> None:
-        """Ends it and everything it started; harmless if it has ended."""
+        """Kills its process group; no effect if it has ended."""
         ...
 
     def output_tail(self) -> str:
-        """The last lines of what it wrote."""
+        """Last lines of its output."""
         ...
 
 
 class _NoProcess:
-    """Where there is no process: it has ended, and nothing that is asked of it matters."""
+    """Null object for no process."""
 
     pid = 0
 
     def poll(self) -> int:
-        """It has ended."""
+        """0: ended."""
         return 0
 
     def terminate(self) -> None:
@@ -57,7 +57,7 @@ class _NoProcess:
         """Does nothing."""
 
     def output_tail(self) -> str:
-        """It never said anything."""
+        """Empty."""
         return ""
 
 
@@ -85,7 +85,7 @@ class ChildProcess:
         program: Sequence[str] = (sys.executable, "-m", "abs_service"),
     ) -> None:
         self._lines: deque[str] = deque(maxlen=TAIL_LINES)
-        # A group of its own, so that Ctrl-C in the terminal reaches only the supervisor, which knows the order.
+        # Its own process group: Ctrl-C in the terminal reaches only the supervisor, which stops the children in order.
         self._process = subprocess.Popen(
             [*program, *arguments],
             stdin=subprocess.PIPE,
@@ -128,7 +128,7 @@ class ChildProcess:
         return "\n".join(self._lines)
 
     def _read(self, output: IO[str], component: str, on_line: Callable[[str, str], None]) -> None:
-        with output, self._process:  # leaving the latter waits for the end and closes the lifeline
+        with output, self._process:  # leaving the latter waits for the end and closes the watchdog's pipe
             for line in output:
                 self._lines.append(line.rstrip("\n"))
                 on_line(component, line.rstrip("\n"))

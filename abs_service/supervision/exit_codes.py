@@ -1,19 +1,19 @@
-"""Exit codes of the commands, and so the language between a process and its supervisor."""
+"""Exit codes of the commands, which the supervisor evaluates."""
 
 from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """Why a process ended."""
+    """Reason of a process's end."""
 
     OK = 0
     FAILED = 1  # something broke; starting again may help
     USER = 2  # the command line, the configuration or the surroundings have to be changed first
     GIVE_UP = 3  # cannot start, and starting again will not help
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
-    PIPE_CLOSED = 141  # whoever read the output is gone
+    PIPE_CLOSED = 141  # the reader of the output has closed it
 
 
 def is_for_user(error: Exception) -> bool:
-    """Whether an exception is one of ours, whose message says what to change. All others are our own mistakes."""
+    """True for exceptions of this project, which are user errors with an actionable message; others are bugs."""
     return type(error).__module__.partition(".")[0] in ("abs_service", "drivers", "calib")

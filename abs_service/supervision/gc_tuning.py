@@ -1,21 +1,21 @@
-"""Keeps Python itself from pausing a process while a frame waits."""
+"""Shortens pauses by Python's thread switching and garbage collection."""
 
 import gc
 import sys
 
-#: For how long a thread may keep the others of its process from running Python code [s]; Python's own choice is 5 ms.
+#: Switch interval between threads [s]; Python's default is 5 ms.
 SWITCH_S = 0.0005
 
 
 def shorten_switch_interval() -> None:
-    """Lets a thread that has something to send or to receive interrupt one that computes."""
+    """Lets threads that send or receive interrupt one that computes."""
     sys.setswitchinterval(SWITCH_S)
 
 
 def freeze_loaded_objects() -> None:
-    """Takes all that exists now, mostly modules, out of every later search for garbage.
+    """Excludes all present objects, mostly modules, from later garbage collections.
 
-    A search through all modules takes 50 to 90 ms, two or three frames; what comes and goes with a frame takes none.
+    A full collection over all modules takes 50 to 90 ms, two or three frames.
     """
     gc.collect()
     gc.freeze()

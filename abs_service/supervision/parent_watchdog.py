@@ -1,4 +1,4 @@
-"""Lets a child process notice that its supervisor is gone, however it went, so that none outlives it.
+"""Ends a child process when its supervisor has died, so that no orphans remain.
 
 The supervisor holds the writing end of the child's standard input and never writes. When the supervisor dies, even by
 `kill -9`, the kernel closes that end and the child reads the end of the file.
@@ -13,7 +13,7 @@ import time
 #: Set in the environment of children whose standard input is such a pipe.
 VARIABLE = "ABS_SERVICE_PARENT_WATCHDOG"
 
-#: Time that an orphan has to end in order [s].
+#: Time from SIGTERM to SIGKILL for an orphan [s].
 GRACE_S = 3.0
 
 

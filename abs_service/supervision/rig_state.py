@@ -1,4 +1,4 @@
-"""What a running rig said lately, gathered from its messages for people and scripts to read."""
+"""Current state of a running rig, collected from its messages."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -19,14 +19,14 @@ PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), ke
 
 @dataclass(frozen=True)
 class Received:
-    """The last health of a component, when it came, CLOCK_MONOTONIC [ns], and the one previous."""
+    """Last health of a component, its arrival, CLOCK_MONOTONIC [ns], and the health before it."""
 
     health: Health = field(default_factory=Health)
     t_ns: int = 0
     previous: "Received | None" = None
 
     def rate(self, gauge: str) -> float:
-        """How fast a gauge grew lately, per second; 0 if it shrank, as a file's size does when a new one begins."""
+        """Rate of a gauge between the last two messages [1/s]; 0 if it fell, as a file's size does on rotation."""
         if self.previous is None or self.t_ns <= self.previous.t_ns:
             return 0.0
         growth = self.health.gauges.get(gauge, 0.0) - self.previous.health.gauges.get(gauge, 0.0)
@@ -34,16 +34,16 @@ class Received:
 
 
 class RigState:
-    """The present of a rig. Not for several threads.
+    """Current state of a rig. Not thread-safe.
 
     Args:
         trackers: their names.
         clock: monotonic time [ns].
 
     Attributes:
-        trackers: what each of them said.
-        heard: health by component.
-        malformed: messages that could not be read.
+        trackers: log of each tracker.
+        received: health by component.
+        malformed: messages that could not be parsed.
     """
 
     def __init__(self, trackers: Iterable[str], clock: Callable[[], int]) -> None:
@@ -53,7 +53,7 @@ class RigState:
         self._clock = clock
 
     def take(self, sample: Sample) -> list[EstimateReport]:
-        """Takes one message and returns the estimates that it completes; counts messages that cannot be read."""
+        """Processes one message and returns the estimates that it completes; counts malformed messages."""
         try:
             return self._take(sample)
         except (DecodeError, ValueError):
@@ -72,15 +72,15 @@ class RigState:
         return []
 
     def health(self, component: str) -> Health:
-        """What a component said last; empty if it said nothing yet."""
+        """Last health of a component; empty if there is none yet."""
         return self.received.get(component, Received()).health
 
     def preparing(self) -> bool:
-        """Whether a tracker is compiling its kernels, or loading those that it compiled once."""
+        """True if a tracker is compiling its kernels, or loading them from the cache."""
         return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
 
     def missing_topologies(self) -> list[str]:
-        """The trackers whose mesh has to be asked for, because its topology was lost on the way."""
+        """Trackers whose topology was lost and has to be queried."""
         return [name for name, tracker in self.trackers.items() if tracker.lacks_topology]
 
     def _take_truth(self, truth: SurfaceTruth) -> None:

@@ -1,4 +1,4 @@
-"""The facts that every display shows, taken from what the components say of themselves."""
+"""Content of all displays, derived from the health of the components."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,13 +37,13 @@ class Recording:
 
 @dataclass(frozen=True)
 class RigView:
-    """One look at a running rig.
+    """Snapshot of a running rig.
 
     Attributes:
         rig: its name.
         endpoint: where applications connect.
         directory: folder of the recordings.
-        live: what the components said.
+        live: current state of the rig.
         children: the processes.
         elapsed_s: time since the start.
         now_ns: CLOCK_MONOTONIC [ns].
@@ -92,16 +92,16 @@ class RigView:
     def troubles(self) -> list[tuple[str, int, str]]:
         """Component, level and message of everything that needs attention."""
         found: list[tuple[str, int, str]] = [
-            (name, heard.health.level, heard.health.message)
-            for name, heard in sorted(self.live.received.items())
-            if heard.health.level >= Health.LEVEL_WARNING and heard.health.message and name != "run"
+            (name, received.health.level, received.health.message)
+            for name, received in sorted(self.live.received.items())
+            if received.health.level >= Health.LEVEL_WARNING and received.health.message and name != "run"
         ]
         failed = [child for child in self.children if child.state is State.FAILED]
         return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
 
     @property
     def activity(self) -> str:
-        """What is being waited for; "" once there are estimates, or if nothing is tracked."""
+        """Current stage of the start; "" once there are estimates, or if nothing is tracked."""
         if self.live.preparing():
             return "Preparing kernels; the first start compiles them, which takes up to a minute …"
         if "capture" not in self.live.received:
@@ -111,7 +111,7 @@ class RigView:
         return ""
 
     def summary(self) -> list[str]:
-        """What happened, in a few lines."""
+        """Summary in a few lines."""
         streams, recording = self.streams, self.recording
         frames = sum(stream.published for stream in streams)
         dropped = sum(stream.dropped for stream in streams)
@@ -137,14 +137,14 @@ class RigView:
 
 
 class Display(Protocol):
-    """Shows a running rig. Used in a `with` statement; after it, the terminal is as it was previous."""
+    """Shows a running rig. Used in a `with` statement; after it, the terminal is restored."""
 
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *error: object) -> None: ...
 
     def update(self, view: RigView) -> None:
-        """Shows how things are now; called some ten times a second."""
+        """Shows the current state; called some ten times a second."""
         ...
 
     def estimate(self, report: EstimateReport) -> None:
@@ -152,7 +152,7 @@ class Display(Protocol):
         ...
 
     def note(self, text: str) -> None:
-        """Says something once, in passing. May be called from any thread."""
+        """Shows a message once. May be called from any thread."""
         ...
 
     def close(self, view: RigView) -> None:

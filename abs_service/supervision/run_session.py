@@ -1,4 +1,4 @@
-"""One run of a rig: moves messages to the display and signs of life to the supervisor."""
+"""One run of a rig: passes messages to the display and heartbeats to the supervisor."""
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
@@ -17,7 +17,7 @@ from abs_service.supervision.supervisor import Child, State, Supervisor
 DEPTH = 64
 #: Time between two looks at the children, at most [s].
 PERIOD_S = 0.05
-#: Time between two questions for what was lost, and patience for the answer [s].
+#: Period and timeout of queries for lost topologies [s].
 QUERY_PERIOD_S, QUERY_TIMEOUT_S = 1.0, 0.2
 
 _LEVELS: Mapping[State, Level] = {
@@ -31,13 +31,13 @@ class RunSession:
     """Everything that `abs-service run` does between its start and its end.
 
     Args:
-        bus: where the rig speaks.
+        bus: of the rig.
         rig: its name.
         endpoint: where applications connect, for people to read.
         directory: folder of the recordings, for people to read.
         trackers: names of the trackers.
-        supervisor: looks after the processes.
-        display: where to show how they are.
+        supervisor: of the processes.
+        display: shows the state.
         clock: time.
     """
 
@@ -68,19 +68,19 @@ class RunSession:
         """Time since the start [s]."""
         return (self._clock.monotonic() - self._begin_ns) * 1e-9
 
-    def run_until(self, over: Callable[[], bool]) -> None:
-        """Runs until `over` says so or the supervisor has nothing left to do."""
-        while not over() and self._supervisor.exit_code() is None:
+    def run_until(self, stop_requested: Callable[[], bool]) -> None:
+        """Runs until `stop_requested` returns True or the supervisor has an exit code."""
+        while not stop_requested() and self._supervisor.exit_code() is None:
             self._supervisor.poll()
             self._report()
             self._listen(PERIOD_S)
             self._request_missing_topologies()
 
     def stop(self) -> None:
-        """Stops the processes in order, and hears what they say last."""
+        """Stops the processes in order, and processes their last messages."""
 
         def listen(seconds: float) -> None:
-            # Also when nobody reads the output any more, the processes have to be stopped.
+            # The processes have to be stopped even if the output is closed.
             with suppress(BrokenPipeError):
                 self._listen(seconds)
 
@@ -90,7 +90,7 @@ class RunSession:
         self._health.publish()
 
     def view(self) -> RigView:
-        """One look at everything."""
+        """Snapshot of the rig."""
         return RigView(
             rig=self._rig,
             endpoint=self._endpoint,
@@ -111,7 +111,7 @@ class RunSession:
         self._display.update(self.view())
 
     def _request_missing_topologies(self) -> None:
-        """Asks for the topologies that the network dropped: each is sent once, and errors are not known without."""
+        """Queries topologies that the network dropped: each is sent once, and errors cannot be computed without."""
         if self._clock.monotonic() - self._queried_ns < QUERY_PERIOD_S * 1e9:
             return
         self._queried_ns = self._clock.monotonic()

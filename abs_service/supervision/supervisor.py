@@ -1,6 +1,6 @@
-"""Starts the processes of a rig, restarts those that end or fall silent, and stops them in order.
+"""Starts the processes of a rig, restarts those that end or stall, and stops them in order.
 
-A state machine without threads: `poll` does what is due, the caller decides how often and hands in time and processes.
+A state machine without threads: the caller calls `poll` periodically; clock and process creation are passed in.
 """
 
 import logging
@@ -14,18 +14,18 @@ from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
 
-#: Pause before a restart: doubles with each end within the window, up to the longest.
+#: Backoff before a restart: doubles with each end within the window, up to the longest.
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
 
 
 @dataclass(frozen=True)
 class Limits:
-    """How much patience a supervisor has.
+    """Limits and timeouts of a supervisor.
 
     Attributes:
         restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
-        startup_ns: a process may be silent for this long before its first health, and while it says it is busy [ns].
-        stall_ns: afterwards, a process that is silent for this long is restarted [ns].
+        startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
+        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns].
         stop_ns: time that all processes together have to end in order [ns].
     """
 
@@ -37,11 +37,11 @@ class Limits:
 
 
 class State(StrEnum):
-    """Where a child is in its life."""
+    """State of a child process."""
 
     RUNNING = "running"
-    BACKOFF = "backoff"  # not there yet, or ended; will be started when its pause is over
-    STALLED = "stalled"  # lived, but said nothing for too long and was killed; will be started again
+    BACKOFF = "backoff"  # not started yet, or ended; starts when its backoff is over
+    STALLED = "stalled"  # sent no health in time and was killed; will be restarted
     FINISHED = "finished"  # ended in order by itself
     FAILED = "failed"  # given up
     STOPPED = "stopped"
@@ -55,8 +55,8 @@ class Child:
         component: its name in health: capture, track/<tracker>, record.
         arguments: its command line after `abs-service`.
         stage: children of lower stages are stopped first.
-        state: where it is.
-        reason: why it is there, in plain words.
+        state: its state.
+        reason: of the state, in plain words.
         restarts: how often it was started again.
         process: what runs it; `NO_PROCESS` while nothing does.
         exit_code: of its last end.
@@ -76,10 +76,10 @@ class Child:
 
 
 class Supervisor:
-    """Looks after children until told to stop.
+    """Supervises child processes.
 
     Args:
-        children: whom to look after; started by the first `poll`.
+        children: the processes; started by the first `poll`.
         spawn: starts a process.
         clock: monotonic time [ns].
         limits: when to restart and when to give up.
@@ -94,7 +94,7 @@ class Supervisor:
         self._limits = limits or Limits()
 
     def poll(self) -> None:
-        """Starts, restarts and gives up whatever is due now."""
+        """Starts, restarts and gives up children as due."""
         now_ns = self._clock()
         for child in self.children.values():
             if child.state is State.RUNNING:
@@ -103,13 +103,13 @@ class Supervisor:
                 self._start(child, now_ns)
 
     def heartbeat(self, component: str, busy: bool = False) -> None:
-        """Notes a sign of life. A busy component (one that compiles kernels) may be silent for longer than others."""
+        """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)
         if child is not None and child.state is State.RUNNING:
             child.deadline_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
 
     def misconfigured(self) -> Child | None:
-        """A child that cannot work until the user changes something; everything should stop."""
+        """A child that ended with a user error, after which the rig should stop; None if there is none."""
         return next((child for child in self._failed() if child.exit_code == Exit.USER), None)
 
     def exit_code(self) -> Exit | None:
@@ -128,7 +128,7 @@ class Supervisor:
         return Exit.OK if finished else None
 
     def stop(self, wait: Callable[[float], None]) -> None:
-        """Stops all children: stage after stage, so that each later one still takes what the earlier ones said.
+        """Stops all children: stage after stage, so that later stages still receive the last messages of earlier ones.
 
         Args:
             wait: passes the time given in seconds.
@@ -139,7 +139,7 @@ class Supervisor:
             children = [child for child in self.children.values() if child.stage == stage]
             for child in children:
                 child.process.terminate()
-            # A share for each of the earlier stages; the last one, which drains to disk, has all that is left.
+            # Equal time for each of the earlier stages; the last one, which drains to disk, has all that is left.
             share = (number + 1) / (len(stages) + 1) if number + 1 < len(stages) else 1.0
             deadline_ns = begin_ns + int(share * self._limits.stop_ns)
             while self._clock() < deadline_ns and any(child.process.poll() is None for child in children):
@@ -158,7 +158,7 @@ class Supervisor:
             return
         if code is None:
             child.process.kill()
-            self._schedule_restart(child, now_ns, "said nothing for too long", State.STALLED)
+            self._schedule_restart(child, now_ns, "sent no health in time", State.STALLED)
             return
         child.exit_code = code
         if code == Exit.OK:

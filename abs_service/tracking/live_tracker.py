@@ -18,22 +18,21 @@ from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 from drivers.contract.frame import FrameSet
 
-#: How long one turn waits for a frame [s]; a reader that is told to stop notices within this time.
+#: Timeout of the wait for a frame [s]; bounds the reaction time to a stop request.
 POLL_S = 0.05
-#: Turns of which the median says how fast the tracker is: a few slow ones, as after a stall, say nothing.
+#: Processing times in the running median: robust against a few slow frames, as after a stall.
 DURATIONS = 9
 
 
 class FrameSetQueue:
-    """The frame sets that a tracker has still to take.
+    """Queue of frame sets, with frame skipping if the tracker is slower than the cameras.
 
-    A tracker that is faster than the cameras gets all of them, in order: what a stall of the machine has left waiting
-    is worked off within a few frames. A slower one gets the newest, or it would fall back more and more; the others are
-    counted.
+    A tracker that is faster than the cameras gets all of them, in order: the backlog after a stall of the machine is
+    processed within a few frames. A slower one gets the newest, so that latency does not grow; the others are counted.
 
     Args:
-        frames: where frames come from.
-        synchroniser: what makes sets of them.
+        frames: the frames.
+        synchroniser: makes sets of them.
         clock: CLOCK_MONOTONIC [ns].
 
     Attributes:
@@ -51,7 +50,7 @@ class FrameSetQueue:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """What became no estimate.
+        """Counters of losses.
 
         `skipped` frame sets; by topic, frames `dropped` unseen and `malformed` messages; by stream and cause, frames
         that are in no set and so `unused`.
@@ -73,11 +72,11 @@ class FrameSetQueue:
 
     @property
     def last_error(self) -> str:
-        """Why the last malformed message was one; "" if there was none."""
+        """Error of the last malformed message; "" if there was none."""
         return self._frames.last_error
 
     def take(self) -> FrameSet | None:
-        """The next set; None if there is none yet. Whoever calls is done with the last one."""
+        """The next set; None if there is none yet. The call ends the processing of the last one."""
         if self._taken_ns is not None:
             self._durations_ns.append(self._clock() - self._taken_ns)
         self._collect()
@@ -96,7 +95,7 @@ class FrameSetQueue:
         self._waiting.extend(self._synchroniser.poll(self._clock()))
 
     def _keeps_up(self) -> bool:
-        """Whether a turn usually takes less time than lies between the sets that wait."""
+        """True if the median processing time is below the interval between the queued sets."""
         if len(self._waiting) < 2 or not self._durations_ns:
             return False
         interval_ns = (self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns) / (len(self._waiting) - 1)
@@ -132,10 +131,10 @@ class LiveTracker:
 
     Args:
         tracking: the tracker.
-        sets: where its frame sets come from.
-        publisher: where its estimates go.
-        health: what others learn about it.
-        residuals: tells health which noise model is wrong.
+        sets: its frame sets.
+        publisher: publishes its estimates.
+        health: of the tracker.
+        noise_monitor: compares residuals with the noise models.
         clock: CLOCK_MONOTONIC [ns].
         budget_ms: time that the search may take per frame set; the rest of the interval is for everything else.
     """
@@ -160,7 +159,7 @@ class LiveTracker:
         self._reported = 0
 
     def process_next(self) -> None:
-        """Handles the next frame set, if there is one."""
+        """Processes the next frame set, if there is one."""
         frames = self._sets.take()
         if frames is None:
             return
@@ -180,7 +179,7 @@ class LiveTracker:
         self._report(estimate, solve_ms)
 
     def report(self) -> None:
-        """Enters what was lost on the way into health, also if nothing arrives; call it before `Health.tick`."""
+        """Updates the loss counters of health, also if no frame arrives; call it before `Health.tick`."""
         self._health.count_up_to(self._sets.counters)
         if self._sets.last_error:
             self._health.label("malformed", self._sets.last_error)

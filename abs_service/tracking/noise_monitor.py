@@ -1,4 +1,4 @@
-"""Whether the sensors err as their noise models say: what a tracker's health tells about it, once a second."""
+"""Compares the residuals of each sensor with its noise model, once a second."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,14 @@ from abs_service.tracker.estimate import Estimate
 #: Time over which residuals are averaged [ns]; at 30 Hz and 300 vertices, their variance is then known to 2 %.
 WINDOW_NS = 1_000_000_000
 
-#: With a smaller share of inliers it is not the noise that is wrong: the object is lost, hidden, or bends as its model
-#: cannot.
+#: With fewer inliers the residuals are not due to noise: the object is lost, occluded, or deforms beyond its model.
 MINIMUM_INLIER_SHARE = 0.6
 
-#: Fewer residuals than this in a window are no evidence.
+#: A window with fewer residuals is ignored.
 MINIMUM_RESIDUALS = 200
 
 #: The variance of residuals over deviations is 1 if the noise model is right. A warning begins outside the wider limits
-#: and ends within the narrower ones, so that what lies on a limit does not flicker.
+#: and ends within the narrower ones, a hysteresis.
 WARN_OUTSIDE = (0.5, 2.0)
 CLEAR_INSIDE = (0.6, 1.7)
 
@@ -32,7 +31,7 @@ class _Sum:
 
 
 class NoiseMonitor:
-    """Enters into health the gauge `residual_variance.<sensor>`, and a warning where a sensor's noise model is wrong.
+    """Sets the gauge `residual_variance.<sensor>` and a warning if a sensor's noise model is wrong.
 
     A deviation that is too small rejects good measurements; one that is too large gives the sensor too little weight
     beside the others, and makes the covariance of Θ depend on what the priors allow.
@@ -48,7 +47,7 @@ class NoiseMonitor:
         self._warned: set[str] = set()
 
     def add(self, estimate: Estimate) -> None:
-        """Adds an estimate's residuals, if it explains what the sensors see."""
+        """Adds an estimate's residuals, if its inlier share is sufficient."""
         if estimate.inlier_share < MINIMUM_INLIER_SHARE:
             return
         if not 0 <= estimate.t_host_ns - self._begin_ns < WINDOW_NS:

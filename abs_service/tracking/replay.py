@@ -1,4 +1,4 @@
-"""A recording through the trackers: every frame set, no clock, the same Θ each time."""
+"""Offline tracking of a recording: every frame set, no clock, deterministic."""
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import chain, count
@@ -38,7 +38,7 @@ class OfflineTracker:
         clock: measures the time of a search [ns]; nothing depends on it.
 
     Attributes:
-        log: what it said so far.
+        log: its estimates so far.
     """
 
     def __init__(
@@ -62,16 +62,16 @@ class OfflineTracker:
         self._clock = clock
 
     def add_truth(self, truth: Truth) -> None:
-        """Takes what the simulated device knew."""
+        """Adds ground truth of a simulated device."""
         self.log.truth.add_truth(truth.t_host_ns, truth.points_r, truth.surface)
 
     def add_frame(self, frame: Frame) -> Iterator[EstimateReport]:
-        """Takes a frame and reports the estimates that it makes possible."""
+        """Adds a frame and yields the estimates of the frame sets that it completes."""
         for frames in self.synchroniser.add(frame):
             yield from self._track(frames)
 
     def finish(self) -> Iterator[EstimateReport]:
-        """Reports the estimates of the frame sets that still wait for something."""
+        """Yields the estimates of the remaining frame sets."""
         for frames in self.synchroniser.flush():
             yield from self._track(frames)
 

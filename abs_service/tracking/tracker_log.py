@@ -1,4 +1,4 @@
-"""What one tracker said, its errors where the truth is known, and the totals over all of it."""
+"""Log of one tracker: estimates, errors where ground truth is known, and statistics."""
 
 import math
 from collections import Counter
@@ -16,7 +16,7 @@ from abs_service.tracking.truth import TruthComparison, rms_sigma_mm
 
 @dataclass(frozen=True)
 class EstimateReport:
-    """One estimate as people and scripts see it; None where something is not known.
+    """One estimate for displays and scripts; None where a value is unknown.
 
     Attributes:
         tracker: who made it.
@@ -56,14 +56,14 @@ class EstimateReport:
 
 @dataclass
 class RunningStats:
-    """Mean and maximum of numbers that come one by one."""
+    """Running mean and maximum."""
 
     count: int = 0
     sum: float = 0.0
     max: float = 0.0
 
     def add(self, value: float | None) -> None:
-        """Takes one more; None, where nothing is known, changes nothing."""
+        """Adds a value; None is ignored."""
         if value is not None:
             self.count, self.sum, self.max = self.count + 1, self.sum + value, max(self.max, value)
 
@@ -74,14 +74,14 @@ class RunningStats:
 
 
 class TrackerLog:
-    """What one tracker said.
+    """Log of one tracker.
 
     Attributes:
         last: its last estimate.
         estimates, skipped: how many estimates it made, and how many frame sets it passed over.
         error_mm, surface_mm, solve_ms: totals over all estimates.
         exposure_ns: exposure of every sensor that it used last, CLOCK_MONOTONIC [ns].
-        truth: what the errors are measured against.
+        truth: ground truth for the errors.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class TrackerLog:
 
     @property
     def lacks_topology(self) -> bool:
-        """Whether the topology that the last estimate belongs to did not arrive."""
+        """True if the topology of the last estimate did not arrive."""
         return self._estimate_mesh != self._topology_mesh
 
     def take_topology(self, topology: MeshTopology) -> None:
@@ -129,7 +129,7 @@ class TrackerLog:
             yield self._report(state, mesh)
 
     def summary(self) -> list[str]:
-        """What it did so far, in a line or two."""
+        """Summary in one or two lines."""
         line = f"{self.estimates} estimates, {self.skipped} frame sets skipped"
         if self.estimates:
             line += f", {self.solve_ms.mean:.1f} ms each"

@@ -1,4 +1,4 @@
-"""How far a tracked mesh is from the surface that really was there, and how far it says it might be."""
+"""Errors of a tracked mesh against ground truth, and their expected size from its covariances."""
 
 from collections import OrderedDict
 from collections.abc import Mapping
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 Grid = NDArray[np.float64]
 
-#: Over so short a time a surface moves on a straight line, as far as a mesh on it can tell [ns].
+#: Longest interval over which ground truth is interpolated linearly [ns].
 MAXIMUM_INTERPOLATION_NS = 250_000_000
-#: A nearest point that moves by less than this is found [grid cells]: a thousandth is 0.01 mm of a sheet.
+#: Step below which the closest-point search has converged [grid cells]; about 0.01 mm on a sheet.
 TOLERANCE = 1e-3
-#: Truths kept while their estimate is still being searched for.
+#: Ground truths kept until their estimates arrive.
 MAXIMUM_TRUTHS = 256
 
 
@@ -66,7 +66,7 @@ class TruthComparison:
         return Errors(float(error.mean() * 1e3), float(surface.mean() * 1e3))
 
     def material_points(self, t_host_ns: int) -> NDArray[np.float64] | None:
-        """Where the vertices' own material points (n, 3) [m] really are; None where that is unknown."""
+        """True positions of the vertices' material points (n, 3) [m]; None where unknown."""
         grid, places = self._own(t_host_ns)
         return None if grid is None else _bilinear(grid, places)[0]
 
@@ -91,7 +91,7 @@ class TruthComparison:
 
 
 def rms_sigma_mm(covariance_f32: bytes) -> float | None:
-    """What a mesh's own covariances say of its vertex errors: their root mean square [mm]; None where they say nothing.
+    """Root mean square of the vertex errors predicted by the mesh's covariances [mm]; None without covariances.
 
     Args:
         covariance_f32: six numbers [m²] per vertex, as in `DeformedMesh`.

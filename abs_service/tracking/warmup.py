@@ -1,4 +1,4 @@
-"""Makes every kernel ready before the first real frame: compiled once per installation, then read from the cache."""
+"""Compiles all kernels before the first real frame: once per installation, then they are loaded from the cache."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,19 +15,19 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Noise, Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
-#: Stand for every camera: kernels take images of any size, so that nobody has to wait until the real ones are known.
+#: Placeholder cameras: kernels take images of any size, so that the real cameras need not be known yet.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
 _DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
 _FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
-#: Stands for every noise of depth: kernels see its texture only, and a map of pixels would not fit the camera.
+#: Placeholder for every depth noise: kernels use its texture only, and a per-pixel map would not fit the camera.
 _NOISE = GaussianPolynomial(((0.01,),))
 
 
 def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
-    """Tracks and loses a flat board that no sensor ever saw, with every kind of lens, with the parts of the plan.
+    """Tracks and loses a synthetic flat board with every kind of lens and the parts of the plan.
 
     Args:
-        noises: noise model of every sensor that the tracker uses, by name; tells what kind of image it takes.
+        noises: noise model of every sensor that the tracker uses, by name; gives the kind of image.
         plan: of the tracker.
     """
     for camera in (_CAMERA, _DISTORTED, _FISHEYE):
@@ -47,7 +47,7 @@ def _without_object(frame: Frame) -> Frame:
 
 
 def _board(head: str, kind: Kind, size: tuple[float, float]) -> Frame:
-    """What a head sees of a flat board [m] that fills half its image; grey pictures, and a beam that is free."""
+    """Frame of a flat board [m] that fills half the image; uniform grey images, and an uninterrupted beam."""
     height, width = _CAMERA.height, _CAMERA.width
     match kind:
         case Kind.DEPTH:

@@ -1,4 +1,4 @@
-"""What a tracker tells the world: its estimates and its mesh as messages."""
+"""Messages of a tracker: estimates, mesh and topology."""
 
 import hashlib
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ _STOP = {
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who made an estimate, and with what.
+    """Tracker, model and calibration of an estimate.
 
     Attributes:
         tracker: name of the tracker.
@@ -55,11 +55,11 @@ class Identity:
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """What an estimate cost.
+    """Computing time and losses of an estimate.
 
     Attributes:
         solve_ms: time from frame set to Θ [ms].
-        budget_ms: time that the search was allowed [ms]; 0 if it was in no hurry.
+        budget_ms: time that the search was allowed [ms]; 0 if unlimited.
         age_ms: time from exposure to now [ms].
         skipped: frame sets passed over since the last estimate.
         dropped: frames so far that are in no estimate, by sensor.
@@ -113,7 +113,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
 
 
 def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.Sensor]:
-    """How every sensor contributed, and which ones did not."""
+    """Contribution of each sensor; missing sensors are marked."""
     for fit in estimate.fits:
         source = estimate.sources.get(fit.sensor, Source(0, 0))
         yield State.Sensor(
@@ -143,7 +143,7 @@ def mesh(header: common_pb2.Header, estimate: Estimate, identity: Identity) -> d
 
 
 def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) -> deformed_mesh_pb2.MeshTopology:
-    """The undeformed mesh as a message; the header tells the moment of the frames that it was made from."""
+    """The undeformed mesh as a message; the header has the time of the frames that it was made from."""
     colored = np.isfinite(undeformed.colors).any()
     colors = np.nan_to_num(undeformed.colors).astype(np.uint8).tobytes() if colored else b""
     return deformed_mesh_pb2.MeshTopology(
@@ -157,7 +157,7 @@ def topology(header: common_pb2.Header, undeformed: Mesh, identity: Identity) ->
 
 
 def _is_known(estimate: Estimate) -> bool:
-    """Whether the covariances say anything: what is lost has a curvature like everything else."""
+    """True if the covariances are valid, which they are not while the object is lost."""
     return estimate.status in (Status.TRACKING, Status.DEGRADED)
 
 

@@ -1,4 +1,4 @@
-"""When a message on the bus happened and what number it has, read from its bytes."""
+"""Time stamp and sequence number of a message, parsed from its bytes."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ from abs_service.bus.contract import Sample
 
 
 class MessageHeaderError(ValueError):
-    """A message that is none of this service's, or none at all."""
+    """A message of an unknown type, or malformed."""
 
 
 @dataclass(frozen=True, slots=True)
 class MessageHeader:
-    """When and which: wall-clock time [ns], 0 if the message does not say, and the sender's number."""
+    """Time stamp (wall clock) [ns], 0 if the message has none, and sequence number."""
 
     stamp_ns: int
     seq: int
@@ -43,7 +43,7 @@ _WITH_HEADER = (
 
 
 def _ns(stamp: Timestamp) -> int:
-    # Not `ToNanoseconds`, which raises for years that nobody will record.
+    # Not `ToNanoseconds`, which raises for years outside its range.
     return stamp.seconds * 1_000_000_000 + stamp.nanos
 
 

@@ -353,7 +353,7 @@ def test_a_step_of_the_wall_clock_is_said_once(metadata):
         levels.append((health.level, health._counters["clock_steps"]))
     assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
     said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]
-    assert "somebody set the clock by +3600.000 s; stamps follow it" in said
+    assert "the wall clock was set by +3600.000 s; stamps follow it" in said
 
 
 def test_the_schema_describes_every_message_on_the_wire():
