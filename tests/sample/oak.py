@@ -1,4 +1,4 @@
-"""Makes `recordings/sample_oak`: what depthai records of an OAK with a time-of-flight and a colour camera.
+"""Makes `recordings/sample_oak`: a depthai recording of an OAK with a time-of-flight and a colour camera.
 
     .venv/bin/python -m tests.sample.oak
 
@@ -45,7 +45,7 @@ def write(folder: Path, simulation: Simulation, exposures: Iterable[int]) -> Non
 
 
 def record(path: Path, messages: list[Any]) -> None:
-    """Has depthai write messages to a file, as its `RecordMetadataOnly` node does beside a device."""
+    """Writes messages to a file by depthai's `RecordMetadataOnly` node."""
     dai = library.load()
     path.unlink(missing_ok=True)
     with dai.Pipeline(False) as pipeline:
@@ -83,7 +83,7 @@ def message(frame: Frame, camera: Camera, socket: int) -> Any:
 
 
 def pixels(frame: Frame, camera: Camera) -> tuple[np.ndarray, str]:
-    """The image as an OAK has it, and the name of its format: depth in millimetres along z."""
+    """The image in an OAK's format, and the name of the format: depth in millimetres along z."""
     if frame.kind == Kind.DEPTH:
         z = frame.si() * camera.rays()[..., 2]
         return np.nan_to_num(1000 * z).round().astype(np.uint16), "RAW16"

@@ -1,4 +1,4 @@
-"""What other programs recorded is imported with its own calibration, and tracked."""
+"""Recordings of other programs are imported with their own calibration, and tracked."""
 
 import json
 from pathlib import Path

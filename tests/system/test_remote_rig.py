@@ -1,4 +1,4 @@
-"""A rig that is captured by one process is tracked by another, as from one host to the next; also after a loss."""
+"""A rig captured by one process is tracked by another, also after a reconnection."""
 
 import json
 import signal

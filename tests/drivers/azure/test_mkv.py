@@ -1,4 +1,4 @@
-"""Recordings of the Azure Kinect: written by a muxer from the description of the format, read back in SI units."""
+"""Recordings of the Azure Kinect: synthetic files, written after the format description, are read back in SI units."""
 
 import contextlib
 import json
@@ -23,7 +23,7 @@ ROTATION = cv2.Rodrigues(np.array([0.09, 0.0, 0.01]))[0]
 
 
 def camera_entry(location: str, translation: list[float], rotation: Any = ROTATION) -> dict[str, Any]:
-    """cx, cy, fx, fy in parts of the sensor, k1…k6, centre of distortion, p2, p1."""
+    """cx, cy, fx, fy as fractions of the sensor, k1…k6, centre of distortion, p2, p1."""
     parameters = [0.51, 0.52, 0.49, 0.48, 0.5, -0.1, 0.01, 0.8, 0.05, 0.002, 0, 0, -1e-4, 2e-4]
     return {
         "Intrinsics": {
@@ -104,7 +104,7 @@ def test_cameras_are_those_of_the_sdk(recording: Path) -> None:
         np.testing.assert_allclose(cameras[sensor].project(point_d), expected, atol=1e-9)
 
 
-def test_what_is_no_such_recording_is_named(tmp_path: Path) -> None:
+def test_other_files_are_rejected_with_their_name(tmp_path: Path) -> None:
     pytest.importorskip("av", reason="needs PyAV: make all")
     for name, content in (("nothing.mkv", None), ("text.mkv", b"no MKV")):
         if content is not None:
@@ -113,7 +113,7 @@ def test_what_is_no_such_recording_is_named(tmp_path: Path) -> None:
             AzureRecording(tmp_path / name)
 
 
-def test_a_damaged_recording_is_read_or_refused(recording: Path, tmp_path: Path) -> None:
+def test_a_corrupt_recording_is_read_or_rejected(recording: Path, tmp_path: Path) -> None:
     content, rng = recording.read_bytes(), np.random.default_rng(11)
     damaged, refused = tmp_path / "damaged.mkv", 0
     for k in range(40):
@@ -142,13 +142,13 @@ def test_a_damaged_recording_is_read_or_refused(recording: Path, tmp_path: Path)
         (CALIBRATION.replace(b"0.002, 0, 0", b"0.002, 1, 0"), MODES, "centre of distortion"),
     ],
 )
-def test_a_strange_calibration_is_refused(content: bytes, modes: dict[str, str], complaint: str) -> None:
+def test_an_unsupported_calibration_is_rejected(content: bytes, modes: dict[str, str], complaint: str) -> None:
     with pytest.raises(CalibrationError, match=complaint):
         calibration.cameras(content, modes)
 
 
 @given(st.lists(st.tuples(st.integers(0, len(CALIBRATION) - 1), st.integers(0, 255)), min_size=1, max_size=8))
-def test_a_damaged_calibration_is_read_or_refused(changes: list[tuple[int, int]]) -> None:
+def test_a_corrupt_calibration_is_read_or_rejected(changes: list[tuple[int, int]]) -> None:
     content = bytearray(CALIBRATION)
     for position, value in changes:
         content[position] = value
@@ -157,7 +157,7 @@ def test_a_damaged_calibration_is_read_or_refused(changes: list[tuple[int, int]]
 
 
 @given(st.binary(max_size=200), st.sampled_from(["MJPG", "NV12", "YUY2", "BGRA", ""]), st.booleans())
-def test_any_bytes_are_an_image_or_refused(content: bytes, encoding: str, begins: bool) -> None:
+def test_arbitrary_bytes_are_an_image_or_rejected(content: bytes, encoding: str, begins: bool) -> None:
     jpeg = cv2.imencode(".jpg", np.zeros((6, 8, 3), np.uint8))[1].tobytes()
     camera = Camera(8, 6, 8, 8, 4, 3)
     for read in (lambda data: mkv.color(encoding, data, camera), lambda data: mkv.words(data, camera)):
@@ -165,7 +165,7 @@ def test_any_bytes_are_an_image_or_refused(content: bytes, encoding: str, begins
             assert read(jpeg[:300] + content if begins else content).shape[:2] == (6, 8)
 
 
-def test_a_real_recording_has_colours_where_its_depth_says(shared_data: Path) -> None:
+def test_depth_and_colour_of_a_real_recording_are_registered(shared_data: Path) -> None:
     pytest.importorskip("av", reason="needs PyAV: make all")
     path = shared_data / "tof_azure_kinect_pyk4a" / "recording.mkv"
     if not path.is_file():

@@ -24,7 +24,7 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
         yield bench
 
 
-def test_it_comes_back_as_the_same_device_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unplugged_device_is_reopened_in_a_later_epoch(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(device_supervisor, "FIRST_BACKOFF_S", 0.1)
     opened: list[tuple[str, str]] = []
     faults = iter([Fault.UNPLUG])

@@ -1,4 +1,4 @@
-"""A control takes what its device allows; everything else is refused in words that say what is allowed."""
+"""Validation of control values; errors name what is allowed."""
 
 import math
 
@@ -17,7 +17,7 @@ INFOS = [
 
 @pytest.fixture
 def device() -> tuple[Controls, dict[str, Value]]:
-    """Controls, and what has reached their device."""
+    """Controls, and the values written to their device."""
     held: dict[str, Value] = {}
 
     def control(info: ControlInfo) -> Control:
@@ -30,7 +30,7 @@ def device() -> tuple[Controls, dict[str, Value]]:
     ("name", "value", "held"),
     [("exposure_s", 0.01, 0.01), ("exposure_s", 1e-5, 1e-5), ("gain", 50, 50), ("auto_exposure", False, False)],
 )
-def test_what_is_allowed_reaches_the_device(device, name: str, value: Value, held: Value) -> None:
+def test_allowed_values_are_written_to_the_device(device, name: str, value: Value, held: Value) -> None:
     controls, reached = device
     controls.set(name, value)
     assert reached == {name: held}
@@ -53,13 +53,13 @@ def test_what_is_allowed_reaches_the_device(device, name: str, value: Value, hel
         ("gian", 3, "gian: the device has no such control, it has: auto_exposure, exposure_s, gain, modulation"),
     ],
 )
-def test_what_is_not_allowed_is_explained_and_does_not_reach_it(device, name: str, value, complaint: str) -> None:
+def test_invalid_values_raise_and_are_not_written(device, name: str, value, complaint: str) -> None:
     controls, reached = device
     with pytest.raises(ControlError, match=complaint):
         controls.set(name, value)
     assert reached == {}
 
 
-def test_a_device_without_controls_says_so() -> None:
+def test_a_device_without_controls_raises() -> None:
     with pytest.raises(ControlError, match="gain: the device has no such control, it has none"):
         Controls().get("gain")

@@ -1,4 +1,4 @@
-"""What is attached is found whatever the drivers do, and an address means one device or says which there are."""
+"""Discovery with failing drivers, and selection of a device by its address."""
 
 import sys
 import threading
@@ -15,7 +15,7 @@ ONE, OTHER = (Found(DeviceInfo(f"oak://{serial}", "OAK-D", serial)) for serial i
 BUSY = Found(DeviceInfo("oak://333", "OAK-D", "333"), Availability.BUSY, "another program has it", "close that program")
 
 
-def test_an_address_without_a_serial_number_is_the_only_device() -> None:
+def test_an_address_without_a_serial_number_selects_the_only_device() -> None:
     assert choose([ONE], "oak", "") is ONE
     assert choose([ONE, OTHER], "oak", "222") is OTHER
 
@@ -30,12 +30,12 @@ def test_an_address_without_a_serial_number_is_the_only_device() -> None:
         ([BUSY], "", "^oak://333: another program has it; close that program$"),
     ],
 )
-def test_an_address_that_means_no_device_is_explained(found: list[Found], serial: str, complaint: str) -> None:
+def test_an_address_without_a_match_raises_with_the_reason(found: list[Found], serial: str, complaint: str) -> None:
     with pytest.raises(DeviceError, match=complaint):
         choose(found, "oak", serial)
 
 
-def test_a_driver_that_breaks_or_hangs_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     ending = threading.Event()
 
     def breaks(timeout_s: float) -> list[Found]:
@@ -61,5 +61,5 @@ def test_a_driver_that_breaks_or_hangs_does_not_hide_the_others(monkeypatch: pyt
     assert working is ONE
 
 
-def test_every_driver_can_be_asked_what_is_attached() -> None:
+def test_every_driver_has_a_discovery() -> None:
     assert all(callable(sys.modules[f"drivers.{scheme}"].discover) for scheme in opening.available())

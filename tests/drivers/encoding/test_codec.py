@@ -1,4 +1,4 @@
-"""Frames and truths survive the wire, and nothing but a CodecError comes out of bytes that are none."""
+"""Round trip of frames and truths; malformed bytes raise a CodecError."""
 
 import dataclasses
 import math
@@ -71,7 +71,7 @@ def equal(left: object, right: object) -> bool:
 
 
 @given(frames(), st.integers(0, 2**62))
-def test_a_frame_survives_the_wire(frame: Frame, wall_ns: int) -> None:
+def test_frames_round_trip(frame: Frame, wall_ns: int) -> None:
     image, info = codec.encode_image(frame, wall_ns), codec.encode_info(frame, Header(rig="demo", seq=3))
     back = codec.decode(image, info)
     for field in dataclasses.fields(Frame):
@@ -84,13 +84,13 @@ def test_a_frame_survives_the_wire(frame: Frame, wall_ns: int) -> None:
             assert equal(sent, received), field.name
 
 
-def test_viewers_get_wall_time_and_the_sensor_as_coordinate_frame() -> None:
+def test_raw_images_have_wall_time_and_the_sensor_as_frame_id() -> None:
     image = RawImage.FromString(codec.encode_image(small_frame(), 1_700_000_000_123_456_789))
     assert image.timestamp.ToNanoseconds() == 1_700_000_000_123_456_789
     assert (image.frame_id, image.width, image.height, image.step) == ("tof", 3, 2, 6)
 
 
-def test_the_header_tells_who_speaks_and_the_frame_tells_when() -> None:
+def test_the_header_has_the_sender_and_the_frames_time() -> None:
     info = FrameInfo.FromString(codec.encode_info(small_frame(), Header(rig="demo", boot_id="b", seq=3, t_host_ns=99)))
     assert (info.header.rig, info.header.boot_id, info.header.seq) == ("demo", "b", 3)
     assert (info.header.t_host_ns, info.header.frame_id) == (5, "tof")
@@ -127,13 +127,13 @@ def damaged(*, image: dict[str, object] | None = None, info: dict[str, object] |
         ((codec.encode_image(small_frame(), 0), b"\x12\x01\xff"), r"are no absmsg\.v1\.FrameInfo"),
     ],
 )
-def test_errors_name_what_is_wrong(messages: tuple[bytes, bytes], complaint: str) -> None:
+def test_errors_name_the_problem(messages: tuple[bytes, bytes], complaint: str) -> None:
     with pytest.raises(CodecError, match=complaint):
         codec.decode(*messages)
 
 
 @given(st.data())
-def test_damaged_bytes_are_a_frame_or_a_codec_error(data: st.DataObject) -> None:
+def test_corrupt_bytes_are_a_frame_or_a_codec_error(data: st.DataObject) -> None:
     message = bytearray(codec.encode_image(small_frame(), 1)), bytearray(codec.encode_info(small_frame(), Header()))
     for part in message:
         for _ in range(data.draw(st.integers(0, 3))):
@@ -153,13 +153,13 @@ def test_arbitrary_bytes_are_a_codec_error(image: bytes, info: bytes) -> None:
 
 
 @given(hnp.arrays(np.float32, hnp.array_shapes(min_dims=2, max_dims=2).map(lambda s: (*s, 3))), INT64)
-def test_a_truth_survives_the_wire(points_r: np.ndarray, t_host_ns: int) -> None:
+def test_truths_round_trip(points_r: np.ndarray, t_host_ns: int) -> None:
     back = codec.decode_truth(codec.encode_truth(Truth(4, t_host_ns, points_r, 3), Header(rig="demo")))
     assert (back.seq, back.t_host_ns) == (4, t_host_ns)
     np.testing.assert_array_equal(back.points_r, points_r)
 
 
 @given(st.binary(max_size=64))
-def test_arbitrary_bytes_are_no_truth(payload: bytes) -> None:
+def test_arbitrary_bytes_are_not_a_truth(payload: bytes) -> None:
     with pytest.raises(CodecError):
         codec.decode_truth(payload)

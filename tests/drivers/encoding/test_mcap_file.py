@@ -1,4 +1,4 @@
-"""What is written is in the file, unchanged and readable by anyone; a full disk spoils it visibly."""
+"""MCAP files are readable without our schemas; after a full disk every write fails."""
 
 import io
 from pathlib import Path
@@ -39,7 +39,7 @@ def test_other_programs_read_the_file_without_our_schemas(tmp_path: Path, compre
     assert (attachment.name, attachment.media_type, attachment.data) == ("rig.toml", "text/toml", b"version = 1\n")
 
 
-def test_what_was_flushed_is_readable_without_finish() -> None:
+def test_flushed_messages_are_readable_without_finish() -> None:
     stream = io.BytesIO()
     file = McapFile(stream)
     file.write("/health/capture", "absmsg.v1.Health", HEALTH, 10, 1)
@@ -55,7 +55,7 @@ def test_descriptors_come_with_their_dependencies_first() -> None:
     assert names == ["google/protobuf/timestamp.proto", "absmsg/v1/common.proto", "absmsg/v1/frame_info.proto"]
 
 
-def test_unknown_schema_and_second_schema_on_a_topic_are_refused() -> None:
+def test_an_unknown_schema_and_a_second_schema_on_a_topic_raise() -> None:
     file = McapFile(io.BytesIO())
     with pytest.raises(McapFileError, match=r"'absmsg\.v1\.Nonsense'"):
         file.write("/a", "absmsg.v1.Nonsense", b"", 0, 0)
@@ -65,7 +65,7 @@ def test_unknown_schema_and_second_schema_on_a_topic_are_refused() -> None:
 
 
 class FullDisk(io.BytesIO):
-    """Takes so many bytes and no more."""
+    """A stream of limited capacity."""
 
     def __init__(self, capacity: int) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ class FullDisk(io.BytesIO):
         return super().write(data)
 
 
-def test_a_full_disk_spoils_the_file_for_good() -> None:
+def test_a_full_disk_fails_all_later_writes() -> None:
     disk = FullDisk(1 << 30)
     file = McapFile(disk)
     for i in range(5):

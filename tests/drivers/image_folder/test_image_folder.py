@@ -1,4 +1,4 @@
-"""Image files become frames as they are, in the order they were taken; whatever does not fit is named."""
+"""Image files are read unchanged in order of time; errors name the file."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def depth_image(value: int = 1000) -> np.ndarray:
     return np.full((3, 4), value, np.uint16) + np.arange(4, dtype=np.uint16)
 
 
-def test_numbers_in_names_order_the_images_and_gaps_stay_gaps(tmp_path: Path) -> None:
+def test_numbers_in_names_are_sequence_numbers(tmp_path: Path) -> None:
     for name in ("d2_10.png", "d2_9.png", "d2_12.png", "other_3.png"):
         save(tmp_path / name, depth_image())
     files = by_number(tmp_path, "d2_*.png", rate_hz=10.0)
@@ -86,7 +86,7 @@ def test_a_missing_folder_is_named(tmp_path: Path) -> None:
         by_number(tmp_path / "nowhere", "*.png", 30.0)
 
 
-def test_depth_is_what_the_file_holds(tmp_path: Path) -> None:
+def test_depth_is_read_unchanged(tmp_path: Path) -> None:
     file = ImageFile(save(tmp_path / "d_7.png", depth_image()), 7, 70)
     frame = DepthImages([file], CAMERA, 0.001, Geometry.RADIAL, invalid=1003).frame(file)
     assert (frame.kind, frame.encoding, frame.geometry, frame.seq, frame.t_host_ns) == (
@@ -101,7 +101,7 @@ def test_depth_is_what_the_file_holds(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
-def test_masks_leave_depth_out(tmp_path: Path, channels: int) -> None:
+def test_masked_depth_is_invalid(tmp_path: Path, channels: int) -> None:
     mask = np.zeros((3, 4) if channels == 1 else (3, 4, channels), np.uint8)
     if channels == 4:
         mask[..., :3] = 200  # what is transparent counts as black, whatever its colour
@@ -148,13 +148,13 @@ def test_frames_come_in_the_order_of_their_times(tmp_path: Path) -> None:
         (np.zeros((4, 4), np.uint16), r"d_0.png: the image has 4 × 4 pixels, its camera 4 × 3"),
     ],
 )
-def test_depth_that_is_none_is_refused(tmp_path: Path, image: np.ndarray, complaint: str) -> None:
+def test_other_depth_formats_are_rejected(tmp_path: Path, image: np.ndarray, complaint: str) -> None:
     file = ImageFile(save(tmp_path / "d_0.png", image), 0, 0)
     with pytest.raises(ImageFolderError, match=complaint):
         DepthImages([file], CAMERA, 0.001).frame(file)
 
 
-def test_colour_of_16_bits_and_files_that_are_no_images_are_refused(tmp_path: Path) -> None:
+def test_16_bit_colour_and_other_files_are_rejected(tmp_path: Path) -> None:
     file = ImageFile(save(tmp_path / "c_0.png", np.dstack([depth_image()] * 3)), 0, 0)
     with pytest.raises(ImageFolderError, match=r"c_0.png: colour must have 8 bits per channel, this is 3 × 16 bit"):
         ColorImages([file], CAMERA).frame(file)

@@ -37,13 +37,13 @@ def watch(assembler: Assembler, shown: PacketStream, first: int, count: int) -> 
 
 
 @pytest.mark.parametrize(("form", "packets", "last"), [(DEPTH, 242, 1132), (COLOR, 162, 12), (INFRARED, 205, 1168)])
-def test_the_formats_are_what_the_camera_sends(form: PacketFormat, packets: int, last: int) -> None:
+def test_packet_counts_of_the_formats(form: PacketFormat, packets: int, last: int) -> None:
     assert form.packets == packets
     assert form.image_bytes - (packets - 1) * form.payload == last
 
 
 @pytest.mark.parametrize("form", [DEPTH, COLOR, INFRARED])
-def test_without_loss_every_image_arrives_as_it_was_shown(form: PacketFormat) -> None:
+def test_without_loss_every_image_is_assembled(form: PacketFormat) -> None:
     shown, assembler = stream_of(form), Assembler(form)
     images = watch(assembler, shown, 0, 8000)
     assert [image[:3] for image in images] == [(i, i * 2_000_000, shown.shown(i)) for i in range(30)]
@@ -51,7 +51,7 @@ def test_without_loss_every_image_arrives_as_it_was_shown(form: PacketFormat) ->
     assert set(assembler.dropped.values()) == {0}
 
 
-def test_one_lost_packet_in_a_hundred_drops_whole_images_and_counts_every_one() -> None:
+def test_images_with_lost_packets_are_dropped_and_counted() -> None:
     shown, assembler = stream_of(DEPTH, lost=0.01), Assembler(DEPTH)
     images = watch(assembler, shown, 0, 60 * 8000)
     first = (images[0][1]) // DEPTH.period_ticks
@@ -64,7 +64,7 @@ def test_one_lost_packet_in_a_hundred_drops_whole_images_and_counts_every_one() 
     assert 0.009 < assembler.missing / (60 * 30 * DEPTH.packets) < 0.011
 
 
-def test_images_of_which_nothing_came_are_counted_by_the_clock() -> None:
+def test_completely_lost_images_are_counted_by_the_timestamps() -> None:
     shown, assembler = stream_of(DEPTH), Assembler(DEPTH)
     watch(assembler, shown, 0, begin(3))
     images = watch(assembler, shown, begin(10), 800)
@@ -72,7 +72,7 @@ def test_images_of_which_nothing_came_are_counted_by_the_clock() -> None:
     assert assembler.dropped["lost_packets"] == 7
 
 
-def test_the_ticks_may_wrap() -> None:
+def test_sequence_numbers_continue_across_a_tick_wrap() -> None:
     shown, assembler = stream_of(COLOR), Assembler(COLOR)
     wrap = 2**32 // COLOR.period_ticks
     images = watch(assembler, shown, begin(wrap - 1), 1600)
@@ -93,7 +93,7 @@ def test_the_ticks_may_wrap() -> None:
         (lambda p, n: p.__setitem__((3, 3), 0x72), "wrong_size"),
     ],
 )
-def test_a_damaged_packet_drops_its_image_for_its_cause(change, causes: str) -> None:
+def test_a_corrupt_packet_drops_its_image_with_the_cause(change, causes: str) -> None:
     shown, assembler = stream_of(TINY), Assembler(TINY)
     packets, lengths = shown.microframes(0, 600)
     change(packets, lengths)
@@ -103,7 +103,7 @@ def test_a_damaged_packet_drops_its_image_for_its_cause(change, causes: str) -> 
     assert sum(assembler.dropped.values()) == len(causes.split())
 
 
-def test_what_is_beyond_the_end_of_a_packet_is_ignored() -> None:
+def test_excess_bytes_of_a_packet_are_ignored() -> None:
     shown, assembler = stream_of(DEPTH), Assembler(DEPTH)
     packets, lengths = shown.microframes(0, 400)
     lengths[lengths > 0] = PACKET_BYTES
@@ -159,7 +159,7 @@ DAMAGE = st.tuples(
 
 @settings(max_examples=200)
 @given(st.lists(DAMAGE, max_size=8), st.integers(1, 17))
-def test_damaged_packets_are_judged_as_the_reference_does(damages: list, at_once: int) -> None:
+def test_corrupt_packets_are_handled_as_by_the_reference(damages: list, at_once: int) -> None:
     shown = stream_of(TINY)
     rows = np.concatenate([np.arange(begin(i), begin(i) + TINY.packets) for i in range(10)])
     packets, lengths = (part[rows].copy() for part in shown.microframes(0, 2700))
@@ -180,7 +180,7 @@ def test_damaged_packets_are_judged_as_the_reference_does(damages: list, at_once
 
 @settings(max_examples=100)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([DEPTH, COLOR, INFRARED]))
-def test_whatever_comes_over_the_pipe_no_byte_outside_the_image_is_touched(seed: int, form: PacketFormat) -> None:
+def test_arbitrary_packets_write_no_byte_outside_the_image(seed: int, form: PacketFormat) -> None:
     generator = np.random.default_rng(seed)
     packets = generator.integers(0, 256, (300, PACKET_BYTES), np.uint8)
     plausible = generator.random(300) < 0.9

@@ -42,19 +42,19 @@ def test_registers_are_written_and_read(pipe: Pipe) -> None:
     assert pipe.commands.read_register(0x47) == 9
 
 
-def test_answers_that_take_their_time_are_waited_for() -> None:
+def test_late_answers_are_polled() -> None:
     pipe = Pipe(EmulatedKinect({}, polls=5))
     assert pipe.camera.infrared_gain() == 30
 
 
-def test_tags_begin_anew_after_65536_commands(pipe: Pipe) -> None:
+def test_tags_wrap_after_65536_commands(pipe: Pipe) -> None:
     for value in range(0x10000):
         pipe.commands.write_register(0x47, value)
     pipe.commands.write_register(0x47, 5)  # the emulator and the driver compare tags
     assert pipe.kinect.registers[0x47] == 5
 
 
-def test_streams_begin_and_end_as_the_camera_wants_it(pipe: Pipe) -> None:
+def test_register_writes_of_starting_and_stopping_streams(pipe: Pipe) -> None:
     for stream in (Stream.DEPTH, Stream.COLOR):
         pipe.camera.start(stream)
     assert pipe.kinect.registers[0x06] == 2
@@ -69,13 +69,13 @@ def test_streams_begin_and_end_as_the_camera_wants_it(pipe: Pipe) -> None:
 
 
 @pytest.mark.parametrize("size", [322, 334])
-def test_the_calibration_of_early_and_late_models(size: int) -> None:
+def test_the_calibration_of_early_and_late_models_is_parsed(size: int) -> None:
     plane = Pipe(EmulatedKinect({}, fixed_size=size)).camera.reference_plane()
     assert plane.baseline == pytest.approx(0.075)
     assert plane.step == pytest.approx(ReferencePlane().step)
 
 
-def test_exposure_and_what_the_color_camera_decides_by_itself(pipe: Pipe) -> None:
+def test_exposure_and_automatic_modes_of_the_color_camera(pipe: Pipe) -> None:
     camera = pipe.camera
     assert camera.exposure_s() == pytest.approx(300 * LINE_S)
     camera.set_exposure_s(0.01)
@@ -95,7 +95,7 @@ def test_exposure_and_what_the_color_camera_decides_by_itself(pipe: Pipe) -> Non
 
 
 @pytest.mark.parametrize("nothing", [b"", bytes(ANSWER_BYTES)])
-def test_no_answer_is_an_error_after_its_time(pipe: Pipe, nothing: bytes) -> None:
+def test_no_answer_raises_after_the_timeout(pipe: Pipe, nothing: bytes) -> None:
     pipe.kinect.corrupt = lambda _: nothing
     with pytest.raises(ProtocolError, match=r"0x02 within 1 s.*power"):
         pipe.commands.read_register(0x15)
@@ -113,14 +113,14 @@ def test_no_answer_is_an_error_after_its_time(pipe: Pipe, nothing: bytes) -> Non
         lambda answer: answer[:5],
     ],
 )
-def test_an_answer_to_something_else_is_refused(pipe: Pipe, corrupt) -> None:
+def test_an_answer_to_another_command_raises(pipe: Pipe, corrupt) -> None:
     pipe.kinect.corrupt = corrupt
     with pytest.raises(ProtocolError, match="command 0x02 with tag 0"):
         pipe.commands.read_register(0x15)
 
 
 @given(st.binary(max_size=ANSWER_BYTES), st.sampled_from(["plane", "gain", "exposure", "start"]), st.booleans())
-def test_whatever_it_answers_is_understood_or_an_error_of_the_driver(answer: bytes, what: str, framed: bool) -> None:
+def test_arbitrary_answers_are_parsed_or_raise_a_device_error(answer: bytes, what: str, framed: bool) -> None:
     pipe = Pipe(EmulatedKinect({}))
     pipe.kinect.corrupt = lambda good: (
         good[:2] + bytes([len(answer) // 2, 0]) + good[4:8] + answer if framed else answer

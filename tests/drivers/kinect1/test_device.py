@@ -43,7 +43,7 @@ def opened(fake: FakeDevice, streams: tuple[Stream, ...] = BOTH, **of_backend: b
     return open_camera(Address("", streams), time.monotonic_ns, lambda: backend, FakeReader)
 
 
-def test_depth_in_metres_and_the_mosaic_as_it_was_measured(fake: FakeDevice) -> None:
+def test_depth_in_metres_and_raw_mosaic(fake: FakeDevice) -> None:
     fake.pace = math.inf
     device, sink = opened(fake), RecordingSink()
     device.start(sink)
@@ -77,7 +77,7 @@ def test_infrared_instead_of_color(fake: FakeDevice) -> None:
     assert "exposure_s" not in [control.name for control in device.capabilities.controls]
 
 
-def test_stamps_are_evenly_spaced_and_count_the_first_packet(fake: FakeDevice) -> None:
+def test_timestamps_are_equidistant_and_of_the_first_packet(fake: FakeDevice) -> None:
     device, sink = opened(fake, (Stream.DEPTH,)), RecordingSink()
     device.start(sink)
     sink.wait(lambda: len(sink.frames) >= 10)
@@ -104,7 +104,7 @@ def test_controls_reach_the_camera(fake: FakeDevice) -> None:
         device.controls.get("infrared_gain")
 
 
-def test_pulling_the_plug_fails_the_device_and_plugging_it_in_lets_it_be_opened_again(fake: FakeDevice) -> None:
+def test_an_unplugged_device_fails_and_can_be_reopened(fake: FakeDevice) -> None:
     device, sink = opened(fake), RecordingSink()
     device.start(sink)
     sink.wait(lambda: len(sink.frames) > 0)
@@ -121,7 +121,7 @@ def test_pulling_the_plug_fails_the_device_and_plugging_it_in_lets_it_be_opened_
     assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
 
 
-def test_closing_from_within_the_sink_lets_go_of_the_camera(fake: FakeDevice) -> None:
+def test_closing_in_the_sink_releases_the_camera(fake: FakeDevice) -> None:
     device = opened(fake)
 
     class Impatient(RecordingSink):
@@ -137,21 +137,21 @@ def test_closing_from_within_the_sink_lets_go_of_the_camera(fake: FakeDevice) ->
     assert fake.kinect.registers[0x06] == 0
 
 
-def test_a_kernel_driver_gives_way(fake: FakeDevice) -> None:
+def test_a_kernel_driver_is_detached(fake: FakeDevice) -> None:
     fake.kernel_driver = True
     assert find(lambda: FakeBackend([fake]))[0].availability == Availability.READY
     opened(fake).close()
     assert not fake.kernel_driver
 
 
-def test_a_kernel_driver_that_does_not_let_go_is_named(fake: FakeDevice) -> None:
+def test_a_kernel_driver_that_cannot_be_detached_is_named(fake: FakeDevice) -> None:
     fake.kernel_driver = fake.stubborn = True
     with pytest.raises(DeviceError, match="modprobe -r gspca_kinect"):
         opened(fake)
     assert fake.opened == 0
 
 
-def test_without_permission_the_message_holds_the_rule_and_where_to_put_it(fake: FakeDevice) -> None:
+def test_without_permission_the_message_has_the_udev_rule_and_its_path(fake: FakeDevice) -> None:
     fake.refusal = errno.EACCES
     (found,) = find(lambda: FakeBackend([fake]))
     assert found.availability == Availability.NO_PERMISSION
@@ -160,7 +160,7 @@ def test_without_permission_the_message_holds_the_rule_and_where_to_put_it(fake:
     assert 'ATTR{idProduct}=="02ae"' in str(caught.value)
 
 
-def test_two_programs_cannot_have_one_camera(fake: FakeDevice) -> None:
+def test_a_camera_in_use_cannot_be_opened(fake: FakeDevice) -> None:
     device = opened(fake)
     assert find(lambda: FakeBackend([fake]))[0].availability == Availability.BUSY
     with pytest.raises(DeviceError, match="another program"):
@@ -169,13 +169,13 @@ def test_two_programs_cannot_have_one_camera(fake: FakeDevice) -> None:
     opened(fake).close()
 
 
-def test_a_slow_link_is_noticed(fake: FakeDevice) -> None:
+def test_a_slow_link_is_faulty(fake: FakeDevice) -> None:
     fake.speed = 2
     (found,) = find(lambda: FakeBackend([fake]))
     assert (found.availability, found.info.link) == (Availability.FAULTY, "USB 1, 12 Mbit/s")
 
 
-def test_a_camera_without_a_number_has_that_of_the_audio_part_beside_it() -> None:
+def test_a_camera_without_serial_number_has_that_of_its_audio_device() -> None:
     camera = FakeDevice(noise(), "0" * 16, product=0x02BF, ports=(1, 4, 1))
     audio = FakeDevice(EmulatedKinect({}), "B44887234567890B", product=0x02BE, ports=(1, 4, 2))
     elsewhere = FakeDevice(EmulatedKinect({}), "B00000000000001B", product=0x02BE, ports=(1, 5, 2))
@@ -187,18 +187,18 @@ def test_a_camera_without_a_number_has_that_of_the_audio_part_beside_it() -> Non
     assert camera.opened == audio.opened == elsewhere.opened == 0
 
 
-def test_the_setting_with_pipes_is_chosen(fake: FakeDevice) -> None:
+def test_the_alternate_setting_with_endpoints_is_selected(fake: FakeDevice) -> None:
     opened(fake, wide=True).close()
     assert fake.settings == [1]
 
 
-def test_a_configured_camera_is_not_configured_again(fake: FakeDevice) -> None:
+def test_an_unconfigured_camera_is_configured(fake: FakeDevice) -> None:
     fake.configuration = 0
     opened(fake).close()
     assert fake.configuration == 1
 
 
-def test_two_cameras_are_told_apart_by_their_numbers(fake: FakeDevice) -> None:
+def test_two_cameras_are_selected_by_serial_number(fake: FakeDevice) -> None:
     other = FakeDevice(noise(seed=2), "B00363A01234040B", ports=(2, 1))
     backend = FakeBackend([fake, other])
     with pytest.raises(DeviceError, match=f"kinect1://{SERIAL}, kinect1://{other.serial}"):
@@ -221,13 +221,13 @@ def test_two_cameras_are_told_apart_by_their_numbers(fake: FakeDevice) -> None:
         ("kinect1://A/b", "nothing may follow"),
     ],
 )
-def test_an_address_that_is_none_says_what_is_allowed(uri: str, complaint: str) -> None:
+def test_invalid_addresses_name_what_is_allowed(uri: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         parse(uri)
 
 
 @given(st.text("abdehlmoprst:/?&=,%[]@0\n é", max_size=30))
-def test_whatever_follows_the_scheme_is_an_address_or_an_error_of_the_driver(rest: str) -> None:
+def test_arbitrary_text_is_an_address_or_an_address_error(rest: str) -> None:
     try:
         address = parse(f"kinect1://{rest}")
     except AddressError:
@@ -236,25 +236,25 @@ def test_whatever_follows_the_scheme_is_an_address_or_an_error_of_the_driver(res
 
 
 @given(st.binary(max_size=40))
-def test_a_camera_that_tells_a_garbled_number_is_listed_all_the_same(garbled: bytes) -> None:
+def test_a_camera_with_a_garbled_serial_number_is_listed(garbled: bytes) -> None:
     with mock.patch.object(usb_descriptors, "string", return_value=garbled):
         (found,) = find(lambda: FakeBackend([FakeDevice(EmulatedKinect({}), "")]))
     assert found.info.serial.isalnum() or found.info.serial == ""
 
 
-def test_addresses() -> None:
+def test_valid_addresses() -> None:
     assert parse("kinect1://") == Address("", BOTH)
     assert parse(f"kinect1://{SERIAL}?streams=ir,depth") == Address(SERIAL, (Stream.IR, Stream.DEPTH))
 
 
-def test_the_address_of_an_opened_camera_opens_the_same_streams_of_the_same_camera(fake: FakeDevice) -> None:
+def test_the_uri_of_an_opened_camera_reopens_it_with_its_streams(fake: FakeDevice) -> None:
     for streams in (BOTH, (Stream.IR,), (Stream.IR, Stream.DEPTH)):
         device = opened(fake, streams)
         assert parse(device.info.uri) == Address(SERIAL, streams)
         device.close()
 
 
-def test_pyusb_is_imported_only_when_it_is_needed() -> None:
+def test_pyusb_is_imported_lazily() -> None:
     code = "import sys, drivers.kinect1; sys.exit(any(name.split('.')[0] == 'usb' for name in sys.modules))"
     assert (
         subprocess.run([sys.executable, "-c", code], env={"PYTHONPATH": ":".join(sys.path)}, check=False).returncode
@@ -262,6 +262,6 @@ def test_pyusb_is_imported_only_when_it_is_needed() -> None:
     )
 
 
-def test_the_rules_that_are_shipped_are_those_that_the_message_prints() -> None:
+def test_the_shipped_udev_rules_are_those_of_the_message() -> None:
     shipped = (Path(__file__).parents[3] / "docker" / Path(udev.PATH).name).read_text(encoding="utf-8")
     assert udev.RULES in shipped

@@ -3,7 +3,7 @@
 from drivers.kinect1.transport.loss_monitor import CONDITION, WINDOW_NS, LossMonitor
 
 
-def test_losses_that_matter_are_told_and_taken_back() -> None:
+def test_the_warning_is_raised_and_cleared() -> None:
     now_ns, heard = 0, []
     monitor = LossMonitor(lambda: now_ns, lambda condition, message: heard.append((condition, message)))
     monitor.update(100, 100)  # too early to judge

@@ -24,7 +24,7 @@ def test_known_distances(raw: int, millimetres: float) -> None:
     assert ReferencePlane().table()[raw] * DEPTH_SCALE * 1000 == pytest.approx(millimetres, abs=0.7)
 
 
-def test_every_raw_value_up_to_13_metres_keeps_a_number_of_its_own() -> None:
+def test_the_conversion_is_injective_up_to_13_metres() -> None:
     z, table = ReferencePlane().z(), ReferencePlane().table()
     seen = np.flatnonzero(table)
     assert z[seen].max() > 11
@@ -33,7 +33,7 @@ def test_every_raw_value_up_to_13_metres_keeps_a_number_of_its_own() -> None:
     np.testing.assert_allclose(table[seen] * DEPTH_SCALE, z[seen], atol=DEPTH_SCALE / 2 + 1e-12)
 
 
-def test_inverse_distances_are_equally_spaced_by_the_step_that_the_noise_model_wants() -> None:
+def test_inverse_depths_are_spaced_by_the_step_of_the_noise_model() -> None:
     plane = ReferencePlane()
     with np.errstate(invalid="ignore"):
         steps = -np.diff(1 / plane.z()[:1089])
@@ -41,13 +41,13 @@ def test_inverse_distances_are_equally_spaced_by_the_step_that_the_noise_model_w
     assert plane.step == pytest.approx(2.85e-3, rel=0.02)
 
 
-def test_no_return_and_what_is_behind_infinity_is_nothing() -> None:
+def test_no_return_and_values_beyond_infinity_are_invalid() -> None:
     table = ReferencePlane().table()
     assert table[2047] == 0
     assert not table[1090:].any()
 
 
-def test_a_distant_reference_plane_seen_at_its_own_shift_is_where_it_is() -> None:
+def test_the_shift_maps_to_the_distance_of_the_reference_plane() -> None:
     plane = ReferencePlane(distance=1.5, shift=150)
     assert plane.z()[600] == pytest.approx(1.5, rel=2e-2)
 
@@ -60,7 +60,7 @@ def test_the_cameras() -> None:
     np.testing.assert_allclose(color.T_rs[:3, 3], (0.023, 0, 0))
 
 
-def test_the_calibration_is_read() -> None:
+def test_the_calibration_is_parsed() -> None:
     plane = parse(*answers(7.4, 2.4, 121.0, 0.105, shift=199, size=334))
     expected = ReferencePlane(0.074, 0.024, 1.21, 0.00105, 199)
     assert dataclasses.astuple(plane) == pytest.approx(dataclasses.astuple(expected), rel=1e-6)
@@ -76,13 +76,13 @@ def test_the_calibration_is_read() -> None:
         (bytes(322), b""),
     ],
 )
-def test_a_calibration_that_is_none_is_refused(blocks: tuple[bytes, bytes]) -> None:
+def test_an_implausible_calibration_raises(blocks: tuple[bytes, bytes]) -> None:
     with pytest.raises(CalibrationError, match="calibration"):
         parse(*blocks)
 
 
 @given(st.binary(max_size=340), st.binary(max_size=12))
-def test_any_answer_is_a_calibration_or_an_error_of_the_driver(fixed: bytes, shift: bytes) -> None:
+def test_arbitrary_answers_are_a_calibration_or_raise(fixed: bytes, shift: bytes) -> None:
     try:
         plane = parse(fixed, shift)
     except CalibrationError:

@@ -1,4 +1,4 @@
-"""Kernels that unpack pixels do what bit-by-bit arithmetic does."""
+"""The unpacking kernels agree with the bit-by-bit reference."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""PCIC messages written from the description of the format, for tests of what reads them."""
+"""Synthetic PCIC messages, written after the format description."""
 
 import struct
 from collections.abc import Sequence

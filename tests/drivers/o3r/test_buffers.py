@@ -1,4 +1,4 @@
-"""Buffers of the ifm O3R: what they hold comes out in SI units; whatever else they are is named, never read beyond."""
+"""Buffers of the ifm O3R are read in SI units; malformed ones raise, without reading beyond the end."""
 
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def test_the_lens_of_a_wide_view_is_opencvs_fisheye(tmp_path: Path) -> None:
     np.testing.assert_allclose(camera.project(point), corner.ravel() - 0.5, atol=1e-5)
 
 
-def test_messages_as_they_travel_and_older_ones_are_read(tmp_path: Path) -> None:
+def test_network_messages_and_older_versions_are_read(tmp_path: Path) -> None:
     old = pcic_messages.message(
         pcic_messages.chunk(100, bytes(96), 8, 6, 2, version=1),
         pcic_messages.chunk(420, pcic_messages.tof_info(newer=False), 8, 6, 0, version=1),
@@ -101,13 +101,13 @@ def test_messages_as_they_travel_and_older_ones_are_read(tmp_path: Path) -> None
         ),
     ],
 )
-def test_what_is_no_buffer_is_named(tmp_path: Path, content: bytes, complaint: str) -> None:
+def test_other_files_are_rejected_with_their_name(tmp_path: Path, content: bytes, complaint: str) -> None:
     with pytest.raises(ForeignRecordingError, match=complaint) as error:
         footage(tmp_path, content)
     assert "buffer.data" in str(error.value)
 
 
-def test_an_image_with_fewer_pixels_than_it_says_is_refused_when_it_is_read(tmp_path: Path) -> None:
+def test_an_image_with_too_few_bytes_raises_when_read(tmp_path: Path) -> None:
     content = pcic_messages.message(
         pcic_messages.chunk(100, bytes(94), 8, 6, 2), pcic_messages.chunk(420, pcic_messages.tof_info(), 8, 6, 0)
     )
@@ -125,7 +125,7 @@ def parsed(content: bytes) -> list[Frame]:
 
 
 @given(st.binary(max_size=200), st.booleans())
-def test_any_bytes_are_read_or_refused(content: bytes, begins: bool) -> None:
+def test_arbitrary_bytes_are_read_or_rejected(content: bytes, begins: bool) -> None:
     try:
         frames = parsed(b"0000star" * begins + content)
     except ChunkError:
@@ -134,7 +134,7 @@ def test_any_bytes_are_read_or_refused(content: bytes, begins: bool) -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 1400), st.integers(0, 255)), max_size=6), st.integers(0, 1400))
-def test_a_damaged_message_is_read_or_refused(changes: list[tuple[int, int]], length: int) -> None:
+def test_a_corrupt_message_is_read_or_rejected(changes: list[tuple[int, int]], length: int) -> None:
     content = bytearray(pcic_messages.exposure())
     for position, value in changes:
         content[position % len(content)] = value
@@ -145,7 +145,7 @@ def test_a_damaged_message_is_read_or_refused(changes: list[tuple[int, int]], le
     assert all(frame.data.size and frame.si().shape == frame.data.shape for frame in frames)
 
 
-def test_a_real_buffer_shows_what_stood_before_the_camera(shared_data: Path) -> None:
+def test_a_real_buffer_has_the_expected_depth(shared_data: Path) -> None:
     path = shared_data / "tof_ifm_o3r" / "O3RBuffer.data"
     if not path.is_file():
         pytest.skip(f"no file {path}")

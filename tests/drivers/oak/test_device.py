@@ -1,4 +1,4 @@
-"""The OAK driver over the real depthai, without a device: a recording that depthai plays, and what depthai promises."""
+"""The OAK driver on the real depthai without a device: playback of a recording, and mocks with depthai's interface."""
 
 import json
 import os
@@ -36,7 +36,7 @@ SAMPLE = Path(__file__).parents[3] / "recordings" / "sample_oak"
 URI = f"oak://?recording={SAMPLE}"
 
 
-def test_what_depthai_plays_is_what_it_recorded(tmp_path: Path) -> None:
+def test_playback_by_depthai_is_bit_exact(tmp_path: Path) -> None:
     simulation = parse_simulated("simulated://sheet?sensors=tof&tof=32x24&rate=15").build()
     camera = simulation.heads["tof"].camera
     depths = [frame for k in range(30) for frame in simulation.frames(k) if frame.kind == Kind.DEPTH]
@@ -88,7 +88,7 @@ def has_frames(receiver: RecordingSink, epoch: int, number: int) -> bool:
     return sum(frame.epoch == epoch for frame in receiver.frames) >= number
 
 
-def test_a_device_that_goes_away_fails_and_leaves_nothing_behind() -> None:
+def test_a_lost_device_fails_and_releases_its_resources() -> None:
     threads = len(os.listdir("/proc/self/task"))
     receiver = RecordingSink()
     connection = live_connection()
@@ -106,11 +106,11 @@ def test_a_device_that_goes_away_fails_and_leaves_nothing_behind() -> None:
 
 
 def live_connection() -> Any:
-    """What plays, as if its end were the loss of a device."""
+    """A playback whose end is reported as the loss of a device."""
     return replace(playback.connect(parse(URI), SAMPLE), ended="")
 
 
-def test_a_stream_that_never_delivers_is_named() -> None:
+def test_a_stream_without_images_is_named() -> None:
     silent = MagicMock()
     silent.get.return_value = None
     connection = live_connection()
@@ -119,9 +119,9 @@ def test_a_stream_that_never_delivers_is_named() -> None:
         OakDevice(connection, time.monotonic_ns, first_s=0.1)
 
 
-def test_a_message_that_is_no_image_is_counted_and_the_stream_goes_on() -> None:
+def test_malformed_messages_are_counted_and_the_stream_continues() -> None:
     class Odd:
-        """A queue whose third message is no image."""
+        """A queue whose third message is malformed."""
 
         def __init__(self, queue: Queue) -> None:
             self.queue, self.count = queue, 0
@@ -164,7 +164,7 @@ def test_the_calibration_is_depthais_own() -> None:
 
 
 def test_projection_between_cameras_agrees_with_depthais() -> None:
-    """depthai projects a pixel and its depth from one image into another by itself."""
+    """Reference: depthai's own projection of a pixel with depth from one image to another."""
     read = OakRecording(SAMPLE)
     tof, color = read.cameras["tof"], read.cameras["color"]
     pixel, z = np.array([30.0, 50.0]), 1.1
@@ -182,7 +182,7 @@ def test_projection_between_cameras_agrees_with_depthais() -> None:
     np.testing.assert_allclose(color.project(point), (theirs.x, theirs.y), atol=0.6)
 
 
-def test_no_device_is_said_at_once_and_nobody_is_called() -> None:
+def test_no_device_raises_at_once_without_network_traffic() -> None:
     assert os.environ["DEPTHAI_TELEMETRY"] == "0"
     assert os.environ["DEPTHAI_PROTOCOL"] == "usb"
     assert discover(0.2) == []
@@ -204,19 +204,19 @@ def test_no_device_is_said_at_once_and_nobody_is_called() -> None:
         ("oak://?recording=nowhere", "nowhere"),
     ],
 )
-def test_a_wrong_address_is_never_tried_again(uri: str, complaint: str) -> None:
+def test_an_invalid_address_is_a_final_error(uri: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         open_device(uri, time.monotonic_ns)
 
 
-def test_the_network_is_searched_only_if_the_address_asks() -> None:
+def test_network_discovery_is_opt_in() -> None:
     assert not parse("oak://18443010E1A2B3C4").network
     assert parse("oak://192.168.1.44").network
     assert parse("oak://?network=1").network
 
 
 def mock_device(platform: str, tof: bool) -> Any:
-    """A device with the methods of the real one, and no others."""
+    """A mock with exactly the methods of the real device."""
     device = create_autospec(dai.Device, instance=True)
     kinds = dai.CameraSensorType
     cameras = [(dai.CameraBoardSocket.CAM_C, kinds.COLOR)]
@@ -237,7 +237,7 @@ def mock_device(platform: str, tof: bool) -> Any:
 
 
 def mock_pipeline() -> tuple[Any, list[Any]]:
-    """A pipeline whose nodes have the methods and outputs of the real ones."""
+    """A mock whose nodes have the methods and outputs of the real ones."""
     nodes: list[Any] = []
 
     def create(kind: Any) -> Any:
@@ -278,7 +278,7 @@ def test_stereo_gives_depth_in_the_view_of_the_left_image() -> None:
 
 
 @pytest.mark.parametrize(("mode", "tof"), [("tof", False), ("stereo", True)])
-def test_a_mode_that_the_device_lacks_is_refused_with_what_it_has(mode: str, tof: bool) -> None:
+def test_an_unsupported_mode_raises_with_the_existing_cameras(mode: str, tof: bool) -> None:
     with pytest.raises(DeviceError, match=f"mode = {mode} needs a camera that the device lacks; it has CAM_C: sensor"):
         pipelines.build(dai, mock_device("RVC2", tof), mock_pipeline()[0], parse(f"oak://?mode={mode}"))
 
@@ -310,7 +310,7 @@ def test_the_range_can_be_changed_while_it_runs() -> None:
     assert controls.get("modulation") == "high"
 
 
-def test_a_sync_role_is_taken_by_the_device_or_not_at_all() -> None:
+def test_a_rejected_sync_role_leaves_the_control_unchanged() -> None:
     device, (pipeline, _) = mock_device("RVC2", tof=True), mock_pipeline()
     address = parse("oak://")
     controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
@@ -331,7 +331,7 @@ def test_a_sync_role_is_taken_by_the_device_or_not_at_all() -> None:
         ("X_LINK_INSUFFICIENT_PERMISSIONS", "X_LINK_UNBOOTED", Availability.NO_PERMISSION),
     ],
 )
-def test_what_is_attached_says_what_to_do(
+def test_attached_devices_have_availability_and_remedy(
     monkeypatch: pytest.MonkeyPatch, status: str, state: str, availability: Availability
 ) -> None:
     info = dai.DeviceInfo("18443010E1A2B3C4")
@@ -342,7 +342,7 @@ def test_what_is_attached_says_what_to_do(
     assert bool(found.remedy) == (availability != Availability.READY)
 
 
-def test_a_sync_role_that_the_device_refuses_is_said() -> None:
+def test_a_rejected_sync_role_in_the_address_raises() -> None:
     device = mock_device("RVC2", tof=True)
     device.setExternalFrameSyncRole.return_value = (False, "no M8 connector")
     with pytest.raises(DeviceError, match="sync = master: no M8 connector"):

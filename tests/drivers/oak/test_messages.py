@@ -1,4 +1,4 @@
-"""depthai's images: every format becomes the same pixels, and whatever bytes come are an image or refused by name."""
+"""Decoding of depthai's images: all formats give the same pixels, malformed messages raise."""
 
 import contextlib
 import json
@@ -42,7 +42,7 @@ def test_depth_is_in_millimetres_along_z_and_stamped_in_the_middle_of_its_exposu
 
 
 @pytest.mark.parametrize("gap", [0, 5])
-def test_rows_may_have_gaps_behind_them(gap: int) -> None:
+def test_row_padding_is_removed(gap: int) -> None:
     rows = np.concatenate([np.arange(48, dtype=np.uint8).reshape(6, 8), np.full((6, gap), 99, np.uint8)], axis=1)
     picture = replace(DEPTH, type="RAW8", stride=8 + gap, data=rows.ravel())
     np.testing.assert_array_equal(pixels(picture, Kind.IR)[1], np.arange(48).reshape(6, 8))
@@ -57,14 +57,14 @@ def test_rows_may_have_gaps_behind_them(gap: int) -> None:
         ("BGR888p", np.moveaxis(COLORS[..., ::-1], -1, 0)),
     ],
 )
-def test_colours_are_the_same_in_every_order(name: str, data: np.ndarray) -> None:
+def test_all_colour_formats_decode_to_the_same_pixels(name: str, data: np.ndarray) -> None:
     stride = 24 if name.endswith("i") else 8
     picture = replace(DEPTH, type=name, stride=stride, data=np.ascontiguousarray(data).ravel())
     encoding, image = pixels(picture, Kind.COLOR)
     np.testing.assert_array_equal(image if encoding == "rgb8" else image[..., ::-1], COLORS)
 
 
-def test_compressed_chroma_is_what_opencv_makes_of_it() -> None:
+def test_subsampled_chroma_is_decoded_as_by_opencv() -> None:
     color = np.full((6, 8, 3), (200, 100, 30), np.uint8)
     planes = cv2.cvtColor(color, cv2.COLOR_BGR2YUV_I420)
     for name in ("YUV420p", "NV12"):
@@ -80,7 +80,7 @@ def test_compressed_chroma_is_what_opencv_makes_of_it() -> None:
     st.sampled_from(TYPES), st.integers(-2, 20), st.integers(-2, 20), st.integers(-1, 70), st.binary(max_size=600),
     st.sampled_from([Kind.DEPTH, Kind.IR, Kind.COLOR]),
 )  # fmt: skip
-def test_any_bytes_are_an_image_or_refused(
+def test_arbitrary_bytes_are_an_image_or_rejected(
     name: str, width: int, height: int, stride: int, data: bytes, kind: Kind
 ) -> None:
     bytes_ = np.frombuffer(data, np.uint8)
@@ -94,20 +94,22 @@ def test_any_bytes_are_an_image_or_refused(
     st.lists(st.floats(width=32), min_size=9, max_size=9),
     st.sampled_from(["PERSPECTIVE", "FISHEYE", "CYLINDRICAL"]),
 )
-def test_any_camera_is_one_or_refused(coefficients: list[float], matrix: list[float], model: str) -> None:
+def test_arbitrary_parameters_are_a_camera_or_rejected(
+    coefficients: list[float], matrix: list[float], model: str
+) -> None:
     numbers = np.reshape(matrix, (3, 3))
     with contextlib.suppress(PictureError):
         made = camera(replace(DEPTH, coefficients=tuple(coefficients), matrix=numbers, model=model), pose.identity())
         assert made.fx > 0
 
 
-def test_tilted_lenses_are_refused_with_what_to_do() -> None:
+def test_tilted_lenses_are_rejected_with_the_remedy() -> None:
     with pytest.raises(PictureError, match="undistort=1"):
         camera(replace(DEPTH, coefficients=(*[0.1] * 8, 0, 0, 0, 0, 0.01, 0)), pose.identity())
 
 
-def test_stereo_images_are_where_their_rectified_views_are() -> None:
-    """Rectified, the cameras look the same way, and the right one stands on the left one's x axis."""
+def test_stereo_images_have_rectified_poses() -> None:
+    """The rectified cameras are parallel, with the right one on the x axis of the left one."""
     R1 = pose.from_rotation_vector([0, 0.02, 0.01], [0, 0, 0])
     T_rect_left_right = pose.from_rotation_vector([0, 0, 0], [0.075, 0, 0])
     R2 = pose.from_rotation_vector([0.01, -0.01, 0], [0, 0, 0])
@@ -121,7 +123,7 @@ def test_stereo_images_are_where_their_rectified_views_are() -> None:
     np.testing.assert_allclose(found["right"].T_rs, T_rect_left_right, atol=1e-12)
 
 
-def test_unconnected_cameras_and_circles_are_refused() -> None:
+def test_unconnected_and_circular_extrinsics_are_rejected() -> None:
     with pytest.raises(EepromError, match="nothing is known of where camera 1 is relative to camera 0"):
         Poses({}).between(0, 1)
     circle = Poses({0: Extrinsics(1, pose.identity()), 1: Extrinsics(0, pose.identity())})
@@ -133,7 +135,7 @@ CALIBRATION = (SAMPLE / "calibration.json").read_bytes()
 
 
 @given(st.lists(st.tuples(st.integers(0, len(CALIBRATION) - 1), st.integers(0, 255)), min_size=1, max_size=8))
-def test_a_damaged_calibration_is_read_or_refused(changes: list[tuple[int, int]]) -> None:
+def test_a_corrupt_calibration_is_read_or_rejected(changes: list[tuple[int, int]]) -> None:
     content = bytearray(CALIBRATION)
     for position, value in changes:
         content[position] = value
@@ -144,7 +146,7 @@ def test_a_damaged_calibration_is_read_or_refused(changes: list[tuple[int, int]]
     assert pose.shape == (4, 4)
 
 
-def test_the_sample_is_what_the_simulator_sees() -> None:
+def test_the_sample_recording_matches_the_simulation() -> None:
     read = OakRecording(SAMPLE)
     simulation = parse(DEVICE).build()
     seen = {frame.key: frame for frame in simulation.frames(EXPOSURES[3])}
@@ -160,7 +162,7 @@ def test_the_sample_is_what_the_simulator_sees() -> None:
         assert read.cameras[name].fx == pytest.approx(head.camera.fx)
 
 
-def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
+def test_a_corrupt_recording_is_read_or_rejected(tmp_path: Path) -> None:
     content, rng = (SAMPLE / "tof_depth.mcap").read_bytes(), np.random.default_rng(7)
     damaged, refused = tmp_path / "depth.mcap", 0
     for k in range(40):
@@ -184,7 +186,9 @@ def test_a_damaged_recording_is_read_or_refused(tmp_path: Path) -> None:
         ("", None, "there is no MCAP file in it"),
     ],
 )
-def test_what_is_no_recording_is_named(tmp_path: Path, name: str, content: bytes | None, complaint: str) -> None:
+def test_other_files_are_rejected_with_their_name(
+    tmp_path: Path, name: str, content: bytes | None, complaint: str
+) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(ForeignRecordingError, match=complaint):

@@ -1,4 +1,4 @@
-"""A RealSense that librealsense itself simulates, fed from a thread of the test's."""
+"""A software device of librealsense, fed by a thread of the test."""
 
 import threading
 import time
@@ -13,7 +13,7 @@ SIZE = (64, 48)
 
 
 class SoftwareCamera:
-    """Depth, infra-red and confidence behind one lens and colours beside it, as an L515 has them.
+    """Depth, infra-red and confidence behind one lens and a separate colour camera, like an L515.
 
     Args:
         serial: its serial number.
@@ -55,7 +55,7 @@ class SoftwareCamera:
         self._thread = threading.Thread()
 
     def show(self, number: int, time_ms: float) -> None:
-        """Shows one exposure to whoever listens: depth 1000 + number everywhere but in the first row."""
+        """Emits one exposure: depth 1000 + number except in the first row."""
         rs, (width, height) = self.rs, SIZE
         fault = self.fault if number >= self._after else Fault.NONE
         if fault in {Fault.STALL, Fault.UNPLUG}:
@@ -77,7 +77,7 @@ class SoftwareCamera:
             sensor.on_video_frame(frame)
 
     def run(self, rate_hz: float = 100.0) -> None:
-        """Begins to show exposures until `halt`."""
+        """Emits exposures until `halt`."""
         self._stop = threading.Event()
         self._thread = threading.Thread(
             target=self._show_all, args=(self._stop, 1 / rate_hz), name="shows", daemon=True
@@ -85,7 +85,7 @@ class SoftwareCamera:
         self._thread.start()
 
     def halt(self) -> None:
-        """Shows no more."""
+        """Stops the emission."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()

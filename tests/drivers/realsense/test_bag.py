@@ -1,4 +1,4 @@
-"""Bags of librealsense: written by a library from the description of the format, read back in SI units."""
+"""Bags of librealsense: synthetic files, written after the format description, are read back in SI units."""
 
 import contextlib
 from pathlib import Path
@@ -24,7 +24,7 @@ TURN, TRANSLATION = (0.0, 0.6, 0.0, 0.8), (0.015, 0.001, 0.002)
 
 @pytest.fixture
 def bag(tmp_path: Path) -> Path:
-    """Two exposures of depth and one of colours, as a D435 would."""
+    """Two exposures of depth and one of colour, like a D435's."""
     return write(tmp_path / "d435.bag")
 
 
@@ -104,7 +104,7 @@ def write(path: Path, model: str = "Brown Conrady", units: float = 0.0001, with_
     return path
 
 
-def test_images_come_with_their_metadata_and_the_devices_pace(bag: Path) -> None:
+def test_images_have_metadata_and_device_time(bag: Path) -> None:
     read = RealsenseBag(bag)
     frames = {(frame.sensor, frame.seq): frame for frame in read.frames()}
     assert read.total == len(frames) == 3
@@ -123,7 +123,7 @@ def test_images_come_with_their_metadata_and_the_devices_pace(bag: Path) -> None
     assert np.isnan(second.exposure_s)
 
 
-def test_the_colour_camera_is_where_the_transform_says(bag: Path) -> None:
+def test_the_extrinsics_of_the_colour_camera(bag: Path) -> None:
     camera = RealsenseBag(bag).cameras["color"]
     point_d = np.array([0.1, -0.05, 0.8])
     angle = 2 * np.arctan2(0.6, 0.8)
@@ -132,7 +132,7 @@ def test_the_colour_camera_is_where_the_transform_says(bag: Path) -> None:
     np.testing.assert_allclose(camera.project(point_d), expected.ravel(), atol=1e-9)
 
 
-def test_what_is_no_such_bag_is_named(tmp_path: Path) -> None:
+def test_other_files_are_rejected_with_their_name(tmp_path: Path) -> None:
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
     (tmp_path / "text.bag").write_bytes(b"no bag")
     with pytest.raises(ForeignRecordingError, match=r"text.bag: this is no ROS 1 bag"):
@@ -147,7 +147,7 @@ def test_what_is_no_such_bag_is_named(tmp_path: Path) -> None:
         RealsenseBag(write(tmp_path / "unit.bag", units=0.0))
 
 
-def test_a_damaged_bag_is_read_or_refused(bag: Path, tmp_path: Path) -> None:
+def test_a_corrupt_bag_is_read_or_rejected(bag: Path, tmp_path: Path) -> None:
     content, rng = bag.read_bytes(), np.random.default_rng(5)
     damaged = tmp_path / "damaged.bag"
     refused = 0
@@ -171,7 +171,7 @@ def test_a_damaged_bag_is_read_or_refused(bag: Path, tmp_path: Path) -> None:
     st.integers(0, 80),
     st.binary(max_size=400),
 )
-def test_any_image_message_is_an_image_or_refused(
+def test_arbitrary_image_messages_are_an_image_or_rejected(
     kind: Kind, encoding: str, width: int, height: int, step: int, data: bytes
 ) -> None:
     message = SimpleNamespace(
@@ -182,7 +182,7 @@ def test_any_image_message_is_an_image_or_refused(
         assert image.shape[:2] == (height, width)
 
 
-def test_a_real_bag_puts_depth_where_its_colours_are(shared_data: Path) -> None:
+def test_depth_and_colour_of_a_real_bag_are_registered(shared_data: Path) -> None:
     """The room's corner, 1.9 m away, is at column 326 of the depth image and at column 330 of the colours."""
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
     path = shared_data / "realsense_bag" / "single_depth_color_640x480.bag"

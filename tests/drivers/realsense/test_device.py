@@ -68,7 +68,7 @@ def test_every_stream_arrives_in_si_units_on_the_cameras_clock(camera: SoftwareC
     assert device.counters["frames"] == 20
 
 
-def test_the_colour_camera_is_where_librealsense_says(device: RealsenseDevice) -> None:
+def test_the_extrinsics_of_the_colour_camera(device: RealsenseDevice) -> None:
     point = [0.1, -0.05, 0.8]
     depth, color = (
         stream.profile for used in device._used for stream in used.streams if stream.role.stream in {"depth", "color"}
@@ -88,13 +88,13 @@ def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> No
         np.testing.assert_allclose(device.cameras["depth"].project(np.array(point)), expected, atol=0.01)
 
 
-def test_an_unknown_lens_is_refused() -> None:
+def test_an_unknown_lens_is_rejected() -> None:
     camera = SoftwareCamera(model="ftheta")
     with pytest.raises(DeviceError, match="distortion 'ftheta' is none of brown conrady"):
         of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
 
 
-def test_host_times_follow_the_exposures_and_starting_again_is_a_new_epoch(
+def test_host_times_follow_the_exposures_and_a_restart_is_a_new_epoch(
     camera: SoftwareCamera, device: RealsenseDevice
 ) -> None:
     receiver = RecordingSink()
@@ -126,7 +126,7 @@ def test_the_sink_may_stop_the_device(camera: SoftwareCamera, device: RealsenseD
     assert receiver.settle() == 1
 
 
-def test_nothing_is_left_behind(camera: SoftwareCamera) -> None:
+def test_resources_are_released(camera: SoftwareCamera) -> None:
     camera.run()
     resources = []
     for _ in range(6):
@@ -139,7 +139,7 @@ def test_nothing_is_left_behind(camera: SoftwareCamera) -> None:
     assert resources[-1] <= resources[1]
 
 
-def test_a_camera_that_is_gone_fails(camera: SoftwareCamera, device: RealsenseDevice) -> None:
+def test_a_lost_camera_fails(camera: SoftwareCamera, device: RealsenseDevice) -> None:
     device._camera = SimpleNamespace(is_connected=lambda: False)
     receiver = RecordingSink()
     device.start(receiver)
@@ -147,7 +147,7 @@ def test_a_camera_that_is_gone_fails(camera: SoftwareCamera, device: RealsenseDe
     assert receiver.states[-1] == (DeviceState.FAILED, "the camera is gone")
 
 
-def test_what_librealsense_recorded_is_played(tmp_path: Path, camera: SoftwareCamera) -> None:
+def test_recordings_of_librealsense_are_played(tmp_path: Path, camera: SoftwareCamera) -> None:
     path = tmp_path / "take.db3"
     recorder = rs.recorder(str(path), camera.device)
     sensors, queue = recorder.query_sensors(), rs.frame_queue(100)
@@ -186,12 +186,12 @@ def test_what_librealsense_recorded_is_played(tmp_path: Path, camera: SoftwareCa
         ("realsense://?recording=nowhere.db3", "nowhere.db3 cannot be played"),
     ],
 )
-def test_a_wrong_address_is_never_tried_again(uri: str, complaint: str) -> None:
+def test_an_invalid_address_is_a_final_error(uri: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         open_device(uri, time.monotonic_ns)
 
 
-def test_no_camera_is_said() -> None:
+def test_no_camera_raises() -> None:
     assert discover(0.1) == []
     with pytest.raises(DeviceError, match="no realsense device is attached"):
         open_device("realsense://", time.monotonic_ns)
@@ -206,7 +206,7 @@ def offer(kind: str, size: tuple[int, int], fps: int, encoding: str) -> Stream:
     return Stream(ROLES[kind, 0], profile, encoding)
 
 
-def test_of_many_profiles_the_address_chooses_one_of_each_stream() -> None:
+def test_the_address_selects_one_profile_per_stream() -> None:
     offers = [offer("depth", (640, 480), fps, "z16") for fps in (30, 60)]
     offers += [offer("color", (640, 480), 30, name) for name in ("y16", "bgr8", "rgb8")]
     offers += [offer("infrared", (640, 480), 30, "y8")]
@@ -264,7 +264,7 @@ def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
         controls.set("gain", 20.0)
 
 
-def test_an_inbox_keeps_the_newest_and_counts_the_rest() -> None:
+def test_a_frame_queue_keeps_the_newest_and_counts_drops() -> None:
     inbox: FrameQueue[int] = FrameQueue(2)
     for number in range(5):
         inbox.put(number)
@@ -278,7 +278,7 @@ def test_an_inbox_keeps_the_newest_and_counts_the_rest() -> None:
     st.sampled_from(["z16", "y8", "y16", "raw8", "rgb8", "bgr8", "yuyv", ""]), st.integers(-2, 20), st.integers(-2, 20),
     st.integers(-1, 80), st.binary(max_size=600), st.sampled_from([Kind.DEPTH, Kind.IR, Kind.CONFIDENCE, Kind.COLOR]),
 )  # fmt: skip
-def test_any_bytes_are_an_image_or_refused(
+def test_arbitrary_bytes_are_an_image_or_rejected(
     name: str, width: int, height: int, stride: int, data: bytes, kind: Kind
 ) -> None:
     picture = Picture(name, width, height, stride, np.frombuffer(data, np.uint8), 0, 0.0, "", 0.001, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""A rig elsewhere is a device here: its frames as they were, on this host's clock, and its losses counted."""
+"""The remote device: unchanged frames, clock mapping, and counted losses."""
 
 import time
 from dataclasses import replace
@@ -27,7 +27,7 @@ AHEAD_NS, DRIFT = 7_000_000_000_000, 80e-6
 
 
 class Wire:
-    """A link on which a test speaks."""
+    """A fake link with messages from the test."""
 
     def __init__(self) -> None:
         self.listeners = {}
@@ -52,7 +52,7 @@ class Wire:
 
 @pytest.fixture
 def heard():
-    """Starts a device on a wire, whose clock the test moves."""
+    """Starts a device on a fake link with a manual clock."""
 
     def heard(same_clock: bool):
         wire, sink, now = Wire(), RecordingSink(), [5_000_000_000]
@@ -70,7 +70,7 @@ def frame(seq: int, t_host_ns: int, t_arrival_ns: int = 0, epoch: int = 900, whi
     return replace(FRAMES[which], seq=seq, epoch=epoch, t_host_ns=t_host_ns, t_arrival_ns=arrival_ns)
 
 
-def test_on_one_host_nothing_of_a_frame_changes_but_the_number_of_its_epoch(heard) -> None:
+def test_with_a_shared_clock_only_the_epoch_of_a_frame_changes(heard) -> None:
     device, wire, sink, _ = heard(same_clock=True)
     sent = frame(41, 1_234_567_891, t_arrival_ns=1_240_000_000)
     wire.say(sent)
@@ -82,7 +82,7 @@ def test_on_one_host_nothing_of_a_frame_changes_but_the_number_of_its_epoch(hear
     assert device.gauges == {}
 
 
-def test_times_of_another_host_are_mapped_to_this_ones_clock(heard) -> None:
+def test_host_times_of_another_host_are_mapped(heard) -> None:
     device, wire, sink, now = heard(same_clock=False)
     for k in range(600):
         exposure_ns = 5_000_000_000 + k * 33_333_333
@@ -115,7 +115,7 @@ def test_missing_and_malformed_frames_are_counted(heard) -> None:
     assert [f.seq for f in sink.frames] == [1, 2, 5, 6]
 
 
-def test_an_epoch_of_the_rig_is_one_of_the_device_and_loses_nothing(heard) -> None:
+def test_each_remote_epoch_is_one_epoch_without_losses(heard) -> None:
     device, wire, sink, _ = heard(same_clock=True)
     for epoch in (900, 950):
         for seq in (7, 8):
@@ -125,7 +125,7 @@ def test_an_epoch_of_the_rig_is_one_of_the_device_and_loses_nothing(heard) -> No
     assert device.counters["missing"] == 0
 
 
-def test_the_end_of_the_other_process_is_a_failure(heard) -> None:
+def test_the_end_of_the_remote_process_is_a_failure(heard) -> None:
     device, wire, sink, _ = heard(same_clock=True)
     wire.on_gone()
     assert device.state == DeviceState.FAILED
@@ -153,18 +153,18 @@ def test_an_address_names_host_rig_and_options() -> None:
         ("remote://a/x?shared_memory=yes", "shared_memory = 'yes' must be 0 or 1"),
     ],
 )
-def test_addresses_are_strict(uri: str, complaint: str) -> None:
+def test_invalid_addresses_raise(uri: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         open_device(uri, time.monotonic_ns)
 
 
-def test_what_cannot_be_reached_is_explained(endpoint: str) -> None:
+def test_an_unreachable_endpoint_raises_with_the_remedy(endpoint: str) -> None:
     where = endpoint.removeprefix("tcp/")
     with pytest.raises(DeviceError, match=f"nothing answers at tcp/{where} within .* is `abs-service run` running"):
         open_link(parse(f"remote://{where}/x"), timeout_s=0.2)
 
 
-def test_a_rig_that_is_not_there_is_named_with_those_that_are() -> None:
+def test_an_unknown_rig_raises_with_the_existing_ones() -> None:
     with bench() as rigs:
         with pytest.raises(
             DeviceError, match=r"remote://none is not attached; attached: remote://.*/bench.*, .*/other"
@@ -174,7 +174,7 @@ def test_a_rig_that_is_not_there_is_named_with_those_that_are() -> None:
             open_device(f"remote://127.0.0.1:{rigs.port}", time.monotonic_ns)
 
 
-def test_sensors_that_are_not_there_yet_are_awaited_not_left_out() -> None:
+def test_missing_sensors_raise_instead_of_being_omitted() -> None:
     with bench() as rigs:
         uri = f"remote://127.0.0.1:{rigs.port}/bench?learn=0.3&sensors=tof,color"
         with pytest.raises(DeviceError, match='rig "bench" has not announced color yet; announced: tof') as caught:
@@ -182,7 +182,7 @@ def test_sensors_that_are_not_there_yet_are_awaited_not_left_out() -> None:
         assert not isinstance(caught.value, FinalError)
 
 
-def test_processes_of_one_host_know_that_they_share_a_clock() -> None:
+def test_processes_of_one_host_share_a_clock() -> None:
     with bench() as rigs:
         device = rigs.open()
         assert device._same_clock  # type: ignore[attr-defined]

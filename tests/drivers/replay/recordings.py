@@ -1,4 +1,4 @@
-"""Small recordings of the simulated device, whole and damaged."""
+"""Small recordings of the simulated device, intact and corrupt."""
 
 import dataclasses
 from collections.abc import Iterable

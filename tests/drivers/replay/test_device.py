@@ -1,4 +1,4 @@
-"""A replay keeps its pace and looks like now."""
+"""Real-time playback of recordings."""
 
 import dataclasses
 import threading
@@ -20,7 +20,7 @@ from tests.drivers.replay.recordings import (
 
 
 class Sink:
-    """Keeps what it gets, and tells when the replay ended or enough has come."""
+    """A sink that sets an event at the end of the replay or after enough frames."""
 
     def __init__(self, enough: int = 1 << 30) -> None:
         self.items: list[Frame | Truth] = []
@@ -45,7 +45,7 @@ class Sink:
 
 
 class Time:
-    """A clock that moves only when someone waits."""
+    """A manual clock, advanced by waiting."""
 
     def __init__(self) -> None:
         self.now_ns = 77_000_000_000
@@ -59,7 +59,7 @@ class Time:
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0])
-def test_a_replay_keeps_its_pace_and_looks_like_now(tmp_path: Path, speed: float) -> None:
+def test_a_replay_has_real_time_pace_and_current_times(tmp_path: Path, speed: float) -> None:
     items = recorded(6)
     time, sink = Time(), Sink()
     device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), speed, False, time.clock, time.wait)
@@ -82,7 +82,7 @@ def test_a_replay_keeps_its_pace_and_looks_like_now(tmp_path: Path, speed: float
     assert {(s.width, s.height) for s in device.capabilities.streams} == {(32, 24)}
 
 
-def test_a_replay_can_give_those_who_watch_time_to_get_ready(tmp_path: Path) -> None:
+def test_a_replay_can_be_delayed(tmp_path: Path) -> None:
     time, sink = Time(), Sink()
     recording = Recording(write(tmp_path / "a.mcap", recorded(2)))
     device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait, delay_s=6.0)
@@ -95,7 +95,7 @@ def test_a_replay_can_give_those_who_watch_time_to_get_ready(tmp_path: Path) -> 
         open_device(f"replay://{recording.path}?delay=-1", time.clock)
 
 
-def test_every_round_of_a_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
+def test_every_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
     items = [item if isinstance(item, Truth) else dataclasses.replace(item, epoch=7_000_000) for item in recorded(2)]
     time, sink = Time(), Sink(enough=20)
     device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), 1.0, True, time.clock, time.wait)
@@ -113,7 +113,7 @@ def test_every_round_of_a_loop_and_every_start_is_a_new_epoch(tmp_path: Path) ->
     assert first.epoch > epochs[-1]
 
 
-def test_a_replay_of_a_damaged_file_fails_with_the_reason(tmp_path: Path) -> None:
+def test_a_replay_of_a_corrupt_file_fails_with_the_reason(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(20))
     device = open_device(f"replay://{path}?speed=100", Time().clock)
     damage(path)
@@ -143,7 +143,7 @@ def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("pace=1", r"unknown key 'pace'; allowed are \['delay', 'loop', 'speed'\]"),
     ],
 )
-def test_addresses_are_strict(query: str, complaint: str) -> None:
+def test_invalid_addresses_raise(query: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
         open_device(f"replay://a.mcap?{query}", Time().clock)
 

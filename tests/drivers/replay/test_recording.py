@@ -1,4 +1,4 @@
-"""A recording gives back what was recorded, in order, whatever happened to the file."""
+"""Offline reading of recordings, in order, also from truncated and corrupt files."""
 
 import dataclasses
 from collections.abc import Iterable
@@ -38,7 +38,7 @@ def assert_same(left: Iterable[Frame | Truth], right: Iterable[Frame | Truth]) -
             np.testing.assert_array_equal(a.points_r, b.points_r)
 
 
-def test_everything_comes_back_in_order(tmp_path: Path) -> None:
+def test_frames_and_truths_are_read_in_order(tmp_path: Path) -> None:
     items = recorded(10)
     recording = Recording(write(tmp_path / "a.mcap", items))
     assert_same(recording.frames(), items)
@@ -54,7 +54,7 @@ def test_everything_comes_back_in_order(tmp_path: Path) -> None:
     assert recording.models["tof"].noise == "gaussian_polynomial"
 
 
-def test_messages_that_were_written_late_are_put_in_their_place(tmp_path: Path) -> None:
+def test_late_messages_are_sorted(tmp_path: Path) -> None:
     items = recorded(30)
     late = [item for item in items if isinstance(item, Frame) and item.sensor == "color" and item.seq < 10]
     rest = [item for item in items if not any(item is other for other in late)]
@@ -74,7 +74,7 @@ def test_a_killed_recorder_leaves_a_readable_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.77, 0.95])
-def test_a_truncated_file_gives_what_is_there(tmp_path: Path, share: float) -> None:
+def test_a_truncated_file_is_read_up_to_the_truncation(tmp_path: Path, share: float) -> None:
     items = recorded(20)
     path = write(tmp_path / "a.mcap", items)
     whole = path.read_bytes()
@@ -88,7 +88,7 @@ def test_a_truncated_file_gives_what_is_there(tmp_path: Path, share: float) -> N
     assert {(item.seq, type(item)) for item in found} <= {(item.seq, type(item)) for item in items}
 
 
-def test_a_damaged_chunk_is_named(tmp_path: Path) -> None:
+def test_a_corrupt_chunk_is_named(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(20))
     damage(path)
     recording = Recording(path)
@@ -96,7 +96,7 @@ def test_a_damaged_chunk_is_named(tmp_path: Path) -> None:
         list(recording.frames())
 
 
-def test_damaged_chunks_of_an_unfinished_file_are_left_out_and_counted(tmp_path: Path) -> None:
+def test_corrupt_chunks_of_an_unfinished_file_are_skipped_and_counted(tmp_path: Path) -> None:
     items = recorded(20)
     path = write(tmp_path / "a.mcap", items, finish=False)
     assert Recording(path).damaged_chunks == 0
@@ -106,7 +106,7 @@ def test_damaged_chunks_of_an_unfinished_file_are_left_out_and_counted(tmp_path:
     assert 0 < len(list(recording.frames())) < len(items)
 
 
-def test_an_image_without_its_description_is_counted(tmp_path: Path) -> None:
+def test_an_image_without_metadata_is_counted(tmp_path: Path) -> None:
     items = recorded(3)
     path = tmp_path / "a.mcap"
     with path.open("wb") as stream:
@@ -162,7 +162,7 @@ def impossible(path: Path) -> None:
         (impossible, "the model of sensor 'tof' is no camera: fx and fy must be positive"),
     ],
 )
-def test_errors_name_the_file_and_what_is_wrong(tmp_path: Path, make, complaint: str) -> None:
+def test_errors_name_the_file_and_the_problem(tmp_path: Path, make, complaint: str) -> None:
     path = tmp_path / "broken.mcap"
     make(path)
     with pytest.raises(RecordingError, match=rf"broken\.mcap: .*{complaint}|broken\.mcap: {complaint}"):

@@ -1,4 +1,4 @@
-"""The light barrier tells whether something is in its beam, and errs as often as it declares."""
+"""The light barrier: detection of bodies in the beam, and declared error rates."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_it_is_interrupted_where_the_sheet_is_in_the_beam() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_it_is_free_at_rest_and_interrupted_a_good_part_of_the_time(seed: int) -> None:
+def test_it_is_free_at_rest_and_interrupted_during_motion(seed: int) -> None:
     simulation, barrier = build(f"seed={seed}")
     assert not barrier.interrupted(simulation.scene.at(0.5))
     states = [barrier.interrupted(simulation.scene.at(t)) for t in np.arange(4, 24, 0.2)]
@@ -61,7 +61,7 @@ def test_a_hand_interrupts_it_as_well() -> None:
     assert 3 < sum(by_hand) < 60
 
 
-def test_it_errs_as_often_as_it_declares() -> None:
+def test_the_error_rates_are_as_declared() -> None:
     simulation, barrier = build("seed=5&noise=10&speed=2")
     assert barrier.noise == BarrierNoise(miss=0.1, false_alarm=0.1)
     exposures = range(120, 1320, 2)
@@ -78,7 +78,7 @@ def test_without_noise_it_never_errs() -> None:
         assert report(simulation, k).si()[0, 0] == float(barrier.interrupted(simulation.scene.at(k / 30)))
 
 
-def test_its_frame_is_one_pixel_of_yes_or_no_and_travels_as_one() -> None:
+def test_its_frame_is_one_binary_pixel_and_round_trips() -> None:
     simulation, barrier = build("seed=1")
     frame = report(simulation, 130)
     assert (frame.kind, frame.encoding, frame.unit, frame.data.shape) == (Kind.BINARY, "mono8", "1", (1, 1))

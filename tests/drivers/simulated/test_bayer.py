@@ -1,4 +1,4 @@
-"""The Bayer head measures the channel of each filter, of a scene that may be out of focus and finely printed."""
+"""The Bayer head: filter patterns, defocus, crosstalk and fine prints."""
 
 import numpy as np
 import pytest
@@ -31,12 +31,12 @@ def test_the_mosaic_is_one_channel_per_pixel_of_the_colour_image(order: str) -> 
             np.testing.assert_array_equal(mosaic[row::2, column::2], rgb[row::2, column::2, channel])
 
 
-def test_an_order_that_is_not_given_is_grbg() -> None:
+def test_the_default_order_is_grbg() -> None:
     assert build("sensors=bayer").heads["bayer"].streams[0].encoding == "bayer_grbg8"
 
 
 @given(st.floats(0.8, 3))
-def test_defocus_makes_a_point_a_gaussian_and_loses_no_light(blur: float) -> None:
+def test_defocus_is_a_gaussian_and_preserves_intensity(blur: float) -> None:
     points = np.zeros((61, 61, 3), np.float32)
     points[30, 30] = 1000
     spread = Mosaic(blur_px=blur).expose(points)
@@ -67,7 +67,7 @@ def test_the_fine_print_has_details_of_one_to_three_pixels() -> None:
     assert 1.5 < widths["fine"] < 3.5 < widths["smooth"]
 
 
-def test_a_pixel_of_a_fine_print_is_the_mean_of_what_it_covers() -> None:
+def test_a_pixel_of_a_fine_print_is_the_mean_over_its_area() -> None:
     simulation = build("texture=fine&sensors=color")
     camera, moment = Camera(96, 72, 275.0, 275.0, 47.5, 35.5), simulation.scene.at(3.0)
     dense = Picture(camera, simulation.scene, samples=12).take(moment)

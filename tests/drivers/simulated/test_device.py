@@ -1,4 +1,4 @@
-"""The simulated device delivers on time, counts what it is late for, and understands its address or says why not."""
+"""The simulated device: timing, counting of late exposures, and validation of addresses."""
 
 import threading
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from drivers.simulated.device import SimulatedDevice
 
 @dataclass
 class Recorder:
-    """A sink that keeps everything and tells when it has enough."""
+    """A sink that sets an event after enough frames."""
 
     enough: int
     frames: list[Frame] = field(default_factory=list)
@@ -40,7 +40,7 @@ class Recorder:
 
 @dataclass
 class Time:
-    """A clock that only moves when someone waits, and a wait that takes as long as it is told."""
+    """A manual clock, advanced by waiting."""
 
     now_ns: int = 5_000_000_000
     delays: dict[int, int] = field(default_factory=dict)
@@ -80,7 +80,7 @@ def test_exposures_arrive_when_they_are_due() -> None:
     assert [truth.t_host_ns for truth in sink.truths[:3]] == [frame.t_host_ns for frame in sink.frames[:9:3]]
 
 
-def test_exposures_that_are_overdue_are_delivered_late_and_with_their_own_stamps() -> None:
+def test_overdue_exposures_are_delivered_late_with_their_own_timestamps() -> None:
     device, sink = run(SMALL, Time(delays={1: 110_000_000}), 18)  # 3.3 periods at 30 Hz
     assert [truth.seq for truth in sink.truths][:6] == [0, 1, 2, 3, 4, 5]
     assert [frame.t_host_ns for frame in sink.frames[::3]][:6] == [
@@ -90,13 +90,13 @@ def test_exposures_that_are_overdue_are_delivered_late_and_with_their_own_stamps
     assert device.counters["late"] == 0
 
 
-def test_exposures_for_which_there_is_no_buffer_are_skipped_and_counted() -> None:
+def test_overdue_exposures_beyond_the_buffer_are_skipped_and_counted() -> None:
     device, sink = run(SMALL, Time(delays={1: 210_000_000}), 12)  # 6.3 periods at 30 Hz
     assert [truth.seq for truth in sink.truths][:4] == [0, 1, 7, 8]
     assert device.counters["late"] == 5
 
 
-def test_a_fault_that_passes_loses_what_it_says() -> None:
+def test_a_temporary_fault_loses_the_declared_frames() -> None:
     device, sink = run(f"{SMALL}&fault=drop@2", Time(), 12)
     assert [truth.seq for truth in sink.truths][:4] == [0, 1, 3, 5]
     assert device.counters["lost"] >= 3 * 2

@@ -1,4 +1,4 @@
-"""The page about the simulated device names everything that an address may say."""
+"""docs/simulation.md documents all keys of the addresses."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ TABLES = {
 }
 
 
-def test_scenes_heads_and_keys_are_those_there_are() -> None:
+def test_scenes_heads_and_keys_are_documented() -> None:
     assert TABLES["Scenes"] == set(SCENES)
     assert TABLES["Heads"] == {*OPTICS, *BEAMS}
     assert TABLES["Keys"] == set(KEYS) - set(OPTICS)
@@ -29,6 +29,6 @@ def test_defaults_are_those_of_the_address() -> None:
         assert KEYS[key](value) == expected, key
 
 
-def test_the_beam_is_as_long_as_the_page_says() -> None:
+def test_the_documented_beam_length() -> None:
     (length,) = {float(number) for number in re.findall(r"length_m = ([\d.]+)", PAGE)}
     assert abs(BEAMS["barrier"].length_m - length) < 1e-4

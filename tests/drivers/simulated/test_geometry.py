@@ -1,4 +1,4 @@
-"""The simulated sheet is isometric, moves smoothly, and what the kernels see is where its points are."""
+"""The simulated sheet: isometry, smooth motion, and ray casting."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_the_first_fundamental_form_is_the_identity(placement: Placement) -> Non
 
 
 @given(PLACEMENTS)
-def test_lines_of_sight_end_at_the_material_point_they_report(placement: Placement) -> None:
+def test_rays_end_at_the_reported_material_point(placement: Placement) -> None:
     T_bs = np.ascontiguousarray(pose.inverse(placement.T_rb))
     sight, share = cast(CAMERA.rays(), T_bs, shape_of(placement))
     distance, a, b, cosine = sight.astype(float)
@@ -98,8 +98,8 @@ def test_the_cosine_of_incidence_is_that_of_the_normal(placement: Placement) -> 
     np.testing.assert_allclose(cosine, expected, atol=1e-5)
 
 
-def test_the_nearest_of_two_intersections_is_seen() -> None:
-    """Seen from its side, both flanks of a strongly bent sheet lie on one line of sight."""
+def test_the_nearest_of_two_intersections_is_returned() -> None:
+    """In the side view of a strongly bent sheet, both flanks lie on one ray."""
     placement = Placement(pose.from_rotation_vector((0, np.pi / 2, 0), (0, 0, 1)), curvature=12.0)
     ray = np.array([[[0.02, 0.0, 1.0]]]) / np.hypot(0.02, 1.0)
     distance = cast(ray, np.ascontiguousarray(pose.inverse(placement.T_rb)), shape_of(placement))[0][0, 0, 0]
@@ -116,8 +116,8 @@ def test_the_nearest_of_two_intersections_is_seen() -> None:
 
 
 @pytest.mark.parametrize("lens", [Lens(), Lens(np.array([-0.2, 0.05, 0.001, -0.001]))])
-def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
-    """The shares of all pixels add up to the projected area of the flat sheet."""
+def test_the_coverage_of_rims_is_their_area(lens: Lens) -> None:
+    """The coverage of all pixels adds up to the projected area of the flat sheet."""
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5, lens)
     (sight,) = View(SHEET, camera).look(moment(Placement(pose.from_rotation_vector((0, 0, 0.3), (0, 0, 1)))))
     corners = [(-0.15, -0.1), (0.15, -0.1), (0.15, 0.1), (-0.15, 0.1)]
@@ -129,7 +129,7 @@ def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
     assert np.any((sight.share > 0) & (sight.share < 1))
 
 
-def test_a_sheet_out_of_sight_is_an_empty_region() -> None:
+def test_a_sheet_out_of_view_is_an_empty_region() -> None:
     view = View(SHEET, CAMERA)
     for elsewhere in ((5.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
         assert view.look(moment(Placement(pose.from_rotation_vector((0, 0, 0), elsewhere))))[0].share.size == 0

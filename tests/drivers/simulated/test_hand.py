@@ -1,4 +1,4 @@
-"""The hand in front of the sheet is where its kernels see it, keeps its distance, and hides a quarter in passing."""
+"""The simulated hand: ray casting, clearance, and occlusion."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def clearance(points: np.ndarray, capsules: np.ndarray) -> np.ndarray:
 
 
 def march(rays: np.ndarray, capsules: np.ndarray) -> np.ndarray:
-    """Distance at which rays meet the capsules, by walking as far as nothing can be; beyond 2 m where they miss."""
+    """Distance to the capsules by ray marching (reference); beyond 2 m for a miss."""
     distance = np.zeros(rays.shape[:-1])
     for _ in range(200):
         distance = np.minimum(distance + clearance(rays * distance[..., None], capsules), 3.0)
@@ -52,7 +52,7 @@ def march(rays: np.ndarray, capsules: np.ndarray) -> np.ndarray:
 
 @settings(max_examples=25)
 @given(CAPSULES)
-def test_lines_of_sight_end_where_walking_along_them_does(capsules: np.ndarray) -> None:
+def test_ray_distances_agree_with_ray_marching(capsules: np.ndarray) -> None:
     share, distance, cosine, part = cast_capsules(RAYS, capsules)
     expected = march(RAYS, capsules)
     seen = (share == 1) & (cosine > 0.2)
@@ -69,7 +69,7 @@ def test_lines_of_sight_end_where_walking_along_them_does(capsules: np.ndarray) 
 
 
 @given(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.12, 0.12), st.floats(0.9, 1.3)), st.floats(0.03, 0.1))
-def test_the_shares_of_a_ball_add_up_to_its_outline(center: tuple[float, float, float], radius: float) -> None:
+def test_the_coverage_of_a_ball_is_its_projected_area(center: tuple[float, float, float], radius: float) -> None:
     share = cast_capsules(FINE_RAYS, np.array([(*center, 0.0, 0.0, 0.0, radius)]))[0]
     away = np.linalg.norm(center)
     # A cone of half angle α about a direction that is θ off the axis cuts an ellipse out of the plane z = 1.
@@ -79,7 +79,9 @@ def test_the_shares_of_a_ball_add_up_to_its_outline(center: tuple[float, float, 
 
 
 @given(CAPSULES, st.tuples(*[st.floats(-0.1, 0.1)] * 3))
-def test_shadow_is_what_the_light_does_not_see(capsules: np.ndarray, light: tuple[float, float, float]) -> None:
+def test_the_shadow_is_the_region_not_visible_from_the_light(
+    capsules: np.ndarray, light: tuple[float, float, float]
+) -> None:
     points = np.array(light) + RAYS * 1.8
     relative = capsules - [*light, 0, 0, 0, 0]
     share = cast_capsules(RAYS, relative)[0]
@@ -89,7 +91,7 @@ def test_shadow_is_what_the_light_does_not_see(capsules: np.ndarray, light: tupl
 
 
 @pytest.mark.parametrize("scene", ["sheet", "board"])
-def test_the_hand_is_not_there_in_the_first_second(scene: str) -> None:
+def test_the_hand_is_out_of_view_in_the_first_second(scene: str) -> None:
     heads = "seed=2&sensors=tof,structured_light,color,bayer,ir"
     alone, crossed = build(heads, scene), build(f"{heads}&occluder=hand", scene)
     for k in (0, 15, 30):
@@ -98,7 +100,7 @@ def test_the_hand_is_not_there_in_the_first_second(scene: str) -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
-def test_it_hides_a_quarter_in_the_middle_of_its_pass_and_touches_nothing(seed: int) -> None:
+def test_it_occludes_a_quarter_in_the_middle_of_its_pass_without_contact(seed: int) -> None:
     scene = build(f"seed={seed}&occluder=hand").scene
     hand = hand_of(build(f"seed={seed}&occluder=hand"))
     for t in hand.crossings(4):
@@ -111,7 +113,7 @@ def test_it_hides_a_quarter_in_the_middle_of_its_pass_and_touches_nothing(seed: 
         assert 0.08 < nearest - hand.at(t).T_rh[2, 3] < 0.12
 
 
-def test_what_is_hidden_is_seen_nearer_and_the_rest_as_it_is() -> None:
+def test_occluded_pixels_are_nearer_and_the_others_unchanged() -> None:
     simulation = build("seed=1&occluder=hand&sensors=tof,structured_light&noise=0&tof=352x288&structured_light=640x480")
     k = round(30 * hand_of(simulation).crossings(1)[0])
     frames, truth = simulation.expose(k)
@@ -142,7 +144,7 @@ def test_every_head_sees_it_and_its_shadow_lies_beside_it() -> None:
     assert lost[1] > lost[0] + 300
 
 
-def test_at_rest_it_stays_away() -> None:
+def test_with_speed_zero_it_stays_out_of_view() -> None:
     still = build("speed=0&occluder=hand&sensors=tof").scene
     assert still.at(100.0).occluders[0].outline()[..., 0].min() > 0.5 or (
         still.at(100.0).occluders[0].outline()[..., 0].max() < -0.5

@@ -1,4 +1,4 @@
-"""Two sheets stay apart, each with a truth of its own; what leaves or turns does so when it is told."""
+"""Scenes with two sheets, and excursions."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_the_sheets_of_a_pair_stay_apart_and_in_view(seed: int, bend: int) -> No
             assert right[..., 0].max() < head.camera.width - 1
 
 
-def test_each_sheet_of_a_pair_moves_and_looks_its_own_way() -> None:
+def test_each_sheet_of_a_pair_has_its_own_motion_and_texture() -> None:
     simulation = build("pair", "sensors=color&noise=0&color=640x480")
     moved = [[truth.points_r for truth in simulation.truths(k)] for k in (0, 150)]
     steps = [after - before for before, after in zip(*moved)]
@@ -56,7 +56,7 @@ def test_time_of_flight_measures_both_truths(k: int) -> None:
 
 
 class Log:
-    """A sink that keeps the truths and stops the device."""
+    """A sink that records the truths and stops the device."""
 
     def __init__(self) -> None:
         self.truths: list[Truth] = []
@@ -71,7 +71,7 @@ class Log:
     def on_warning(self, condition: str, message: str) -> None: ...
 
 
-def test_the_device_tells_the_truth_about_both() -> None:
+def test_the_device_delivers_the_truth_of_both() -> None:
     log = Log()
     simulation = build("pair", "sensors=tof&tof=32x24")
     waits = iter([False, True])
@@ -82,7 +82,7 @@ def test_the_device_tells_the_truth_about_both() -> None:
 
 
 @pytest.mark.parametrize("scene", ["sheet", "board", "pair", "strip"])
-def test_what_leaves_is_out_of_every_view_from_then_to_then(scene: str) -> None:
+def test_a_leaving_surface_is_out_of_every_view_in_the_interval(scene: str) -> None:
     heads = "sensors=tof,structured_light,color,bayer,ir,barrier&noise=0&lens=-0.25,0.06"
     simulation, usual = build(scene, f"{heads}&leave=3,5"), build(scene, heads)
     for k in (91, 120, 149):
@@ -100,7 +100,7 @@ def test_what_leaves_is_out_of_every_view_from_then_to_then(scene: str) -> None:
 
 
 @pytest.mark.parametrize("scene", ["sheet", "board", "pair"])
-def test_what_turns_does_so_by_a_right_angle_in_a_quarter_of_a_second(scene: str) -> None:
+def test_a_turn_is_a_right_angle_in_a_quarter_of_a_second(scene: str) -> None:
     turning, usual = build(scene, "sensors=tof&turn=4&seed=2"), build(scene, "sensors=tof&seed=2")
     for t, share in ((3.99, 0), (4.125, 0.5), (4.26, 1), (9, 1)):
         for surface, expected in zip(turning.scene.at(t).surfaces, usual.scene.at(t).surfaces):

@@ -1,4 +1,4 @@
-"""What the simulated heads deliver follows the laws they declare."""
+"""The simulated heads follow their declared noise models."""
 
 import numpy as np
 import pytest
@@ -97,7 +97,7 @@ def test_structured_light_has_holes_at_the_rim_and_in_the_shadow() -> None:
     assert np.count_nonzero(holes > sheet[-1]) <= 1
 
 
-def test_deviation_and_offset_of_time_of_flight_follow_the_declared_law() -> None:
+def test_sigma_and_offset_of_time_of_flight_follow_the_declared_model() -> None:
     simulation = build("sensors=tof&offset=0.02")
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
@@ -116,7 +116,7 @@ def test_deviation_and_offset_of_time_of_flight_follow_the_declared_law() -> Non
     assert 0.0025 < depths[:, shining].std(axis=0).mean() < 0.004
 
 
-def test_the_published_polynomial_is_the_law() -> None:
+def test_the_published_polynomial_fits_the_model() -> None:
     noise = TimeOfFlightNoise()
     model = GaussianPolynomial(sigma=SIGMA_POLYNOMIAL)
     x, a = np.meshgrid(np.linspace(0.6, 2.0, 8), np.linspace(2000, 10000, 50))
@@ -124,7 +124,7 @@ def test_the_published_polynomial_is_the_law() -> None:
     assert np.max(np.abs(model.deviation(x, a, pixels) - noise.sigma(x, a))) < 3e-4
 
 
-def test_weak_returns_are_dropped_and_only_they() -> None:
+def test_exactly_the_weak_returns_are_invalid() -> None:
     simulation = build("sensors=tof&noise=0")
     frames, _ = expose(simulation, 0)
     depth, amplitude = frames["tof/depth"], frames["tof/amplitude"].si()
@@ -134,7 +134,7 @@ def test_weak_returns_are_dropped_and_only_they() -> None:
     assert np.all(amplitude[~lost] >= 500)
 
 
-def test_pixels_at_the_rim_fly_between_sheet_and_wall() -> None:
+def test_flying_pixels_are_between_sheet_and_wall() -> None:
     simulation = build("sensors=tof&noise=0")
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
@@ -158,7 +158,7 @@ def test_the_amplitude_falls_with_the_square_of_the_distance() -> None:
     assert np.percentile(reflectivity, 95) == pytest.approx(0.85, abs=0.01)
 
 
-def test_infrared_is_what_comes_back_of_the_sensors_own_light() -> None:
+def test_infrared_is_the_returned_intensity() -> None:
     simulation = build("sensors=tof,ir&noise=0&ir=176x144")
     tof, ir = simulation.heads["tof"], simulation.heads["ir"]
     assert ir.camera.fx != tof.camera.fx
@@ -197,7 +197,7 @@ def test_colour_noise_has_the_declared_deviation() -> None:
     assert np.sqrt(images.var(axis=0, ddof=1)[mid].mean()) == pytest.approx(2.5, abs=0.05)
 
 
-def test_all_heads_share_the_instant_and_stamps_jitter_only_if_asked() -> None:
+def test_all_heads_share_the_exposure_time_and_jitter_is_opt_in() -> None:
     exact, _ = expose(build(ALL), 7)
     assert {frame.t_host_ns for frame in exact.values()} == {round(7e9 / 30)}
     assert {frame.seq for frame in exact.values()} == {7}

@@ -1,4 +1,4 @@
-"""The sagging strip is in equilibrium, and what the kernels see is where its points are."""
+"""The sagging strip: equilibrium and ray casting."""
 
 import numpy as np
 import pytest
@@ -84,8 +84,8 @@ def test_chords_are_as_long_as_the_strip_and_near_its_curve(clamp: float, load: 
 
 
 @pytest.mark.parametrize("k", [0, 150, 300])
-def test_every_part_carries_what_hangs_beyond_it(k: int) -> None:
-    """The moment from the curvature of the true points is that of the weight beyond, which acts along the rig's y."""
+def test_the_bending_moment_balances_the_weight_beyond(k: int) -> None:
+    """The bending moment from the curvature equals that of the weight beyond, which acts along the rig's y axis."""
     simulation = build("sensors=tof&stiffness=0.02&weight=0.4")
     line = simulation.scene.at(k / 30).surfaces[0].grid(3, 129)[1]  # as many points as the curve has nodes
     step = 0.30 / 128
@@ -98,7 +98,7 @@ def test_every_part_carries_what_hangs_beyond_it(k: int) -> None:
 
 @settings(max_examples=25)
 @given(PLACED)
-def test_lines_of_sight_end_at_material_points(strip: PlacedStrip) -> None:
+def test_rays_end_at_material_points(strip: PlacedStrip) -> None:
     seen = strip.cast(RAYS, pose.identity())
     hit = seen.share == 1
     assert hit.any()
@@ -126,7 +126,7 @@ def test_the_texture_stays_on_the_material(strip: PlacedStrip) -> None:
 
 
 @pytest.mark.parametrize("lens", [Lens(), Lens(np.array([-0.2, 0.05]))])
-def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
+def test_the_coverage_of_rims_is_their_area(lens: Lens) -> None:
     camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5, lens)
     strip = STILL.scene.at(0.0).surfaces[0]
     share = strip.cast(np.ascontiguousarray(camera.rays()), pose.identity()).share
@@ -139,7 +139,9 @@ def test_rims_are_filled_by_the_area_they_cover(lens: Lens) -> None:
 
 @settings(max_examples=25)
 @given(PLACED, st.tuples(*[st.floats(-0.1, 0.1)] * 3))
-def test_shadow_is_what_the_light_does_not_see(strip: PlacedStrip, light: tuple[float, float, float]) -> None:
+def test_the_shadow_is_the_region_not_visible_from_the_light(
+    strip: PlacedStrip, light: tuple[float, float, float]
+) -> None:
     T_rs = pose.from_rotation_vector((0, 0, 0), light)
     share = strip.cast(RAYS, T_rs).share
     dark = strip.shadowed(RAYS * 2.5, np.zeros(3), T_rs)
@@ -160,7 +162,7 @@ def test_without_noise_the_truth_is_what_time_of_flight_measures(k: int, lens: s
     assert np.max(away) < 3e-3
 
 
-def test_it_rests_for_a_second_and_then_its_sag_changes() -> None:
+def test_it_is_at_rest_for_a_second_before_the_sag_changes() -> None:
     strip = strip_of(build("seed=3"))
     at_rest = [strip.at(t).grid(3, 31) for t in (0, 0.5, 1.0)]
     assert all(np.array_equal(grid, at_rest[0]) for grid in at_rest)
@@ -177,7 +179,7 @@ def test_it_rests_for_a_second_and_then_its_sag_changes() -> None:
     np.testing.assert_allclose(gripper[:3, 1], (clamp[2, 0] - clamp[0, 0]) / 0.05, atol=1e-9)
 
 
-def test_without_speed_it_stays_as_it_is() -> None:
+def test_with_speed_zero_it_is_static() -> None:
     assert np.array_equal(STILL.expose(0)[1].points_r, STILL.expose(900)[1].points_r)
     sheet = parse("simulated://sheet?speed=0&sensors=tof").build()
     assert np.array_equal(sheet.expose(0)[1].points_r, sheet.expose(900)[1].points_r)

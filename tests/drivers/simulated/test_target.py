@@ -22,7 +22,7 @@ def pixels_of(frame: Frame) -> NDArray[np.integer]:
 
 
 @pytest.mark.parametrize("board", sorted(TARGETS))
-def test_corners_are_where_the_true_pose_says(board: str) -> None:
+def test_corners_agree_with_the_true_pose(board: str) -> None:
     made = simulation(board, "sensors=color,ir", "color=640x480", "ir=640x480", "rate=0.5", "seed=3")
     target = TARGETS[board]
     for k in (0, 1, 2):
@@ -69,6 +69,6 @@ def test_it_is_held_still_moved_and_held_still() -> None:
     assert not still(2.4, 2.5)
 
 
-def test_keys_of_the_board_mean_nothing_elsewhere() -> None:
+def test_keys_of_the_board_are_errors_in_other_scenes() -> None:
     with pytest.raises(AddressError, match="board means nothing in 'sheet'"):
         parse("simulated://sheet?board=circles")

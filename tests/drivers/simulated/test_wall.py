@@ -1,4 +1,4 @@
-"""A bare wall is where its address says, for every head, and a sensor errs on it by its declared law."""
+"""The bare wall: pose in every head, and declared noise models."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_the_amplitude_is_that_of_the_reflectivity() -> None:
     np.testing.assert_allclose(amplitudes[1] / amplitudes[0], 4, rtol=2e-3)
 
 
-def test_the_offset_wiggles_grows_on_dark_surfaces_and_has_a_fixed_pattern() -> None:
+def test_wiggling_amplitude_dependent_and_fixed_pattern_offsets() -> None:
     simulation = build("noise=0&offset=0.01&wiggle=0.005&dark=-8&pattern=0.003&reflectivity=0.6&sensors=tof&seed=5")
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
@@ -44,7 +44,7 @@ def test_the_offset_wiggles_grows_on_dark_surfaces_and_has_a_fixed_pattern() -> 
     np.testing.assert_allclose(pattern, other.pattern, atol=2e-4)  # the sensor's, whatever it looks at
 
 
-def test_nothing_moves_and_nothing_is_to_be_tracked() -> None:
+def test_the_scene_is_static_without_tracked_surfaces() -> None:
     simulation = build("noise=0")
     assert simulation.truths(100) == []
     for early, late in zip(simulation.frames(0), simulation.frames(500), strict=True):

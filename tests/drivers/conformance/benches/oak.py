@@ -1,4 +1,4 @@
-"""depthai playing what it recorded; what goes wrong happens between its queues and the driver."""
+"""Playback by depthai; faults are injected between its queues and the driver."""
 
 import shutil
 import tempfile
@@ -25,7 +25,7 @@ SAMPLE = Path(__file__).parents[4] / "recordings" / "sample_oak"
 
 
 class FaultyQueue:
-    """A queue of depthai that shows a fault after its first images."""
+    """A depthai queue with a fault after its first images."""
 
     def __init__(self, queue: Queue, fault: Fault, connection: Connection) -> None:
         self._queue = queue

@@ -1,4 +1,4 @@
-"""librealsense's own software device."""
+"""The software device of librealsense."""
 
 import time
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from tests.drivers.realsense.software_camera import SoftwareCamera
 
 
 class Pluggable:
-    """A software device that can be taken away."""
+    """A software device that can be unplugged."""
 
     def __init__(self, camera: SoftwareCamera) -> None:
         self._camera = camera

@@ -1,4 +1,4 @@
-"""Rigs that are captured elsewhere: here by threads of the test, over zenoh as ever."""
+"""Remote rigs, published over zenoh by threads of the test."""
 
 import socket
 import threading
@@ -30,7 +30,7 @@ LASTS = 20
 
 
 class Peer:
-    """Captures one rig: publishes what a camera sees, with faults on demand."""
+    """Publishes the frames of one rig, with fault injection."""
 
     def __init__(self, rig: str, endpoint: str, role: Role) -> None:
         self.bus = ZenohBus.open(rig, endpoint, role, shared_memory=False)
@@ -48,11 +48,11 @@ class Peer:
         self.thread.start()
 
     def arm(self, fault: Fault) -> None:
-        """From a moment on, this goes wrong."""
+        """Activates a fault."""
         self.begin, self.fault = self.seq + AFTER, fault
 
     def heal(self) -> None:
-        """Captures again, if it has ceased to."""
+        """Resumes publishing after a fault."""
         if self.fault == Fault.UNPLUG:
             self.alive.close()
             self.alive = self.bus.declare_liveliness("capture")

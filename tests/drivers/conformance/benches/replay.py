@@ -1,4 +1,4 @@
-"""Recordings as devices: what goes wrong is in the file."""
+"""Recordings as devices, with faults in the file."""
 
 import tempfile
 import time

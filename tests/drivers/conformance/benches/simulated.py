@@ -1,4 +1,4 @@
-"""The simulated device, which can be told to go wrong."""
+"""The simulated device with its own fault injection."""
 
 import time
 from collections.abc import Iterator

@@ -29,7 +29,7 @@ _ROOT_HUB = (
 
 
 def why_not() -> str:
-    """Why there can be no testbed here; "" if there can."""
+    """Reason why the testbed is unavailable; "" if it is available."""
     return "" if shutil.which("umockdev-run") else "umockdev-run is not installed: apt install umockdev"
 
 
