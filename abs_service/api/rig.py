@@ -5,7 +5,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from abs_service import config
+from abs_service import config, wiring
 from abs_service.api.errors import ArgumentError
 from abs_service.api.tracker import Tracker
 from calib.camera import Camera
@@ -32,7 +32,7 @@ class Rig:
         self.name = settings.name
         self.sensors = tuple(settings.sensors)
         self.trackers = tuple(settings.trackers)
-        self.cameras = self._cameras(cameras)
+        self.cameras: Mapping[str, Camera] = wiring.cameras(settings, cameras)
         self.noise: Mapping[str, Any] = {
             name: table.noise for name, table in settings.sensors.items() if table.noise is not None
         }
@@ -60,7 +60,7 @@ class Rig:
             name = self.trackers[0]
         if name not in self.trackers:
             raise ArgumentError(f"name = {name!r}: the rig has {', '.join(self.trackers) or 'no trackers'}")
-        known = dict(self.cameras) | self._cameras(cameras)
+        known = wiring.cameras(self._settings, {**self.cameras, **cameras})
         for sensor in self._settings.trackers[name].sensors:
             if sensor not in known:
                 raise ArgumentError(
@@ -68,11 +68,6 @@ class Rig:
                     f'pass cameras={{"{sensor}": Camera(…)}}'
                 )
         return Tracker.configured(self._settings, name, known, geometry, bayer, budget_ms)
-
-    def _cameras(self, given: Mapping[str, Camera]) -> dict[str, Camera]:
-        tables = {name: table.camera for name, table in self._settings.sensors.items()}
-        own = {name: camera for name, table in tables.items() if (camera := table.own()) is not None}
-        return own | {name: table.applied_to(given[name]) for name, table in tables.items() if name in given}
 
 
 def load_rig(path: str | Path) -> Rig:

@@ -184,9 +184,7 @@ class Tracker:
             raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
         self._region.mask = None
         synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
-        for frame in recording.frames():
-            yield from map(self._track, synchroniser.add(frame))
-        yield from map(self._track, synchroniser.flush())
+        yield from map(self._track, synchroniser.group(recording.frames()))
 
     def reinitialize(self) -> None:
         """Looks for the object anew in the next frame; safe from any thread."""

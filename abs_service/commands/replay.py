@@ -106,12 +106,7 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     Raises:
         ReplayOptionError: the recording lacks images that the tracker needs.
     """
-    cameras = {
-        sensor: settings.sensors[sensor].camera.applied_to(camera)
-        for sensor, camera in recording.cameras.items()
-        if sensor in settings.sensors
-    }
-    rig = wiring.rig(settings, name, cameras)
+    rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
     members = streams(rig.sensors.values())
     missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
     if missing:

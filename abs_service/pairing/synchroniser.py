@@ -2,7 +2,7 @@
 
 from bisect import insort
 from collections import Counter, deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -74,6 +74,12 @@ class Synchroniser:
             offset_ns = self._offsets_ns.get(frame.sensor, 0)
             self._insert(stream, replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
         return self._form()
+
+    def group(self, frames: Iterable[Frame]) -> Iterator[FrameSet]:
+        """All sets of a finished sequence, such as a recording."""
+        for frame in frames:
+            yield from self.add(frame)
+        yield from self.flush()
 
     def poll(self, now_ns: int) -> list[FrameSet]:
         """Returns the sets whose deadline is over at `now_ns` (CLOCK_MONOTONIC), with what there is.

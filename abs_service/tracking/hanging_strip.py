@@ -1,6 +1,5 @@
 """A recording of a strip that hangs from a gripper, tracked from beginning to end."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,7 +88,7 @@ def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Pla
     tracking, observer = Tracking(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
     sets = 0
-    for frames in _frame_sets(recording, synchroniser):
+    for frames in synchroniser.group(item for item in recording.frames() if isinstance(item, Frame)):
         sets += 1
         estimate, model = tracking.track(frames, lambda: True), tracking.model
         if isinstance(model, Gravity) and estimate.status == Status.TRACKING:
@@ -101,10 +100,3 @@ def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Pla
     seen = detect_object(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
     hangings = [hanging(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
     return HangingStrip(model, hangings, sets - len(longest), shown, seen.points)
-
-
-def _frame_sets(recording: Recording, synchroniser: Synchroniser) -> Iterator[FrameSet]:
-    for item in recording.frames():
-        if isinstance(item, Frame):
-            yield from synchroniser.add(item)
-    yield from synchroniser.flush()

@@ -151,5 +151,5 @@ def test_a_name_that_the_rig_does_not_have():
 
 def test_a_rig_file_with_a_mistake_is_refused(tmp_path):
     (tmp_path / "rig.toml").write_text('version = 1\nname = "x"\nfoo = 1\n', encoding="utf-8")
-    with pytest.raises(a.ConfigError, match=r"rig\.toml: \d mistakes"):
+    with pytest.raises(a.ConfigError, match=r"rig\.toml: \d(.|\n)*foo: unknown key"):
         a.load_rig(tmp_path / "rig.toml")

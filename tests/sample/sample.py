@@ -10,18 +10,16 @@ simulator or the tracker was meant to change, and say why in the commit.
 import json
 from pathlib import Path
 
-from abs_service import config, wiring
+import abs_service as a
+from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.config import ServiceConfig, plugins
-from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracking.session import Tracking, streams
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
-from drivers.replay import Recording
 from drivers.simulated.address import parse
 from drivers.simulated.simulation import Simulation
 
@@ -61,14 +59,8 @@ def write(path: Path, settings: ServiceConfig) -> None:
 
 def track(path: Path) -> list[list[float]]:
     """Θ of every exposure of a recording."""
-    recording = Recording(path)
-    settings = config.loads(recording.config, str(path), path.parent)
-    tracker_rig = wiring.rig(settings, "sheet", recording.cameras)
-    tracking = Tracking(tracker_rig, wiring.plan(settings, "sheet"))
-    tolerance_ns = round(settings.synchronisation.tolerance_ms * 1e6)
-    synchroniser = Synchroniser(settings.reference("sheet"), streams(tracker_rig.sensors.values()), tolerance_ns)
-    sets = [found for frame in recording.frames() if isinstance(frame, Frame) for found in synchroniser.add(frame)]
-    return [tracking.track(frames, lambda: True).theta.tolist() for frames in [*sets, *synchroniser.flush()]]
+    recording = a.open_recording(path)
+    return [estimate.theta.tolist() for estimate in recording.rig.tracker("sheet").replay(recording)]
 
 
 def _write_announcements(

@@ -50,10 +50,8 @@ class RecordingShots:
         # The slowest stream determines the number of shots.
         reference = min(used, key=lambda key: self.recording.counts[key])
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
-        for item in self.recording.frames():
-            if isinstance(item, Frame) and item.key in used:
-                yield from synchroniser.add(item)
-        yield from synchroniser.flush()
+        frames = (item for item in self.recording.frames() if isinstance(item, Frame) and item.key in used)
+        yield from synchroniser.group(frames)
 
     def _first_frames(self) -> Iterator[Frame]:
         missing = set(self.recording.counts)

@@ -79,7 +79,7 @@ class Toy:
         self._settings = config.loads(text.replace("mask.png", masks[0].path.resolve().as_posix()), "toy.toml", folder)
         self._rig = wiring.rig(self._settings, TRACKER, images.cameras)
         synchroniser = wiring.synchroniser(self._settings, TRACKER, self._rig.sensors.values())
-        sets = [one for frame in images.frames() for one in synchroniser.add(frame)] + list(synchroniser.flush())
+        sets = list(synchroniser.group(images.frames()))
         # As the service does before its first image; compiling is no part of a frame's time.
         warm_up(wiring.noises(self._settings, TRACKER), wiring.plan(self._settings, TRACKER))
         self.references = [_reference_frame(one, _mask(mask.path)) for one, mask in zip(sets, masks, strict=True)]
