@@ -135,8 +135,8 @@ def file(rig: config.ServiceConfig) -> Iterator[Path]:
 def limits(rig: config.ServiceConfig) -> Limits:
     """Limits and timeouts of the configuration."""
     table = rig.run
-    seconds = (table.window_s, table.startup_s, table.stall_s, table.stop_s)
-    return Limits(table.restarts, *(int(value * 1e9) for value in seconds))
+    seconds = (table.restart_window_s, table.startup_timeout_s, table.stall_timeout_s, table.stop_timeout_s)
+    return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
 def _spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:

@@ -140,17 +140,17 @@ class RunTable(Table):
     """`[run]`: limits and timeouts of the supervisor.
 
     Attributes:
-        restarts, window_s: a process that needs more restarts than this within this time is given up.
-        startup_s: timeout for the health of a process that starts or compiles its kernels.
-        stall_s: timeout for its health afterwards; a process that exceeds it is restarted.
-        stop_s: time that all processes together have to end in order before they are killed.
+        max_restarts, restart_window_s: a process that needs more restarts than this within this time is given up.
+        startup_timeout_s: timeout for the health of a process that starts or compiles its kernels.
+        stall_timeout_s: timeout for its health afterwards; a process that exceeds it is restarted.
+        stop_timeout_s: time that all processes together have to end in order before they are killed.
     """
 
-    restarts: Annotated[int, Field(ge=0)] = 5
-    window_s: Positive = 60.0
-    startup_s: Positive = 180.0
-    stall_s: Positive = 10.0
-    stop_s: Positive = 4.0
+    max_restarts: Annotated[int, Field(ge=0)] = 5
+    restart_window_s: Positive = 60.0
+    startup_timeout_s: Positive = 180.0
+    stall_timeout_s: Positive = 10.0
+    stop_timeout_s: Positive = 4.0
 
 
 class ServiceConfig(Table):

@@ -1,4 +1,4 @@
-"""Reads the records of an MCAP file that may be damaged anywhere."""
+"""Scans the records of a damaged MCAP file, where the library's reader would stop at the first error."""
 
 import mmap
 import struct
@@ -6,16 +6,16 @@ import zlib
 from collections.abc import Iterator
 from io import BytesIO
 
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Chunk, McapRecord
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
 _PREFIX = struct.Struct("<BQ")  # opcode, length of what follows
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size and checksum, length of the compression's name
 _COMPRESSIONS = (b"", b"lz4", b"zstd")
 _OPCODES = frozenset(int(opcode) for opcode in Opcode)
+_COPIED = frozenset({Opcode.ATTACHMENT, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE, Opcode.METADATA, Opcode.SCHEMA})
 #: A chunk that claims to hold more is damaged [bytes].
 _LARGEST_CHUNK = 1 << 30
 
@@ -26,11 +26,10 @@ Data = bytes | mmap.mmap
 class RecordScanner:
     """Iterates over the records outside of chunks; chunks come whole, see `open_chunk`.
 
-    Damage inside of a record is found by its checksum and leaves the others alone. Where the lengths of records are
-    wrong, so that nobody knows where the next one begins, the next chunk is searched for.
+    Damage inside of a record is found by its checksum. After a damaged length, scanning resumes at the next chunk.
 
     Attributes:
-        damaged: records left out because they contradict themselves.
+        damaged: records left out because they are malformed.
         skipped_bytes: bytes that are no record, such as a torn end.
     """
 
@@ -41,23 +40,23 @@ class RecordScanner:
 
     def __iter__(self) -> Iterator[McapRecord]:
         position = len(MCAP0_MAGIC) if self._data[0 : len(MCAP0_MAGIC)] == MCAP0_MAGIC else 0
-        certain = position  # everything up to here is what it seems to be
+        verified = position  # verified up to here
         while position < len(self._data):
             if self._data[position : position + len(MCAP0_MAGIC)] == MCAP0_MAGIC:
                 position += len(MCAP0_MAGIC)  # the end of a finished file
                 continue
             end = self._end(position)
             if end is None:
-                # A record before may have lied about its length, so the search begins behind the last certain one.
-                found = find_chunk(self._data, certain)
+                # An earlier record may have a wrong length, so the search begins after the last verified one.
+                found = find_chunk(self._data, verified)
                 self.skipped_bytes += max(found - position, 1)
-                position = certain = found
+                position = verified = found
                 continue
             opcode = self._data[position : position + 1][0]
-            yield from self._parse(opcode, self._data[position + _PREFIX.size : end])
+            yield from self._parse(opcode, self._data[position:end])
             position = end
             if opcode == Opcode.CHUNK:
-                certain = end
+                verified = end
 
     def open_chunk(self, chunk: Chunk) -> list[McapRecord]:
         """The records in a chunk; none, and counted, if the chunk is damaged."""
@@ -71,7 +70,7 @@ class RecordScanner:
             return []
 
     def _end(self, position: int) -> int | None:
-        """Where the record at `position` ends; None if there is no whole record."""
+        """End of the record at `position`; None if there is no complete record."""
         if position + _PREFIX.size > len(self._data):
             return None
         opcode, length = _PREFIX.unpack(self._data[position : position + _PREFIX.size])
@@ -82,27 +81,21 @@ class RecordScanner:
             return None
         return end
 
-    def _parse(self, opcode: int, content: bytes) -> Iterator[McapRecord]:
-        readers = {
-            Opcode.ATTACHMENT: Attachment.read,
-            Opcode.CHANNEL: Channel.read,
-            Opcode.CHUNK: Chunk.read,
-            Opcode.METADATA: Metadata.read,
-            Opcode.SCHEMA: Schema.read,
-        }
+    def _parse(self, opcode: int, record: bytes) -> Iterator[McapRecord]:
+        """The record, from its opcode to its end, if it is of a kind that is copied and intact."""
+        if opcode not in _COPIED:
+            return
+        if not _is_intact(opcode, record):
+            self.damaged += 1
+            return
         try:
-            if opcode == Opcode.MESSAGE:
-                yield Message.read(ReadDataStream(BytesIO(content)), len(content))
-            elif opcode in readers and _is_intact(opcode, content):
-                yield readers[Opcode(opcode)](ReadDataStream(BytesIO(content)))
-            elif opcode in readers:
-                self.damaged += 1
+            yield next(StreamReader(BytesIO(record), skip_magic=True, emit_chunks=True).records)
         except Exception:  # whatever the parser makes of damaged bytes
             self.damaged += 1
 
 
 def find_chunk(data: Data, start: int) -> int:
-    """Where the first chunk at or behind `start` begins; the length of `data` if there is none."""
+    """Position of the first chunk at or after `start`; the length of `data` if there is none."""
     position = data.find(bytes([Opcode.CHUNK]), start)
     while position >= 0:
         if _is_chunk(data, position):
@@ -112,7 +105,7 @@ def find_chunk(data: Data, start: int) -> int:
 
 
 def _is_chunk(data: Data, position: int) -> bool:
-    """Whether the lengths in what may be a chunk agree with each other; chance would hardly make them."""
+    """True if the lengths in the header of a possible chunk are consistent, which random bytes hardly are."""
     head = data[position : position + _PREFIX.size + _CHUNK.size]
     if len(head) < _PREFIX.size + _CHUNK.size or head[0] != Opcode.CHUNK:
         return False
@@ -126,8 +119,8 @@ def _is_chunk(data: Data, position: int) -> bool:
     return len(size) == 8 and end <= len(data) and start + name_length + 8 + int.from_bytes(size, "little") == end
 
 
-def _is_intact(opcode: int, content: bytes) -> bool:
+def _is_intact(opcode: int, record: bytes) -> bool:
     if opcode != Opcode.ATTACHMENT:
         return True  # chunks have their checksum inside, the others have none
-    checksum = int.from_bytes(content[-4:], "little")
-    return checksum in (0, zlib.crc32(content[:-4]))
+    checksum = int.from_bytes(record[-4:], "little")
+    return checksum in (0, zlib.crc32(record[_PREFIX.size : -4]))

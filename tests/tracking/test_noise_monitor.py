@@ -120,11 +120,11 @@ def test_an_objective_without_noise_models_has_none_to_complain_of():
 
 
 def watched(uri, **changes):
-    """What health says after two seconds of the demo rig, whose noise model is that of noise=1."""
+    """Health after one window of the demo rig, whose noise model is that of noise=1."""
     simulation = simulate(uri)
     tracking = Tracking(rig_of(simulation), default_plan(optimizer=cma.Settings(generations=2), **changes))
     watch = Watch()
-    for step in drive(tracking, simulation, range(62)):
+    for step in drive(tracking, simulation, range(32)):
         watch.watch.add(step.estimate)
     return watch.said
 
