@@ -1,1 +1,1 @@
-"""What a command found out, for people and programs: verdicts, tables and pictures on one page, and as JSON."""
+"""Reports of commands: verdicts, tables and pictures on one HTML page, and as JSON."""

@@ -1,4 +1,4 @@
-"""What a command found out, for people and programs: text, tables, pictures and verdicts.
+"""Content of a report: text, tables, pictures and verdicts.
 
 `abs_service.report.page` writes a report as an HTML page and as JSON with the same numbers.
 """
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class Level(IntEnum):
-    """How far a result can be relied on. The worst of a report is mostly the exit code of its command."""
+    """Reliability of a result. The worst of a report is usually the exit code of its command."""
 
     GOOD = 0
     DOUBTFUL = 1
@@ -32,7 +32,7 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """What the levels are called.
+    """Words for the levels.
 
     Attributes:
         words: one for each level, beside a verdict.
@@ -43,7 +43,7 @@ class Wording:
     headlines: Mapping[Level, str]
 
 
-#: Of a calibration, which is for use.
+#: Wording for calibrations.
 RELIANCE = Wording(
     {level: str(level) for level in Level},
     {
@@ -59,9 +59,9 @@ class Verdict:
     """One judgement, in plain words.
 
     Attributes:
-        level: how far what it is about can be relied on.
-        text: one sentence that says what is so, with the number that it rests on.
-        advice: what to do about it; "" if nothing.
+        level: reliability.
+        text: one sentence with the decisive number.
+        advice: recommended action; "" if none.
         about: the sensor, pair or board that it judges; "" for the whole.
     """
 
@@ -95,7 +95,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An encoded picture: caption, what those learn who do not see it, type (`image/png`) and bytes."""
+    """An encoded picture: caption, alternative text, media type (`image/png`) and bytes."""
 
     caption: str
     alt: str
@@ -113,15 +113,15 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """What a command found out.
+    """Results of a command.
 
     Attributes:
         title: such as "Calibration of rig demo".
         provenance: where it comes from.
         verdicts: judgements, the most important first.
         sections: the evidence.
-        values: what only programs want, by name; goes into the JSON form as it is.
-        wording: what the levels of the verdicts are called.
+        values: numbers for programs, by name; written to the JSON form unchanged.
+        wording: words for the levels of the verdicts.
         exit_code: of the command; None for the worst level of the verdicts.
     """
 
@@ -135,7 +135,7 @@ class Report:
 
     @property
     def level(self) -> Level:
-        """The worst of all verdicts, which is mostly the exit code of the command, too; good if there are none."""
+        """The worst of all verdicts, which is usually the exit code of the command, too; good if there are none."""
         return max((verdict.level for verdict in self.verdicts), default=Level.GOOD)
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: More arrows than this hide each other.
+#: Maximum number of arrows; more overlap.
 ARROWS = 1500
 
 _NO_VALUE = "0.8"  # grey of what is not known
@@ -21,7 +21,7 @@ _NO_VALUE = "0.8"  # grey of what is not known
 def coverage_map(
     views: Sequence[NDArray[np.floating]], width: int, height: int, cells: tuple[int, int] = (8, 6)
 ) -> "Figure":
-    """Where in the image corners were seen, and in how many views in each part of it.
+    """Detected corners in the image, and number of views with corners in each cell.
 
     Args:
         views: pixels (n, 2) of the corners of each view.
@@ -59,8 +59,8 @@ def covered_share(
 def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating], width: int, height: int) -> "Figure":
     """Residuals as enlarged arrows at their place in the image, and all of them from one origin.
 
-    What is left of a good calibration is noise: arrows in all directions everywhere. Arrows that agree with their
-    neighbours are something that the model of the camera does not know.
+    Residuals of a good calibration are noise: arrows in random directions. Arrows that agree with their neighbours
+    show an error of the camera model.
 
     Args:
         pixels: where (n, 2) [px].
@@ -97,7 +97,7 @@ def image_map(values: NDArray[np.floating], label: str, limits: tuple[float, flo
     Args:
         values: (height, width); NaN is shown in grey.
         label: quantity and unit, for the bar.
-        limits: values at the ends of the bar; None takes the 1st and the 99th percentile, lest single pixels rule.
+        limits: values at the ends of the bar; None takes the 1st and 99th percentile, which is robust against outliers.
     """
     return _map(values, label, limits or _percentiles(values), "viridis")
 

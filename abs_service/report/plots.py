@@ -1,4 +1,4 @@
-"""What every drawn picture begins with."""
+"""Empty figures in the style of the reports."""
 
 from typing import TYPE_CHECKING
 
@@ -7,7 +7,7 @@ if TYPE_CHECKING:
 
 
 def figure(width: float, height: float) -> "Figure":
-    """An empty figure of so many inches."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  half a second that only those pay who draw
+    """An empty figure of the given width and height [inch]."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  takes half a second, so only when drawing
 
     return Figure(figsize=(width, height), layout="constrained")

@@ -1,4 +1,4 @@
-"""Where a result comes from: the command, its date and version, and the data with their hashes."""
+"""Provenance of a result: command, date, version, and data with their hashes."""
 
 import hashlib
 import shlex
@@ -15,7 +15,7 @@ _CHUNK = 1 << 20
 
 
 class DataError(Exception):
-    """Data that a result is said to come from, but that cannot be read."""
+    """Data of a result that cannot be read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class DataFile:
     """A file or a folder that a result was computed from.
 
     Attributes:
-        name: its name, without the folders before it: those differ from machine to machine, and are nobody's business.
+        name: its name without its folders, which differ between machines and may be private.
         sha256: hash of the content; of a folder, that of all its files with their names.
     """
 
@@ -33,10 +33,10 @@ class DataFile:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a result comes from.
+    """Provenance of a result.
 
     Attributes:
-        command: command line that computed it; the home folder of whoever did is `~`.
+        command: command line that computed it; the home folder is written as `~`.
         date: when, ISO 8601 in UTC.
         version: of the program.
         data: what it was computed from.
@@ -68,9 +68,9 @@ def trace(
         DataError: one of the files cannot be read.
     """
     away = str(Path.home() if home is None else home).rstrip("/")
-    said = [argument.replace(f"{away}/", "~/") if away else argument for argument in arguments]
+    shown = [argument.replace(f"{away}/", "~/") if away else argument for argument in arguments]
     date = datetime.fromtimestamp(clock() // 1_000_000_000, UTC).isoformat().replace("+00:00", "Z")
-    command = " ".join([program, *map(_quoted, said)])
+    command = " ".join([program, *map(_quoted, shown)])
     return Provenance(command, date, data=tuple(fingerprint(path) for path in data))
 
 

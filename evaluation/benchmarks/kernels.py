@@ -1,10 +1,10 @@
-"""What deforming, synthesising and scoring costs, for every model, sensor and lens, beside a C++ yardstick.
+"""Time to deform, synthesise and score, for every model, sensor and lens, beside a C++ reference loop.
 
     NUMBA_NUM_THREADS=2 python -m evaluation.benchmarks.kernels --rounds 100
 
 prints JSON. The yardstick is a fused, hand-vectorised loop for degree 2 and one knot span (deform, project, compare),
-kept outside the repository; its folder is `../shared/bench`, or what ABS_SHARED_BENCH says. Everything is measured in
-turn, round by round, and the minimum is told; machines, and hours on one machine, differ, ratios less so.
+kept outside the repository; its folder is `../shared/bench`, or what ABS_SHARED_BENCH says. All cases are measured
+in turn, round by round; the minimum is reported. Times vary between machines and hours, ratios less so.
 """
 
 import argparse
@@ -150,7 +150,7 @@ def cases() -> list[Case]:
 
 
 def yardstick(threads: int) -> Callable[[], float]:
-    """What measures the yardstick [s per vertex and candidate]; always NaN where it is not."""
+    """Function that times the reference loop [s per vertex and candidate]; it returns NaN if that is not installed."""
     folder = Path(os.environ.get("ABS_SHARED_BENCH", BESIDE))
     if not (folder / "run_yardstick.py").is_file():
         return lambda: float("nan")
@@ -174,7 +174,7 @@ def minima(cases: list[Case], rounds: int, reference: Callable[[], float]) -> di
 
 
 def seconds(call: Callable[[], object]) -> float:
-    """What a call takes."""
+    """Duration of a call [s]."""
     begin = time.perf_counter()
     call()
     return time.perf_counter() - begin

@@ -1,15 +1,14 @@
-"""What whole frames cost at the paper's full budgets and with `hybrid`, and which share of it is the search's own.
+"""Time of whole frames at the paper's full budgets and with `hybrid`, and the search's own share of it.
 
     NUMBA_NUM_THREADS=2 python -m evaluation.benchmarks.rates --frames 20 --rounds 3
 
 prints JSON. Frames are those of the simulated sheet, from frame set to estimate; the depth camera has 176 × 144 pixels,
-the colour camera 320 × 240. All cases are measured in turns, and the round with the quickest frame is told: machines,
-and minutes on one machine, differ. Where other programs run as well, only the processor time of one thread says
-something.
+the colour camera 320 × 240. All cases are measured in turn, and the round with the fastest frame is reported. Where
+other programs run as well, only the CPU time of one thread is meaningful.
 
-The generations of `cma_es` are one compiled loop with the cost of its candidates, in which no clock can tell what is
-whose. So as many candidates, scattered as at the beginning of the search, are judged once more without a search: the
-rest of the time is its own.
+The generations of `cma_es` and the cost of its candidates are one compiled loop, so they cannot be timed separately.
+Therefore the same number of candidates, distributed as at the start of the search, is evaluated again without a search;
+the difference is the search's own time.
 """
 
 import argparse
@@ -52,7 +51,7 @@ def _judge(thetas: NDArray[np.float64], times: int, arguments: tuple[Any, ...], 
 
 @dataclass
 class Clocked:
-    """A problem, and how long it took to answer [s], but for what was judged in the search's own loop."""
+    """A problem that adds up the time of its answers [s], except for costs evaluated in the search's compiled loop."""
 
     problem: Problem
     dimension: int
@@ -112,7 +111,7 @@ class WatchedSearch:
 
 
 def judging_s(problem: Problem, theta: NDArray[np.float64], generations: int, population: int) -> float:
-    """How long so many generations of candidates around theta (dim,) take when nobody searches [s]."""
+    """CPU time [s] to evaluate `generations` × `population` candidates around theta (dim,) without a search."""
     z = np.random.default_rng(1).standard_normal((population, problem.dimension))
     thetas = theta + z @ search_metric(problem.linearize(theta)).T
     step = problem.judge
@@ -125,7 +124,7 @@ def judging_s(problem: Problem, theta: NDArray[np.float64], generations: int, po
 
 @dataclass(frozen=True)
 class Case:
-    """Something to measure: a model, a search, about how many vertices, which sensors."""
+    """One measured configuration: model, search, approximate number of vertices, sensors."""
 
     part: str
     model: ModelSettings

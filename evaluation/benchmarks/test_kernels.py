@@ -1,4 +1,4 @@
-"""What deforming, synthesising and scoring costs; see `kernels`. Each number of threads has a process of its own."""
+"""Time to deform, synthesise and score; see `kernels`. Each number of threads has its own process."""
 
 import json
 import os
@@ -26,7 +26,7 @@ print(json.dumps([list(kernels.objective_of(model, (head,)).cost(surface)) for h
 
 
 def printed_by(arguments: list[str], threads: int) -> str:
-    """What Python prints in a process whose kernels have so many threads."""
+    """Output of Python in a process whose kernels use `threads` threads."""
     paths = os.pathsep.join([str(ROOT), str(ROOT / "proto")])
     environment = os.environ | {jit.THREADS: str(threads), "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": paths}
     command = [sys.executable, *arguments]
@@ -47,7 +47,7 @@ def test_kernels(benchmark):
 
 
 @pytest.mark.slow
-def test_two_threads_say_what_one_says():
+def test_costs_do_not_depend_on_the_number_of_threads():
     one, two = (np.array(json.loads(printed_by(["-c", COSTS], threads))) for threads in (1, 2))
     assert one.shape == (2, kernels.POPULATION)
     np.testing.assert_allclose(two, one, rtol=1e-6)

@@ -1,4 +1,4 @@
-"""What it costs to render the noise of one frame: the same for every model, and to fit a model.
+"""Time to render the noise texture of one frame, the same for every model, and to fit a model.
 
 Compare minima of one run with each other; machines, and hours on one machine, differ.
 """

@@ -1,4 +1,4 @@
-"""What a generation of CMA-ES costs, ask and tell, by population and dimension; see docs/decisions/0008."""
+"""Time of one generation of CMA-ES, ask and tell, by population and dimension; see docs/decisions/0008."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What an exposure of the simulated device costs: in a live rig it shares two cores with the tracker."""
+"""Time of an exposure of the simulated device, which shares two cores with the tracker in a live rig."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What an estimate costs: priors, set-up and whole frames; its kernels have a table of their own (`kernels`).
+"""Time of an estimate: priors, set-up and whole frames; kernels have their own table (`kernels`).
 
 Compare minima of one run with each other; machines, and hours on one machine, differ.
 """

@@ -1,4 +1,4 @@
-"""What it costs to move and to keep one exposure: depth and amplitude of 176 × 144, colour of 320 × 240."""
+"""Time to transport and to record one exposure: depth and amplitude of 176 × 144, colour of 320 × 240."""
 
 import socket
 

@@ -113,7 +113,7 @@ def by_distance(static: Static, one: sequences.Sequence) -> list[tuple[float, fl
 
 
 def o3r(data: Path) -> list[sigma_consistency.Claim]:
-    """How well the O3R's own deviation agrees with local planes, by distance."""
+    """Consistency of the O3R's own σ with residuals from local planes, by distance."""
     buffers = O3rBuffers(data / "tof_ifm_o3r" / "O3RBuffer.data")
     frames = {frame.kind: frame for frame in buffers.frames() if isinstance(frame, Frame)}
     distance, claimed = (frames[kind].si().astype(np.float64) for kind in (Kind.DEPTH, Kind.DEVIATION))

@@ -1,9 +1,8 @@
-"""E8: a Bayer mosaic compared pixel by pixel with the filter's own channel, against demosaiced images.
+"""E8: a Bayer mosaic compare pixel by pixel with the filter's own channel, against demosaiced images.
 
 Structured light and a Bayer camera of 640×480 see a finely printed sheet; the same exposures for all variants, and
-OpenCV's demosaicing counts as time of the tracker. One rule chooses the deviation of every variant: of `SIGMAS`, each
-twice the one before, that with the smallest mean vertex error in the scene of a seed that is not judged, once for each
-order.
+OpenCV's demosaicing is part of the tracker's time. The σ of every variant is selected by one rule: of `SIGMAS`, the
+one with the smallest mean vertex error on a sequence whose seed is not evaluated, once for each order.
 """
 
 import time
@@ -35,7 +34,7 @@ SIGMAS = (10.0, 20.0, 40.0, 80.0, 160.0)
 
 @dataclass(frozen=True)
 class Settings:
-    """The full evaluation.
+    """Size of the experiment.
 
     Attributes:
         sequences: with seeds that follow each other.
@@ -68,8 +67,8 @@ class Result:
     cpu_ms: float
 
 
-class Scene:
-    """The exposures of one finely printed sheet, and where it was."""
+class MosaicSequence:
+    """Exposures of one finely printed sheet with their truth, tracked by every variant."""
 
     def __init__(
         self,
@@ -90,7 +89,7 @@ class Scene:
         self._exposures = expose(simulation, range(frames))
 
     def track(self, variant: str, sigma: float) -> Result:
-        """What a variant with a deviation makes of the exposures; the first frame is not timed, it makes the mesh."""
+        """Tracks the exposures with a variant and its σ; the first frame, which makes the mesh, is not timed."""
         prepared, seconds = [], []
         for exposure in self._exposures:
             begin = time.process_time()
@@ -120,8 +119,8 @@ class Scene:
         return replace(frame, kind=Kind.COLOR, stream="color", data=rgb, encoding="rgb8")
 
 
-def chosen(scene: Scene, sigmas: Sequence[float]) -> dict[str, float]:
-    """For each variant the deviation with the smallest mean vertex error in a scene; the only one is taken unseen."""
+def select_sigmas(scene: MosaicSequence, sigmas: Sequence[float]) -> dict[str, float]:
+    """Per variant the σ with the smallest mean vertex error in a sequence; a single candidate needs no run."""
     if len(sigmas) == 1:
         return dict.fromkeys(VARIANTS, sigmas[0])
     return {
@@ -130,17 +129,17 @@ def chosen(scene: Scene, sigmas: Sequence[float]) -> dict[str, float]:
     }
 
 
-def compared(scenes: Sequence[Scene], sigmas: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
+def compare(scenes: Sequence[MosaicSequence], sigmas: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
     """Results (scenes, 4) of each variant, in the order of the fields of `Result`."""
     found: dict[str, list[tuple[float, ...]]] = {variant: [] for variant in sigmas}
     for scene in scenes:
-        for variant, sigma in sigmas.items():  # in turn, so that a machine that gets slower does so for all
+        for variant, sigma in sigmas.items():  # in turn, so that a change of the machine's speed affects all
             found[variant].append(astuple(scene.track(variant, sigma)))
     return {variant: np.array(results) for variant, results in found.items()}
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Compares the variants in every order, and in the first one out of focus."""
+    """Compares the variants in every colour order, and in the first one out of focus."""
     cases = {order: (order, 0.0, 0.0) for order in settings.orders}
     if any(settings.blur):
         cases[f"{settings.orders[0]}, blurred"] = (settings.orders[0], *settings.blur)
@@ -150,11 +149,14 @@ def run(settings: Settings, context: Context) -> Findings:
     for name, optics in cases.items():
         context.progress(name)
         scenes = [
-            Scene(context.seed + 1 + k, settings.frames, *optics, settings.vertices) for k in range(settings.sequences)
+            MosaicSequence(context.seed + 1 + k, settings.frames, *optics, settings.vertices)
+            for k in range(settings.sequences)
         ]
-        # The seed before the first: σ must not be chosen where it is judged.
-        sigmas = chosen(Scene(context.seed, settings.frames, *optics, settings.vertices), settings.sigmas)
-        found = compared(scenes, sigmas)
+        # A seed of its own: σ is not selected on the sequences that it is evaluated on.
+        sigmas = select_sigmas(
+            MosaicSequence(context.seed, settings.frames, *optics, settings.vertices), settings.sigmas
+        )
+        found = compare(scenes, sigmas)
         rows += [_row(name, variant, sigmas[variant], results, found) for variant, results in found.items()]
         goals.append(_goal(name, found))
         values[name] = {variant: {"sigma": sigmas[variant], "results": found[variant]} for variant in found}
@@ -185,5 +187,5 @@ def _row(
 def _goal(case: str, found: Mapping[str, NDArray[np.float64]]) -> Goal:
     vertex_mm = {variant: float(results[:, 0].mean()) for variant, results in found.items()}
     best = min(vertex_mm[variant] for variant in CODES)
-    reason = "Where the optics take the fine detail away, demosaicing has none to lose." if "blurred" in case else ""
+    reason = "Where the optics blur the fine detail, demosaicing has none to lose." if "blurred" in case else ""
     return at_most(f"{case}: vertex error, direct / the best demosaiced", vertex_mm["direct"] / best, 1.0, "", reason)

@@ -1,7 +1,7 @@
-"""E7: sensors of four kinds in one likelihood, in every combination that can begin, without a weight.
+"""E7: sensors of four kinds in one likelihood, in every combination that can be initialised, without weights.
 
 The same frames of one simulated sheet for all combinations. A colour camera and a light barrier measure no distance,
-and without one nobody knows where the sheet is when tracking begins; so there are twelve combinations, not fifteen.
+which initial detection needs; so there are twelve combinations, not fifteen.
 """
 
 import itertools
@@ -24,15 +24,15 @@ from evaluation.sequences import demo_plan, expose, simulate, track
 
 TITLE = "E7: sensors of four kinds, in every combination"
 
-#: How each sensor errs besides the time of flight, whose law is the demo's. The distances' laws are the simulator's; a
-#: colour's covers what is no noise of the camera, too.
+#: Noise models of the sensors except the time of flight, which has the demo's. Those of distances are the simulator's;
+#: that of colour includes more than camera noise.
 NOISES: dict[str, Noise] = {
     "structured_light": StructuredLight(),
     "color": GaussianColor(15.0),
     "barrier": LightBarrier(0.8485),
 }
 SENSORS = ("tof", *NOISES)
-#: Those that find the sheet, the better first.
+#: Sensors that can initialise, the more accurate first.
 DEPTH = ("structured_light", "tof")
 
 Subset = frozenset[str]
@@ -43,17 +43,17 @@ SUBSETS: tuple[Subset, ...] = tuple(
     if set(names) & set(DEPTH)
 )
 
-#: How much worse the mean error may get with one sensor more.
+#: Largest allowed ratio of the mean errors with and without one additional sensor.
 WORST = 1.05
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The full evaluation.
+    """Size of the experiment.
 
     Attributes:
-        sequences: with seeds that follow each other; so many because how far a sheet slides along itself, where no
-            colour holds it, is chance.
+        sequences: with seeds that follow each other; many, because sliding of the sheet along itself
+            without colour is random.
         frames: of each sequence.
         subsets: the combinations.
     """
@@ -63,7 +63,7 @@ class Settings:
     subsets: tuple[tuple[str, ...], ...] = tuple(tuple(sorted(subset)) for subset in SUBSETS)
 
 
-#: With colour in all of them: without it the sheet slides along itself, and how far is chance.
+#: All with colour: without it the sheet slides along itself by a random amount.
 QUICK = Settings(
     1,
     12,
@@ -78,8 +78,8 @@ QUICK = Settings(
 )
 
 
-class Scene:
-    """The frames of one sheet as all sensors saw it, and where it was."""
+class SensorSequence:
+    """Frames of one sheet by all sensors, with their truth."""
 
     def __init__(self, seed: int, frames: int):
         simulation = simulate(f"simulated://sheet?seed={seed}&sensors={','.join(SENSORS)}")
@@ -89,7 +89,7 @@ class Scene:
         self._exposures = expose(simulation, range(frames))
 
     def errors(self, subset: Subset) -> tuple[float, float]:
-        """Mean vertex and surface error [mm] of what the sensors of a subset make of it."""
+        """Mean vertex and surface error [mm] of tracking with a subset of the sensors."""
         noises = {"tof": self._tof, **NOISES}
         rig = Rig("e7", {name: Sensor(name, self._cameras[name], noises[name]) for name in SENSORS if name in subset})
         plan = demo_plan(nurbs.Settings(), reference=next(name for name in DEPTH if name in subset))
@@ -104,7 +104,7 @@ def _of(frames: FrameSet, subset: Subset) -> FrameSet:
 
 
 def ratios(errors: Mapping[Subset, NDArray[np.float64]]) -> dict[tuple[Subset, str], float]:
-    """Mean error (of arrays over the seeds) with one sensor more, over that without, for every such pair."""
+    """Ratio of the mean errors with and without one additional sensor, for every such pair."""
     return {
         (subset, extra): float(errors[subset | {extra}].mean() / errors[subset].mean())
         for subset in errors
@@ -114,10 +114,10 @@ def ratios(errors: Mapping[Subset, NDArray[np.float64]]) -> dict[tuple[Subset, s
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Tracks every combination, and finds the pair in which one sensor more gains least."""
+    """Tracks every combination, and finds the pair in which an additional sensor gains least."""
     found = {frozenset(subset): np.zeros((settings.sequences, 2)) for subset in settings.subsets}
     for row in range(settings.sequences):
-        scene = Scene(context.seed + 1 + row, settings.frames)
+        scene = SensorSequence(context.seed + 1 + row, settings.frames)
         for subset, errors in found.items():
             context.progress(f"seed {context.seed + 1 + row}, {' + '.join(sorted(subset))}")
             errors[row] = scene.errors(subset)

@@ -24,7 +24,7 @@ WEIGHT = 0.3 * 9.81
 
 @dataclass(frozen=True)
 class Settings:
-    """The full evaluation.
+    """Size of the experiment.
 
     Attributes:
         stiffnesses: bending stiffness per width [N·m]: the strip sags by 80° to 5°.

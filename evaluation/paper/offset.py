@@ -1,4 +1,4 @@
-"""E3: a mean offset over the whole image is nothing to a likelihood that knows it, and an error to squares."""
+"""E3: a mean offset over the whole image, which the likelihood compensates and the Euclidean fitness does not."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracking.session import ModelSettings, ObjectiveSettings
 from calib.noise.tof_amplitude import TofAmplitude
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
-from evaluation.paper.wall_calibration import learnt
+from evaluation.paper.wall_calibration import calibrated_noise
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
     TrackedSequence,
@@ -32,7 +32,7 @@ TITLE = "E3: a mean offset of 10 cm over the whole image"
 
 MODELS: Mapping[str, ModelSettings] = {"NURBS": nurbs.Settings(), "FlexPad": flexpad.Settings(0.3, 0.2)}
 
-#: Nearer than this is the sheet, however large the offset, and farther the wall [m].
+#: Distance between sheet and wall [m], with and without the offset.
 BETWEEN_M = 1.4
 
 _REFERENCE, _KNOWN, _UNKNOWN, _SQUARES = (
@@ -42,35 +42,35 @@ _REFERENCE, _KNOWN, _UNKNOWN, _SQUARES = (
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is measured.
+    """Size of the experiment.
 
     Attributes:
         offset: added to all distances of the time-of-flight sensor [m].
         sequences: each with a motion of its own.
         frames: of each, from the first in which the sheet moves.
-        every: exposures from one frame to the next, at 30 Hz.
+        stride: exposures from one frame to the next, at 30 Hz.
         models: of `MODELS`.
-        still: frames of each static sequence of the noise calibration.
+        static_frames: frames of each static sequence of the noise calibration.
     """
 
     offset: float = 0.1
     sequences: int = 3
     frames: int = 50
-    every: int = 6
+    stride: int = 6
     models: tuple[str, ...] = ("NURBS", "FlexPad")
-    still: int = 10
+    static_frames: int = 10
 
 
-QUICK = Settings(sequences=1, frames=20, every=6, models=("NURBS",), still=2)
+QUICK = Settings(sequences=1, frames=20, stride=6, models=("NURBS",), static_frames=2)
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One line of the table: what is seen, what is known, and how it is judged.
+    """One row of the table: images, noise model and objective.
 
     Attributes:
         exposures: of every sequence.
-        noise: of the time-of-flight sensor, as the tracker knows it.
+        noise: noise model of the time-of-flight sensor in the tracker.
         objective: the fitness.
     """
 
@@ -80,9 +80,11 @@ class Case:
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Tracks the demo rig's sheet with and without the offset, with what knows of it and with what does not."""
+    """Tracks the demo rig's sheet with and without the offset, with and without the offset in the noise model."""
     context.progress("noise calibration")
-    without, known = (learnt(f"offset={offset}", settings.still, context.seed) for offset in (0.0, settings.offset))
+    without, known = (
+        calibrated_noise(f"offset={offset}", settings.static_frames, context.seed) for offset in (0.0, settings.offset)
+    )
     context.progress("images")
     plain, shifted = (
         [_exposures(offset, context.seed + 1 + number, settings) for number in range(settings.sequences)]
@@ -114,7 +116,7 @@ def run(settings: Settings, context: Context) -> Findings:
 
 def _exposures(offset: float, seed: int, settings: Settings) -> list[LabeledExposure]:
     simulation = simulate(f"simulated://sheet?seed={seed}&offset={offset}")
-    return expose(simulation, moving_indices(settings.frames, settings.every))
+    return expose(simulation, moving_indices(settings.frames, settings.stride))
 
 
 def _figures(runs: Sequence[TrackedSequence]) -> dict[str, float]:

@@ -14,11 +14,11 @@ from drivers.simulated.simulation import Simulation
 DISTANCES, MATERIALS = (0.7, 0.85, 1.0, 1.15, 1.3), (0.85, 0.4, 0.15)
 
 
-def learnt(sensor: str, frames: int, seed: int) -> TofAmplitude:
-    """The law of one deviation and mean offset that static sequences of a time-of-flight sensor call for.
+def calibrated_noise(sensor: str, frames: int, seed: int) -> TofAmplitude:
+    """Noise model of a time-of-flight sensor, fitted to static sequences of walls.
 
     Args:
-        sensor: keys of the simulated device's address that say how the sensor errs, such as "dark=-40".
+        sensor: keys of the simulated device's address for the sensor's errors, such as "dark=-40".
         frames: of each of the 15 sequences.
         seed: of their noise.
     """
@@ -31,7 +31,7 @@ def learnt(sensor: str, frames: int, seed: int) -> TofAmplitude:
 
 
 def _samples(walls: Simulation, frames: int) -> Samples:
-    """What every pixel measured of a static wall, and how far it really was."""
+    """Samples of all pixels of a static wall, with the true distances."""
     images = [{frame.kind: frame.si() for frame in walls.frames(k)} for k in range(frames)]
     measured, amplitude = (np.stack([image[kind] for image in images]) for kind in (Kind.DEPTH, Kind.AMPLITUDE))
     return from_images(measured, View(walls.scene, walls.heads["tof"].camera).wall.distance, amplitude)

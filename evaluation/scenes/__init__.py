@@ -1,5 +1,5 @@
-"""The truth of the experiments: surfaces, what cameras see of them, and how they err.
+"""Ground truth of the experiments: surfaces, a renderer, and sensors with errors.
 
-Nothing of it is shared with the tracker: splines are SciPy's, images are made of points that are splatted, and the true
-law of the errors is a physical one. `abs_service.tracker` must not be imported here, and is not (`make lint`).
+Independent of the tracker and of the simulated device: splines are SciPy's, images are rendered by splatting points,
+and the law of the errors is physical. An import contract forbids the tracker here (`make lint`).
 """

@@ -36,8 +36,8 @@ def places(columns: int, rows: int) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """The sheet at one moment.
+class SheetState:
+    """The sheet at one state.
 
     Attributes:
         angle: by how much the normals of its two short sides differ [rad]; positive ends bend towards the camera.
@@ -50,7 +50,7 @@ class Moment:
     center: tuple[float, float, float]
 
     def points(self, material: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Where the material of places (…, 2) [m] is, (…, 3) [m]: on a cylinder, so that no length changes."""
+        """Positions (…, 3) [m] of material points (…, 2) [m]: on a cylinder, so the bending is isometric."""
         along, across = material[..., 0], material[..., 1]
         if abs(self.angle) < _FLAT:
             bent = np.stack([along, across, np.zeros_like(along)], axis=-1)
@@ -63,20 +63,20 @@ class Moment:
 
 
 #: The sheet by the time [s].
-Motion = Callable[[float], Moment]
+SheetMotion = Callable[[float], SheetState]
 
 
-def swing(t: float) -> Moment:
+def swing(t: float) -> SheetState:
     """Bends to +120° and to −120° in 40 frames and sways meanwhile; flat in the first."""
     phase = 2 * np.pi * t / (40 * INTERVAL_S)
     turn = (0.15 * np.sin(0.7 * phase), 0.25 * np.sin(phase + 0.5) - 0.12, 0.1 * np.sin(0.5 * phase))
     center = (0.03 * np.sin(0.6 * phase), 0.02 * (1 - np.cos(0.8 * phase)), 1 + 0.03 * np.sin(0.9 * phase))
-    return Moment(float(np.deg2rad(120) * np.sin(phase)), turn, center)
+    return SheetState(float(np.deg2rad(120) * np.sin(phase)), turn, center)
 
 
 @dataclass(frozen=True)
-class Scene:
-    """What is filmed.
+class SheetScene:
+    """What is rendered.
 
     Attributes:
         name: what it is called in tables.
@@ -87,14 +87,14 @@ class Scene:
     """
 
     name: str
-    motion: Motion = swing
+    motion: SheetMotion = swing
     sigma: float = 5e-3
     hole: tuple[int, int] = (0, 0)
     wall: Wall = WALL
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shot:
+class SheetFrame:
     """One frame with its truth.
 
     Attributes:
@@ -102,14 +102,14 @@ class Shot:
         distance: measured radial distances (height, width) [m], NaN without return.
         sheet: mask (height, width) of the pixels that show the sheet.
         hole: mask (height, width) of the pixels without return because of the hole.
-        moment: the sheet.
+        state: the sheet.
     """
 
     t_ns: int
     distance: NDArray[np.float32]
     sheet: NDArray[np.bool_]
     hole: NDArray[np.bool_]
-    moment: Moment
+    state: SheetState
 
     @property
     def cloud(self) -> NDArray[np.float64]:
@@ -117,21 +117,21 @@ class Shot:
         return CAMERA.unproject(self.distance)[self.sheet]
 
 
-def film(scene: Scene, frames: Iterable[int], generator: np.random.Generator) -> list[Shot]:
-    """The frames of a scene."""
+def render_frames(scene: SheetScene, indices: Iterable[int], generator: np.random.Generator) -> list[SheetFrame]:
+    """Frames of a scene at the given indices."""
     renderer = Renderer(CAMERA, scene.wall, fineness=1)
     dense = places(181, 121)
     rows, columns = np.indices((CAMERA.height, CAMERA.width))
     across, down = scene.hole
     hole = (np.abs(columns - CAMERA.cx) < across / 2) & (np.abs(rows - CAMERA.cy) < down / 2)
-    shots = []
-    for k in frames:
-        moment = scene.motion(k * INTERVAL_S)
-        view = renderer.render(Sheet(moment.points(dense)))
+    frames = []
+    for k in indices:
+        state = scene.motion(k * INTERVAL_S)
+        view = renderer.render(Sheet(state.points(dense)))
         measured = view.distance + scene.sigma * generator.standard_normal(hole.shape)
         distance = np.where(hole, np.nan, measured).astype(np.float32)
-        shots.append(Shot(round(k * INTERVAL_S * 1e9), distance, (view.share > 0) & ~hole, hole, moment))
-    return shots
+        frames.append(SheetFrame(round(k * INTERVAL_S * 1e9), distance, (view.share > 0) & ~hole, hole, state))
+    return frames
 
 
 def _eased(t: float, begin: float, duration: float) -> float:
@@ -139,15 +139,15 @@ def _eased(t: float, begin: float, duration: float) -> float:
     return float(0.5 - 0.5 * np.cos(np.pi * np.clip((t - begin) / duration, 0, 1)))
 
 
-def turn(t: float) -> Moment:
+def turn(t: float) -> SheetState:
     """Turns by 90° about the vertical axis within a quarter of a second, a little bent."""
     angle = np.deg2rad(-45 + 90 * _eased(t, 0.2, 0.25))
-    return Moment(float(np.deg2rad(40)), (0.0, float(angle), 0.0), (0.0, 0.0, 1.0))
+    return SheetState(float(np.deg2rad(40)), (0.0, float(angle), 0.0), (0.0, 0.0, 1.0))
 
 
-def spin(t: float) -> Moment:
+def spin(t: float) -> SheetState:
     """Turns by 90° about the line of sight within a quarter of a second, a little bent."""
-    return Moment(float(np.deg2rad(40)), (0.0, 0.0, float(np.deg2rad(90 * _eased(t, 0.2, 0.25)))), (0.0, 0.0, 1.0))
+    return SheetState(float(np.deg2rad(40)), (0.0, 0.0, float(np.deg2rad(90 * _eased(t, 0.2, 0.25)))), (0.0, 0.0, 1.0))
 
 
 class Leap:
@@ -167,13 +167,13 @@ class Leap:
         turn = within(0.2, 0.3, 0.3)
         tilt_x, tilt_y, about_sight = within(0.4, 0.6, 1.3)
         aside, down, away = within(0.05, 0.06, 0.15)
-        self._before = Moment(float(bends[0]), turn, (x, y, 1 + z))
-        self._after = Moment(
+        self._before = SheetState(float(bends[0]), turn, (x, y, 1 + z))
+        self._after = SheetState(
             float(bends[1]),
             (tilt_x, tilt_y, turn[2] + about_sight),
             (float(-np.sign(x)) * (0.075 + aside), down, 1 + away),
         )
 
-    def __call__(self, t: float) -> Moment:
+    def __call__(self, t: float) -> SheetState:
         """The sheet at a time [s]."""
         return self._before if t < 2.5 * INTERVAL_S else self._after

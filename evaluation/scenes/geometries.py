@@ -27,7 +27,7 @@ ASPECT = 0.75
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a sheet moves while it bends; periods that share no factor, so that all combinations occur.
+    """Rigid motion of a sheet while it bends; the periods share no factor, so all combinations occur.
 
     Attributes:
         width: of the sheet [m].

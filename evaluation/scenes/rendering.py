@@ -1,4 +1,4 @@
-"""What a camera sees of dense grids of points: splats on a finer raster, each made exact, then mixed to pixels."""
+"""Renderer of dense grids of points: splatted on a finer raster, refined per sub-pixel, then averaged to pixels."""
 
 from dataclasses import dataclass, replace
 
@@ -12,7 +12,7 @@ from evaluation.scenes.surfaces import NO_WALL, Sheet, Wall
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What a camera sees without any noise.
+    """Noise-free view of a camera.
 
     Attributes:
         distance: radial distances (height, width) [m]; a pixel that sees several surfaces has their mean, weighted with
@@ -32,9 +32,9 @@ class View:
 class Renderer:
     """Renders for one camera without distortion.
 
-    Every point is projected to a sub-pixel, the nearest point of each stays. The line of sight through the sub-pixel's
-    centre is then met with the surface around that point, a step of Newton's method: so distances are exact to the
-    second order of half a sub-pixel, some micrometres, and rims to the grid.
+    Every point is projected to a sub-pixel, and the nearest point of each is kept (z-buffer). The line of sight through
+    the sub-pixel's centre is then intersected with the surface around that point by one Newton step: distances are
+    exact to the second order of half a sub-pixel, some micrometres, and rims to the grid.
 
     Args:
         camera: the camera.

@@ -1,4 +1,4 @@
-"""What cameras see of planes and balls, by casting rays: an exact truth for warping."""
+"""Ray casting of planes and balls: an exact truth for warping."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -11,7 +11,7 @@ from calib.camera import Camera
 
 
 class Solid(Protocol):
-    """What a ray may meet."""
+    """A shape that rays can intersect."""
 
     def meet(self, origin: NDArray[np.float64], rays: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distances (…,) [m] at which rays (…, 3) from an origin (3,) meet it first; infinite or NaN if they do not."""
@@ -65,7 +65,7 @@ def image(camera: Camera, solids: tuple[Solid, ...]) -> NDArray[np.float64]:
 def seen_by(
     camera: Camera, points: NDArray[np.float64], solids: tuple[Solid, ...]
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Whether rig points (…, 3) are in a camera's image, and whether nothing hides them there."""
+    """Masks of the rig points (…, 3) inside a camera's image, and of those that are also visible there."""
     place = camera.project(points)
     with np.errstate(invalid="ignore"):
         inside = np.all((place >= 0) & (place <= (camera.width - 1, camera.height - 1)), axis=-1)

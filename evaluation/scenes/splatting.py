@@ -1,4 +1,4 @@
-"""The loops of the renderer: points to sub-pixels, sub-pixels to what they see, and those to pixels."""
+"""Kernels of the renderer: points to sub-pixels, refinement per sub-pixel, and averaging to pixels."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ CHANNELS = 6
 #: What is seen nowhere is so far away [m].
 FARTHEST_M = 1e6
 
-#: A line of sight that meets a point's tangential plane farther from it than so many sub-pixels passes the surface by.
+#: A line of sight that meets a point's tangent plane farther from it than so many sub-pixels passes the surface by.
 #: A surface that is inclined by more than 83° is so stretched in the image that it is lost.
 _REACH_PX = 6.0
 
@@ -113,7 +113,7 @@ def mix(seen: NDArray[np.float64], n: int, mixed: NDArray[np.float64]) -> None:
 def _meet(
     points: NDArray[np.float64], r: int, c: int, ray: NDArray[np.float64], reach: float
 ) -> tuple[float, float, float, float]:
-    """Where a line of sight meets the tangential plane of one point: distance [m], row, column, cosine of incidence.
+    """Intersection of a ray with the tangent plane of a point: distance [m], row, column, cosine of incidence.
 
     The distance is −1 if it does not, or too far from the point for the plane to be the surface.
     """

@@ -1,4 +1,4 @@
-"""A time-of-flight camera as it measures: every pixel with its own deviation, the fainter the return the worse."""
+"""A time-of-flight camera with noise: a σ per pixel that grows with falling amplitude."""
 
 from dataclasses import dataclass, field
 
@@ -21,7 +21,7 @@ WHITE = 10_000.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """What the camera reports.
+    """Measured images.
 
     Attributes:
         distance: radial distances (height, width) [m] in whole steps; NaN without return.

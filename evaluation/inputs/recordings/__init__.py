@@ -1,4 +1,4 @@
-"""What the tracker makes of recordings of real sensors; those that are not in the data folder are passed over."""
+"""Tracking of recordings of real sensors; recordings that are not in the data folder are skipped."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,31 +16,31 @@ TITLE = "Real recordings: a soft toy (PrimeSense type), an ifm O3R and an Azure 
 
 @dataclass(frozen=True)
 class Settings:
-    """The full evaluation.
+    """Size of the experiment.
 
     Attributes:
         toy_frames: of the toy's sequence, from the first one on.
-        o3r_rounds: how often another tenth of the O3R's pixels is hidden.
+        o3r_folds: of the ten-fold cross-validation over the O3R's pixels, at most 10.
     """
 
     toy_frames: int = 120
-    o3r_rounds: int = 5
+    o3r_folds: int = 5
 
 
-QUICK = Settings(toy_frames=6, o3r_rounds=1)
+QUICK = Settings(toy_frames=6, o3r_folds=1)
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Every recording that is there.
+    """Evaluates every available recording.
 
     Raises:
-        UnavailableError: none is.
+        UnavailableError: there is none.
     """
     if context.data is None:
         raise UnavailableError(f"needs --data DIR, a folder with {', '.join(_FOLDERS)}")
     parts: dict[str, Callable[[Path], Findings]] = {
         toy.FOLDER: lambda folder: toy_report.findings(folder, settings.toy_frames, context.seed, context.progress),
-        sigma_report.FOLDER: lambda folder: sigma_report.findings(folder, context.seed, settings.o3r_rounds),
+        sigma_report.FOLDER: lambda folder: sigma_report.findings(folder, context.seed, settings.o3r_folds),
         azure.FOLDER: azure.findings,
     }
     found = []
@@ -60,7 +60,7 @@ _FOLDERS = (toy.FOLDER, sigma_report.FOLDER, azure.FOLDER)
 
 
 def _part(folder: Path, measure: Callable[[Path], Findings]) -> Findings:
-    """What one recording shows, or only that it is not there."""
+    """Findings of one recording, or a section that it is missing."""
     if not folder.is_dir():
         return Findings((), (Section(folder.name, (f"{folder.name} is not in the data folder.",)),))
     try:

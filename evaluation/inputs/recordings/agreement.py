@@ -1,4 +1,4 @@
-"""How well a tracked mesh and a depth image agree, both ways."""
+"""Residuals between a tracked mesh and a depth image, in both directions."""
 
 from dataclasses import dataclass
 

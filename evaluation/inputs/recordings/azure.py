@@ -24,7 +24,7 @@ from evaluation.sequences import demo_plan
 
 FOLDER = "tof_azure_kinect_pyk4a"
 
-#: What makes edges of the infra-red no longer meet edges of the colours [px].
+#: Shift that separates edges of the infra-red from edges of the colours [px].
 SHIFT = 8
 
 #: σ of this camera's distances within its range, by its data sheet at most [m].
@@ -68,7 +68,7 @@ def read(folder: Path) -> AzureExposure:
 
 
 def edges_agree(exposure: AzureExposure) -> float:
-    """Correlation of edges in amplitudes and in warped colours, over the best of four with the colours moved.
+    """Correlation of edges in amplitudes and in warped colours, over the best of four with shifted colours.
 
     Edges of the infra-red amplitudes are edges of the colours there, if distances and calibration are right.
     """
@@ -87,7 +87,7 @@ def edges_agree(exposure: AzureExposure) -> float:
 
 
 def findings(folder: Path) -> Findings:
-    """Whether colours meet amplitudes, and whether a surface begun in the frame agrees with it when it comes again."""
+    """Registration of colours and amplitudes, and residuals of a surface tracked on the repeated frame."""
     exposure = read(folder)
     ratio = edges_agree(exposure)
     noises = {"depth": Constant(SIGMA_M), "color": GaussianColor(15.0)}

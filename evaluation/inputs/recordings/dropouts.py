@@ -1,4 +1,4 @@
-"""What a tracker makes of the sequence when parts of it are missing, and a live machine that is too slow for it."""
+"""Tracking with missing frames and pixels, and at a limited frame rate."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -55,10 +55,10 @@ def _without(frames: FrameSet, drawn: Callable[[tuple[int, ...]], NDArray[np.boo
 
 def recovery(gapped: Sequence[TrackedFrame], whole: Sequence[TrackedFrame]) -> int:
     """Frames after the gap until the residual is again what it is without one; as many as there are if never."""
-    usual = {frame.index: frame.agreement.forward_mm for frame in whole}
+    baseline = {frame.index: frame.agreement.forward_mm for frame in whole}
     after = [frame for frame in gapped if frame.index >= sum(GAP)]
     for count, frame in enumerate(after):
-        if frame.agreement.forward_mm <= RECOVERED * usual[frame.index]:
+        if frame.agreement.forward_mm <= RECOVERED * baseline[frame.index]:
             return count
     return len(after)
 
@@ -77,9 +77,9 @@ class Pace:
 
 
 def pace(solve_ms: Sequence[float]) -> Pace:
-    """What the sensor's rate would make of searches that take so long: a frame waits until a newer one comes.
+    """Missed frames and ages at the sensor's rate, given the time of each search; a frame waits until a newer one.
 
-    The first one is left out: making the mesh and searching widely happens once.
+    The first is left out: it includes initial detection.
     """
     period = 1000 / RATE_HZ
     free, missed, ages = 0.0, 0, []

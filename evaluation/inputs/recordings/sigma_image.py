@@ -1,8 +1,8 @@
-"""One frame of an ifm O3R: what the σ that the sensor tells for every pixel is worth in the likelihood.
+"""One frame of an ifm O3R: value in the likelihood of the σ that the sensor reports for every pixel.
 
-A tenth of the pixels is hidden from the tracker, which begins on each of the frame's large surfaces with a NURBS, under
-one noise model after the other. The hidden pixels then tell how likely they are, with the mesh as the true surface. The
-noise models' own parameters are those of greatest likelihood for what the other pixels deviate from local planes by.
+Cross-validation: a tenth of the pixels is held out, a NURBS is fitted to each large surface of the frame under each
+noise model, and the likelihood of the held-out pixels is evaluated with the mesh as the true surface. The parameters of
+the noise models are fitted by maximum likelihood to the residuals of the other pixels from local planes.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What the O3R's frame says of its own σ, as findings."""
+"""Findings on the σ that the O3R reports for every pixel."""
 
 from pathlib import Path
 
@@ -63,10 +63,10 @@ def numbers(row: Row) -> dict[str, float]:
 
 
 def _cells(rows: dict[str, Row]) -> tuple[tuple[str | float, ...], ...]:
-    return tuple((row.name, _said(row.model), row.pixels, *numbers(row).values()) for row in rows.values())
+    return tuple((row.name, _parameters(row.model), row.pixels, *numbers(row).values()) for row in rows.values())
 
 
-def _said(model: DepthNoise) -> str:
+def _parameters(model: DepthNoise) -> str:
     match model:
         case Measured():
             return f"factor {model.factor:.3g}, floor {model.floor * 1e3:.2f} mm"

@@ -35,7 +35,7 @@ Change = Callable[[int, FrameSet], FrameSet | None]
 
 @dataclass(frozen=True, eq=False)
 class ReferenceFrame:
-    """One frame set, with what it is judged by: radial distances [m] and the object's pixels (height, width)."""
+    """One frame set with its reference: radial distances [m] and the object's mask (height, width)."""
 
     frames: FrameSet
     distance: NDArray[np.float32]
@@ -45,10 +45,10 @@ class ReferenceFrame:
 
 @dataclass(frozen=True, eq=False)
 class TrackedFrame:
-    """The estimate of one reference, its mesh and how well that agrees with the undisturbed depth image.
+    """The estimate of one frame set, its mesh and its residuals from the complete depth image.
 
     Attributes:
-        index: of the reference.
+        index: of the frame set.
         solve_ms: time that the tracker took [ms].
     """
 
@@ -60,7 +60,7 @@ class TrackedFrame:
 
     @property
     def tracking(self) -> bool:
-        """Whether the estimate says so."""
+        """True if the status of the estimate is TRACKING."""
         return self.estimate.status == Status.TRACKING
 
 
@@ -86,7 +86,7 @@ class Toy:
 
     @cached_property
     def budget_ms(self) -> float:
-        """What the live search may take for a frame set [ms]."""
+        """Time limit of the live search for a frame set [ms]."""
         return self._settings.trackers[TRACKER].budget_ms
 
     def tracking(self) -> Tracking:
@@ -100,8 +100,8 @@ class Toy:
 
         Args:
             clock: time [ns], by which the search's time is measured.
-            change: makes of the frame set of a reference what the tracker sees.
-            budget_ms: what a search may take.
+            change: replaces the frame set of an index before tracking.
+            budget_ms: time limit of a search [ms].
         """
         tracking = self.tracking()
         for index, reference in enumerate(self.references):

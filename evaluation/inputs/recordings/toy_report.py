@@ -48,7 +48,7 @@ def findings(folder: Path, frames: int, seed: int, progress: Callable[[str], Non
         folder: with the images.
         frames: how many of them, from the first on.
         seed: of what is missing.
-        progress: told what is being done.
+        progress: called with the current step.
     """
     toy = Toy(folder, frames)
     progress("the toy as it is")
@@ -66,15 +66,15 @@ def findings(folder: Path, frames: int, seed: int, progress: Callable[[str], Non
     back = dropouts.recovery(gapped, whole) if frames > sum(dropouts.GAP) else None
     sections = (
         Section("Soft toy: agreement with the depth image", (_WHAT, _table(runs), _picture(toy, whole))),
-        Section("Soft toy: live", (_said(kept, live),)),
+        Section("Soft toy: live", (_live_text(kept, live),)),
     )
     return Findings(_goals(runs, kept, back), sections, _values(runs, kept, back))
 
 
 _WHAT = (
     "Forward: median |synthesised − measured distance| over the vertices inside the object's mask; backward: median "
-    "distance of the measured points in the mask from the mesh; both of the median and of the worst frame. What is "
-    "missing is missing for the tracker, not for these numbers."
+    "distance of the measured points in the mask from the mesh; both of the median and of the worst frame. Missing "
+    "frames and pixels are missing for the tracker, not for these numbers."
 )
 
 
@@ -90,7 +90,7 @@ def _goals(runs: Mapping[str, Sequence[TrackedFrame]], kept: Pace, back: int | N
     )
     if back is None:
         return goals
-    return (*goals, at_most("Soft toy: frames after a second without any until the residual is as usual", back, 3))
+    return (*goals, at_most("Soft toy: frames until the residual has recovered after a gap of one second", back, 3))
 
 
 def _table(runs: Mapping[str, Sequence[TrackedFrame]]) -> Table:
@@ -98,13 +98,13 @@ def _table(runs: Mapping[str, Sequence[TrackedFrame]]) -> Table:
 
 
 def _row(name: str, run: Sequence[TrackedFrame]) -> tuple[Cell, ...]:
-    usual, least = medians(run), worst(run)
+    median, extreme = medians(run), worst(run)
     tracking = 100 * float(np.mean([frame.tracking for frame in run]))
-    residuals = (usual.forward_mm, least.forward_mm, usual.backward_mm, least.backward_mm)
-    return (name, len(run), tracking, *residuals, 100 * usual.inside, 100 * usual.covered, 100 * least.covered)
+    residuals = (median.forward_mm, extreme.forward_mm, median.backward_mm, extreme.backward_mm)
+    return (name, len(run), tracking, *residuals, 100 * median.inside, 100 * median.covered, 100 * extreme.covered)
 
 
-def _said(kept: Pace, live: Sequence[TrackedFrame]) -> str:
+def _live_text(kept: Pace, live: Sequence[TrackedFrame]) -> str:
     took = np.array([frame.solve_ms for frame in live[1:]])
     return (
         f"A frame takes {np.median(took):.1f} ms of one processor (95 % take less than {np.quantile(took, 0.95):.1f} "

@@ -19,7 +19,7 @@ TITLE = "E9: input warping: faster, less accurate?"
 
 @dataclass(frozen=True)
 class Settings:
-    """The full evaluation.
+    """Size of the experiment.
 
     Attributes:
         sequences: that are tracked, with seeds that follow each other; as many noises of the warped depth images.

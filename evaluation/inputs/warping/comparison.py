@@ -1,4 +1,4 @@
-"""Input warping (section 3.2) against OpenCV's depth registration: how much is filled, how right, how fast.
+"""Input warping (section 3.2) against OpenCV's depth registration: coverage, accuracy and time.
 
 A slanted plane, a ball and a board before a wall, seen by a depth camera of 640 × 576 pixels with a noise of 1 mm and
 warped into a colour camera of 1280 × 720; the truth is cast along the colour camera's rays, and fill and error are
@@ -64,7 +64,7 @@ def methods(source: Camera, target: Camera, pool: ThreadPoolExecutor) -> dict[st
 
 
 def _register(source: Camera, target: Camera, *, dilate: bool) -> Method:
-    """OpenCV's registration, from and to radial distances; the conversions are not its fault."""
+    """OpenCV's registration, from and to radial distances; the conversions are not part of its time."""
     register = _register_z(source, target, dilate=dilate)
     to_z, per_z = 1 / source.lookup.ray_length, target.lookup.ray_length
 
@@ -78,7 +78,7 @@ def _register(source: Camera, target: Camera, *, dilate: bool) -> Method:
 def _register_z(
     source: Camera, target: Camera, *, dilate: bool
 ) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
-    """OpenCV's registration of images of z [m], 0 where there is none; it knows no distortion of the source."""
+    """OpenCV's registration of images of z [m], 0 where there is none; it ignores distortion of the source."""
     K, L = (np.array([[c.fx, 0, c.cx], [0, c.fy, c.cy], [0, 0, 1]]) for c in (source, target))
     T_ts, lens, size = target.T_sr @ source.T_rs, target.lens.coefficients, (target.width, target.height)
 
@@ -91,14 +91,14 @@ def _register_z(
 def opencv_alone_ms(
     source: Camera, target: Camera, distance: NDArray[np.float64], *, dilate: bool, rounds: int = ROUNDS
 ) -> float:
-    """What `cv2.registerDepth` takes without any conversion [ms]."""
+    """Time of `cv2.registerDepth` without conversions [ms]."""
     register = _register_z(source, target, dilate=dilate)
     z = np.nan_to_num(distance / source.lookup.ray_length).astype(np.float32)
-    return least_ms(lambda: register(z), rounds)
+    return fastest_ms(lambda: register(z), rounds)
 
 
-def least_ms(work: Callable[[], object], rounds: int = ROUNDS) -> float:
-    """The least time of many [ms]."""
+def fastest_ms(work: Callable[[], object], rounds: int = ROUNDS) -> float:
+    """Shortest time of many repetitions [ms]."""
     times = []
     for _ in range(rounds):
         start = time.perf_counter_ns()
@@ -126,7 +126,7 @@ def simulated(scenes: Sequence[str], seeds: Sequence[int], rounds: int, pool: Th
             if name.startswith("cv2"):
                 time_ms = opencv_alone_ms(SOURCE, TARGET, clean, dilate="dilated" in name, rounds=rounds)
             else:
-                time_ms = least_ms(lambda method=method, clean=clean: method(clean), rounds)
+                time_ms = fastest_ms(lambda method=method, clean=clean: method(clean), rounds)
             p95 = float(np.quantile(np.abs(error), 0.95))
             rows.append(Row(scene, name, 100 * float(np.mean(filled)), float(error.mean()), p95, time_ms))
     return rows

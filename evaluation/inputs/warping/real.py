@@ -1,4 +1,4 @@
-"""The Azure Kinect's frame, warped by every method; nobody knows its truth, so all are compared with ours."""
+"""The Azure Kinect's frame, warped by every method; without a truth, all are compared with the mesh warp."""
 
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def section(exposure: AzureExposure, pool: ThreadPoolExecutor) -> Section:
-    """How much of what the mesh fills each method fills and how it differs from the mesh, with pictures."""
+    """Coverage and differences of each method relative to the mesh warp, with pictures."""
     found = {
         name: method(exposure.distance.astype(np.float64))
         for name, method in methods(exposure.cameras["depth"], exposure.cameras["color"], pool).items()
@@ -57,7 +57,7 @@ def _picture(exposure: AzureExposure) -> Picture:
     )
     _show(drawn, places[3], "colour as seen", exposure.rgb, {})
     _show(drawn, places[4], "colour in the depth camera's view", np.nan_to_num(colors, nan=255).astype(np.uint8), {})
-    _show(drawn, places[5], "hidden from the depth camera", warped.hidden(), {"cmap": "gray_r"})
+    _show(drawn, places[5], "occluded in the depth camera", warped.hidden(), {"cmap": "gray_r"})
     return drawing(drawn, "One frame of an Azure Kinect (pyk4a's test recording, MIT)", "Depth and colour images")
 
 

@@ -1,4 +1,4 @@
-"""Every synthesis on the same sequences, whose sensors have lenses: what warping the input costs and saves.
+"""Every synthesis on the same sequences, whose sensors have distorting lenses: accuracy and time of warped input.
 
 The demo rig and a second depth sensor, structured light. A frame costs the median of the processor time from images to
 estimate; a candidate the least of many times for a population, per member, all syntheses in turns.
@@ -84,7 +84,7 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     least = dict.fromkeys(names, np.inf)
     for _ in range(TIMES):
         for name, objective in objectives.items():
-            surface = model.deform(thetas)  # a new one: what was synthesised last is remembered
+            surface = model.deform(thetas)  # a new one: the last synthesis is cached
             begin = time.process_time()
             objective.cost(surface)
             least[name] = min(least[name], time.process_time() - begin)
@@ -92,7 +92,7 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
 
 
 def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> Objective:
-    """What judges candidates of the first frame."""
+    """Objective of the first frame."""
     rig, mesh = sequence.rig, model.mesh
     objective = demo_plan(nurbs.Settings()).objective.build(rig, mesh, synthesis.build(rig, mesh))
     objective.observe(Observer(rig).observe(sequence.exposures[0].frames), model.deform(model.rest[None]))

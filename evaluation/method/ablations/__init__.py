@@ -1,4 +1,4 @@
-"""What a reader asks: what does each part contribute, and how much does it matter how much of it there is?"""
+"""Ablations: contribution of each part of the method, and of its size."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ from evaluation.sequences import (
 
 TITLE = "Ablations: vertices, budget, warm start, priors, noise model"
 
-#: As good as no prior at all.
+#: Deviation of a prior that is switched off.
 FREE = 1e3
 
 #: Of the demo's time-of-flight sensor, on its sheet [m].
@@ -41,32 +41,32 @@ MEAN_DEVIATION = 4.5e-3
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is measured.
+    """Size of the experiment.
 
     Attributes:
         seeds: sequences, each with a motion, print and noise of its own.
         frames: of each.
-        every: exposures from one frame to the next, at 30 Hz.
+        stride: exposures from one frame to the next, at 30 Hz.
         bend: largest angle between two ends of the sheet [degrees].
         speed: of all motion, by that of the demo.
         noise: of all sensors, by that of the demo.
         vertices, populations, generations: that are tried.
-        factors: on the σ of distances that the tracker believes in.
+        sigma_factors: of the σ of distances in the tracker's noise model.
     """
 
     seeds: int = 3
     frames: int = 30
-    every: int = 4
+    stride: int = 4
     bend: float = 90.0
     speed: float = 2.0
     noise: float = 1.5
     vertices: tuple[int, ...] = (100, 200, 400, 800, 1600)
     populations: tuple[int, ...] = (8, 16, 32, 64)
     generations: tuple[int, ...] = (3, 10, 30, 100, 300, 1000)
-    factors: tuple[float, ...] = (0.5, 1.0, 2.0)
+    sigma_factors: tuple[float, ...] = (0.5, 1.0, 2.0)
 
 
-QUICK = Settings(seeds=1, frames=7, every=6, vertices=(100, 300), populations=(8, 32), generations=(3, 30))
+QUICK = Settings(seeds=1, frames=7, stride=6, vertices=(100, 300), populations=(8, 32), generations=(3, 30))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +74,9 @@ class Variant:
     """One line of a table.
 
     Attributes:
-        name: what is different.
+        name: of the variant.
         plan: of the tracker.
-        rig: the sensors as the tracker believes that they are.
+        rig: sensors with the tracker's noise models.
     """
 
     name: str
@@ -99,7 +99,7 @@ class Question:
 
 def questions(settings: Settings) -> list[Question]:
     """All tables, one for every question."""
-    rig = believed(settings.noise, 1.0)
+    rig = assumed_rig(settings.noise, 1.0)
     tried = [
         _question("Vertices", rig, {f"{count}": {"vertices": count} for count in settings.vertices}),
         *_of_searches(settings, rig),
@@ -111,11 +111,11 @@ def questions(settings: Settings) -> list[Question]:
             | {"bends free": {"model": flexpad.Settings(0.3, 0.2, bend_deviation=FREE)}},
         ),
     ]
-    return [*tried, Question("Noise model of distances", _believed(settings))]
+    return [*tried, Question("Noise model of distances", _noise_variants(settings))]
 
 
 def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
-    """What the budget of a search, its cost and its start do."""
+    """Questions on the budget, the cost and the start of a search."""
     search = cma_es.Settings()
     populations = {f"{count}": {"optimizer": cma_es.Settings(count, 30)} for count in settings.populations}
     generations = {f"{count}": {"optimizer": cma_es.Settings(16, count)} for count in settings.generations}
@@ -134,10 +134,10 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
     ]
 
 
-def _believed(settings: Settings) -> tuple[Variant, ...]:
-    """The true law with a σ that is wrong by some factor, and models that know less."""
+def _noise_variants(settings: Settings) -> tuple[Variant, ...]:
+    """The true noise model with a scaled σ, and simpler models."""
     plan = demo_plan(nurbs.Settings())
-    laws = {f"{factor:g} σ": believed(settings.noise, factor) for factor in settings.factors}
+    laws = {f"{factor:g} σ": assumed_rig(settings.noise, factor) for factor in settings.sigma_factors}
     laws["one σ everywhere"] = _with_noise(Constant(settings.noise * MEAN_DEVIATION))
     return tuple(Variant(name, plan, rig) for name, rig in laws.items())
 
@@ -155,8 +155,8 @@ PRIORS: Mapping[str, priors.Settings] = {
 }
 
 
-def believed(noise: float, factor: float) -> Rig:
-    """The demo's sensors, which err by `noise` of what they err there; distances by a σ that is wrong by a factor."""
+def assumed_rig(noise: float, factor: float) -> Rig:
+    """Demo rig whose sensors have `noise` times the demo's noise, with the σ of distances scaled by `factor`."""
     law, true = factor * noise, TimeOfFlightNoise()
     return _with_noise(TofAmplitude((law * true.sigma_offset, law * true.sigma_distance), law * true.sigma_amplitude))
 
@@ -194,11 +194,11 @@ def run(settings: Settings, context: Context) -> Findings:
 def _exposures(settings: Settings, seed: int) -> list[LabeledExposure]:
     motion = f"bend={settings.bend:g}&speed={settings.speed:g}&noise={settings.noise:g}"
     simulation = simulate(f"simulated://sheet?seed={seed}&{motion}")
-    return expose(simulation, moving_indices(settings.frames, settings.every))
+    return expose(simulation, moving_indices(settings.frames, settings.stride))
 
 
 def _goals(values: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[Goal, ...]:
-    """What must hold whatever the figures are: no part of the default is a burden."""
+    """Goals: no part of the default setup increases the error."""
     sigma = values["Noise model of distances"]
     wrong = max(sigma[name]["vertex_mm"] for name in sigma if name.endswith(" σ")) / sigma["1 σ"]["vertex_mm"]
     of_priors = values["Priors, NURBS"]
@@ -214,7 +214,7 @@ def _goals(values: Mapping[str, Mapping[str, Mapping[str, float]]]) -> tuple[Goa
 def _about(settings: Settings) -> str:
     return (
         f"The demo's sheet, bent by up to {settings.bend:g}°, {settings.speed:g} times as fast, with "
-        f"{settings.noise:g} times the noise, one image in {settings.every / 30:.2g} s; time of flight and colour. "
-        "Whatever a line does not say is the default: NURBS of 4 × 4 control points, 300 vertices, hybrid. Figures are "
+        f"{settings.noise:g} times the noise, one image in {settings.stride / 30:.2g} s; time of flight and colour. "
+        "Everything else is the default: NURBS of 4 × 4 control points, 300 vertices, hybrid. Figures are "
         "means over the sequences."
     )

@@ -1,4 +1,4 @@
-"""Searches that do not begin where the last frame ended: what ablations put in the place of a warm start."""
+"""Searches without a warm start, for ablations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ from abs_service.tracking.session import OptimizerSettings
 
 @dataclass(frozen=True)
 class Forgetful:
-    """A search that begins every frame where the motion prior says, but as if it had never searched before.
+    """A search that starts every frame at the motion prediction, without step size and covariance of the last frame.
 
     Attributes:
-        search: the search, of which step size and covariance are forgotten.
+        search: the search whose state is reset.
     """
 
     search: OptimizerSettings
@@ -28,7 +28,7 @@ class Forgetful:
 
 @dataclass(frozen=True)
 class Cold:
-    """A search that begins every frame where the first one began.
+    """A search that starts every frame at the start of the first.
 
     Attributes:
         search: the search.

@@ -11,7 +11,7 @@ from evaluation.sequences import TrackedSequence, effort
 
 
 def figures(runs: Sequence[TrackedSequence]) -> dict[str, float]:
-    """What was measured of some sequences, by name."""
+    """Statistics of some sequences, by name."""
     vertex = [one.vertex_mm for one in runs]
     return {
         "vertex_mm": float(np.mean(vertex)),
@@ -45,11 +45,11 @@ def curves(found: Mapping[str, Mapping[str, Sequence[TrackedSequence]]]) -> Pict
         axes.set(xscale="log", xlabel=title, ylabel="error [mm]", ylim=(0, None))
         axes.grid(color="0.9")
         axes.legend()
-    return drawing(drawn, "Error against what there is of each.", "Errors fall and level off")
+    return drawing(drawn, "Error against the size of each part.", "Errors fall and level off")
 
 
 def scene(exposures: Sequence[LabeledExposure]) -> Picture:
-    """What the sensors see at the end of a sequence."""
+    """Images of the sensors at the end of a sequence."""
     drawn = plots.figure(9, 3.2)
     frames = exposures[-1].frames.frames
     for axes, key in zip(drawn.subplots(1, 3), (("tof", "depth"), ("tof", "amplitude"), ("color", "color"))):

@@ -1,11 +1,11 @@
-"""The honest rival: a B-spline sheet fitted to one depth image by Gauss–Newton, in plain NumPy."""
+"""Baseline: a B-spline sheet fitted to one depth image by Gauss–Newton, in plain NumPy."""
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
-from evaluation.scenes.bent_sheet import CAMERA, SIDE, Shot
+from evaluation.scenes.bent_sheet import CAMERA, SIDE, SheetFrame
 from evaluation.scenes.surfaces import knots
 
 CONTROL, DEGREE, ITERATIONS = 4, 3, 6
@@ -21,7 +21,7 @@ class GaussNewton:
     Args:
         vertices: the template (n, 3) [m] in its first pose, row by row.
         sigma: standard deviation of the distances [m].
-        knows_hole: whether it is told which pixels are a hole; else what is missing there is beside the silhouette.
+        knows_hole: True if the mask of the hole is given; otherwise the hole counts as outside the silhouette.
     """
 
     def __init__(self, vertices: NDArray[np.float64], sigma: float, knows_hole: bool = False):
@@ -35,17 +35,17 @@ class GaussNewton:
         self._control = np.linalg.pinv(self._basis) @ vertices
         self._sigma, self._knows_hole = sigma, knows_hole
 
-    def track(self, shot: Shot) -> NDArray[np.float64]:
+    def track(self, frame: SheetFrame) -> NDArray[np.float64]:
         """Vertices (n, 3) [m] in a frame."""
-        points = CAMERA.unproject(shot.distance)
-        nearest = _nearest_on(shot.sheet)
+        points = CAMERA.unproject(frame.distance)
+        nearest = _nearest_on(frame.sheet)
         before = self._control
         for _ in range(ITERATIONS):
             vertices = self._basis @ self._control
             columns, rows = np.floor(CAMERA.project(vertices) + 0.5).astype(int).T
             rows, columns = np.clip(rows, 0, CAMERA.height - 1), np.clip(columns, 0, CAMERA.width - 1)
-            use = ~shot.hole[rows, columns] if self._knows_hole else np.ones(len(rows), bool)
-            beside = use & ~shot.sheet[rows, columns]
+            use = ~frame.hole[rows, columns] if self._knows_hole else np.ones(len(rows), bool)
+            beside = use & ~frame.sheet[rows, columns]
             rows, columns = nearest[:, rows, columns]
             away = points[rows, columns] - vertices
             ray = vertices / np.linalg.norm(vertices, axis=1, keepdims=True)

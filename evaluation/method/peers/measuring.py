@@ -1,4 +1,4 @@
-"""Runs a follower through a scene: its errors and what it costs."""
+"""Runs a tracker through a scene: its errors and what it costs."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -9,40 +9,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracking.truth import closest_points
-from evaluation.method.peers.rivals import Follower
-from evaluation.scenes.bent_sheet import SIDE, Moment, Shot, places
+from evaluation.method.peers.competitors import SheetTracker
+from evaluation.scenes.bent_sheet import SIDE, SheetFrame, SheetState, places
 
-#: A follower whose vertices are on average farther than this from their material, in so many frames in a row, has lost
+#: A tracker whose vertices are on average farther than this from their material, in so many frames in a row, has lost
 #: the object [m]; five frames are a sixth of a second.
 LOST_M, LOST_FRAMES = 0.01, 5
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
-    """What one tracker made of one sequence, the first frame, of which everything is known, left out.
+class TrackedRun:
+    """Result of one tracker on one sequence, without the first frame, whose state is given.
 
     Attributes:
         at: places (n, 2) [m] of the vertices on the flat sheet.
-        moments: the sheet in every frame.
+        states: the sheet in every frame.
         vertices: of every frame (n, 3) [m].
         cpu_ms: processor time of every frame, all threads [ms].
     """
 
     at: NDArray[np.float64]
-    moments: Sequence[Moment]
+    states: Sequence[SheetState]
     vertices: Sequence[NDArray[np.floating]]
     cpu_ms: NDArray[np.float64]
 
     @cached_property
     def vertex_mm(self) -> NDArray[np.float64]:
         """Mean distance of the vertices from their own material [mm], of every frame."""
-        return _mean_mm(self.vertices, (moment.points(self.at) for moment in self.moments))
+        return _mean_mm(self.vertices, (state.points(self.at) for state in self.states))
 
     @cached_property
     def surface_mm(self) -> NDArray[np.float64]:
         """Mean distance of the vertices from the surface [mm], of every frame."""
-        pairs, fine = zip(self.vertices, self.moments), places(61, 41)
-        return _mean_mm(self.vertices, (closest_points(vertices, moment.points(fine)) for vertices, moment in pairs))
+        pairs, fine = zip(self.vertices, self.states), places(61, 41)
+        return _mean_mm(self.vertices, (closest_points(vertices, state.points(fine)) for vertices, state in pairs))
 
     @property
     def far(self) -> int:
@@ -52,7 +52,7 @@ class Followed:
 
     @property
     def lost(self) -> bool:
-        """Whether the object was lost."""
+        """True if the object was lost."""
         return self.far > LOST_FRAMES
 
 
@@ -60,37 +60,37 @@ def _mean_mm(found: Iterable[NDArray[np.floating]], true: Iterable[NDArray[np.fl
     return np.array([1e3 * np.linalg.norm(one - other, axis=1).mean() for one, other in zip(found, true)])
 
 
-def follow(follower: Follower, at: NDArray[np.float64], shots: Sequence[Shot]) -> Followed:
-    """Follows shots after the first, one right after the other.
+def track_frames(tracker: SheetTracker, at: NDArray[np.float64], frames: Sequence[SheetFrame]) -> TrackedRun:
+    """Tracks the frames after the first, one right after the other.
 
     Args:
-        follower: has the first shot behind it.
+        tracker: has the first frame behind it.
         at: places (n, 2) [m] of its vertices on the flat sheet.
-        shots: the sequence.
+        frames: the sequence.
     """
     tracked, cpu = [], []
-    for shot in shots[1:]:
+    for frame in frames[1:]:
         begun = time.process_time()
-        tracked.append(follower.track(shot))
+        tracked.append(tracker.track(frame))
         cpu.append(time.process_time() - begun)
     # Errors are found when they are asked for: in between, that would drive what the tracker needs out of the caches.
-    return Followed(at, [shot.moment for shot in shots[1:]], tracked, 1e3 * np.array(cpu))
+    return TrackedRun(at, [frame.state for frame in frames[1:]], tracked, 1e3 * np.array(cpu))
 
 
-def least(repeats: Sequence[Followed]) -> Followed:
+def fastest(repeats: Sequence[TrackedRun]) -> TrackedRun:
     """A sequence that was followed several times, with the least time of each frame: what else runs only adds to it."""
     return replace(repeats[0], cpu_ms=np.min([one.cpu_ms for one in repeats], axis=0))
 
 
-#: Makes a follower that knows the sheet in the first shot, and tells the places (n, 2) [m] of its vertices.
-Make = Callable[[Shot, float, int], tuple[Follower, NDArray[np.float64]]]
+#: Makes a tracker that knows the sheet in the first frame, and tells the places (n, 2) [m] of its vertices.
+TrackerFactory = Callable[[SheetFrame, float, int], tuple[SheetTracker, NDArray[np.float64]]]
 
 
-def with_template(make: Callable[[NDArray[np.float64]], Follower]) -> Make:
+def with_template(make: Callable[[NDArray[np.float64]], SheetTracker]) -> TrackerFactory:
     """A maker for what begins with the template's vertices."""
 
-    def start(first: Shot, sigma: float, seed: int) -> tuple[Follower, NDArray[np.float64]]:
+    def start(first: SheetFrame, sigma: float, seed: int) -> tuple[SheetTracker, NDArray[np.float64]]:
         at = places(SIDE, SIDE).reshape(-1, 2)
-        return make(first.moment.points(at)), at
+        return make(first.state.points(at)), at
 
     return start

@@ -7,10 +7,10 @@ import numpy as np
 
 from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
-from evaluation.method.peers.measuring import LOST_FRAMES, LOST_M, Followed
-from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, Scene
+from evaluation.method.peers.measuring import LOST_FRAMES, LOST_M, TrackedRun
+from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, SheetScene
 
-Rows = Mapping[str, Sequence[Followed]]
+Rows = Mapping[str, Sequence[TrackedRun]]
 
 _COLUMNS = (
     Column("tracker"), Column("time, median", "ms", ".2f"),
@@ -20,7 +20,7 @@ _COLUMNS = (
 )  # fmt: skip
 
 #: How the row that does not track is called.
-_STILL = "none"
+_NO_TRACKING = "none"
 
 _TITLES = {
     "5 mm": "Bending to ±120°, 5 mm noise",
@@ -32,7 +32,11 @@ _TITLES = {
 
 
 def sections(
-    scenes: Mapping[str, Scene], found: Mapping[str, Rows], leapt: Rows, missing: Sequence[str], slow: Sequence[str]
+    scenes: Mapping[str, SheetScene],
+    found: Mapping[str, Rows],
+    leapt: Rows,
+    missing: Sequence[str],
+    slow: Sequence[str],
 ) -> tuple[Section, ...]:
     """The evidence.
 
@@ -41,10 +45,10 @@ def sections(
         found: what every tracker made of every scene.
         leapt: what some made of sheets that leapt.
         missing: packages that are not installed.
-        slow: rivals that follow a few frames only.
+        slow: competitors that follow a few frames only.
     """
     said = [
-        "A sheet of 300 × 200 mm, about 1 m before a depth camera of 176 × 144 pixels (f = 183 pixels), filmed at "
+        "A sheet of 300 × 200 mm, about 1 m before a depth camera of 176 × 144 pixels (f = 183 pixels), rendered at "
         "30 Hz; a wall 60 cm behind it. All begin with the same 20 × 20 vertices (FlexPad: its own grid of about "
         "as many) where they really are in the first frame, and each frame with what they found in the last. "
         "Point-set methods and Gauss–Newton are told which pixels show the sheet; ours tell that themselves. Times "
@@ -56,7 +60,7 @@ def sections(
     if missing:
         said.append(f"Not installed here, so left out: {', '.join(missing)} (`make all`).")
     if slow:
-        said.append(f"Followed ten frames of one seed only, because they take so long: {', '.join(slow)}.")
+        said.append(f"TrackedRun ten frames of one seed only, because they take so long: {', '.join(slow)}.")
     about = Section("What is compared", tuple(said))
     return (
         about,
@@ -98,7 +102,7 @@ def losses(leapt: Rows) -> dict[str, Any]:
     }
 
 
-def _row(runs: Sequence[Followed]) -> tuple[float, ...]:
+def _row(runs: Sequence[TrackedRun]) -> tuple[float, ...]:
     ms = np.concatenate([one.cpu_ms for one in runs])
     vertex = [one.vertex_mm.mean() for one in runs]
     return (
@@ -147,9 +151,9 @@ def _curves(name: str, rows: Rows) -> Picture:
     return drawing(figure, "Vertex error over time, first seed", f"Vertex error of every tracker over time: {name}")
 
 
-def _worst(scene: Scene, rows: Rows) -> Picture:
+def _worst(scene: SheetScene, rows: Rows) -> Picture:
     """Vertices and their material, in the camera's view, in each tracker's worst frame of the first seed."""
-    ours, *others = (title for title in rows if not title.startswith(_STILL))
+    ours, *others = (title for title in rows if not title.startswith(_NO_TRACKING))
     shown = [ours, *others[-5:]]
     figure = plots.figure(2.6 * len(shown), 2.4)
     for place, title in enumerate(shown, start=1):

@@ -1,10 +1,10 @@
-"""E4 and E5 on a checker board: black and white are everywhere, so that the bias of the black nearly cancels."""
+"""E4 and E5 on a checker board: black and white are mixed everywhere, so the bias of the black nearly cancels."""
 
 import numpy as np
 
 from evaluation.experiment import Context, Findings
 from evaluation.paper.flat_boards import comparison
-from evaluation.paper.flat_boards.comparison import QUICK, Board, Settings, places, squared_print
+from evaluation.paper.flat_boards.comparison import QUICK, Board, Settings, board_print, texel_positions
 from evaluation.paper.flat_boards.report import Published
 
 __all__ = ["QUICK", "TITLE", "Settings", "run"]
@@ -14,11 +14,11 @@ TITLE = "E4 and E5: a flat checker board under a bias that depends on the amplit
 #: Edge of a square [m].
 SQUARE_M = 0.05
 
-_ACROSS, _DOWN = places()
+_ACROSS, _DOWN = texel_positions()
 
 BOARD = Board(
     "checker board",
-    squared_print((np.floor(_ACROSS / SQUARE_M) + np.floor(_DOWN / SQUARE_M)) % 2 == 0),
+    board_print((np.floor(_ACROSS / SQUARE_M) + np.floor(_DOWN / SQUARE_M)) % 2 == 0),
     Published((0.16, 0.11), (0.12, 0.09)),
     {"FlexPad": 0.16 / 0.12, "NURBS": 1.0},
 )

@@ -1,4 +1,4 @@
-"""E4 and E5: a flat board whose print biases a time-of-flight sensor; whatever bends in the estimate is its error."""
+"""E4 and E5: a flat board whose print biases a time-of-flight sensor; every bend of the estimate is an error."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ from drivers.simulated.simulation import Simulation
 from evaluation.experiment import Context, Findings, Goal, at_least
 from evaluation.paper.flat_boards import report
 from evaluation.paper.flat_boards.report import Comparison, Published
-from evaluation.paper.wall_calibration import learnt
+from evaluation.paper.wall_calibration import calibrated_noise
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import TrackedSequence, demo_plan, euclidean_fitness, expose, mean_deviation, track
 
@@ -33,7 +33,7 @@ from evaluation.sequences import TrackedSequence, demo_plan, euclidean_fitness, 
 WIDTH, HEIGHT = 0.30, 0.20
 BLACK, WHITE = 0.15, 0.85
 
-#: Nearer than this is the board, farther the wall [m].
+#: Distance between board and wall [m].
 BETWEEN_M = 1.3
 
 #: Texels per metre of a print, and the deviation of its blur [m].
@@ -42,50 +42,50 @@ _DENSITY, _BLUR = 1600.0, 0.001
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is measured.
+    """Size of the experiment.
 
     Attributes:
         sequences: each with a motion of its own.
         frames: of each.
-        every: exposures from one frame to the next; 1 is 30 Hz.
+        stride: exposures from one frame to the next; 1 is 30 Hz.
         bias: mean offset of the sensor's distances times amplitude [m].
-        biases: others that the ratios are told for, on a part of the first sequence.
-        published: frames of the first sequence that are searched with the paper's budgets as well.
-        still: frames of each static sequence of the noise calibration.
+        biases: further ones, evaluated on a part of the first sequence.
+        paper_budget_frames: frames of the first sequence that are searched with the paper's budgets as well.
+        static_frames: frames of each static sequence of the noise calibration.
     """
 
     sequences: int = 2
     frames: int = 150
-    every: int = 3
+    stride: int = 3
     bias: float = -40.0
     biases: tuple[float, ...] = (0.0, -20.0, -60.0)
-    published: int = 12
-    still: int = 10
+    paper_budget_frames: int = 12
+    static_frames: int = 10
 
 
-QUICK = Settings(sequences=1, frames=20, every=9, biases=(), published=0, still=2)
+QUICK = Settings(sequences=1, frames=20, stride=9, biases=(), paper_budget_frames=0, static_frames=2)
 
 
 @dataclass(frozen=True, eq=False)
 class Board:
-    """What is printed on a board, and what is expected of it.
+    """Print of a board and its goals.
 
     Attributes:
         name: such as "checker board".
         texture: the print.
         published: the paper's figures for FlexPad.
-        least_ratios: goals for the ratios of the errors, Euclidean over likelihood, by the model's name.
+        min_ratios: goals for the ratios of the errors, Euclidean over likelihood, by the model's name.
     """
 
     name: str
     texture: Texture
     published: Published
-    least_ratios: Mapping[str, float]
+    min_ratios: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A model, and how far its estimates are from flat.
+    """A model, and its deviation from flat.
 
     Attributes:
         model: its settings.
@@ -101,22 +101,22 @@ class Measure:
 
 
 def largest_bends(followed: TrackedSequence) -> NDArray[np.float64]:
-    """Largest |bend| (frames,) of FlexPad, at most 2, which is a radius of `least_radius_m`; in truth all are 0."""
+    """Largest |bend| (frames,) of FlexPad, clamped to 2, a radius of `least_radius_m`; the true bends are 0."""
     return np.minimum(np.abs(followed.thetas[:, flexpad.BENDS]).max(axis=1), FULL)
 
 
 def unevenness_mm(followed: TrackedSequence) -> NDArray[np.float64]:
-    """Mean distance (frames,) of the control points from their best plane [mm]; in truth they lie on one."""
-    return np.array([from_plane(theta.reshape(-1, 3)) for theta in followed.thetas]) * 1e3
+    """Mean distance (frames,) of the control points from their least-squares plane [mm]; the true distance is 0."""
+    return np.array([mean_plane_distance(theta.reshape(-1, 3)) for theta in followed.thetas]) * 1e3
 
 
-def from_plane(points: NDArray[np.float64]) -> float:
+def mean_plane_distance(points: NDArray[np.float64]) -> float:
     """Mean distance of points (n, 3) from the plane of least squares through them."""
     arms = points - points.mean(axis=0)
     return float(np.abs(arms @ np.linalg.svd(arms, full_matrices=False)[2][2]).mean())
 
 
-#: The bends are all but free: a prior that prefers flat sheets would lead both fitness functions to the right answer.
+#: The prior of the bends is weak: one that prefers flat sheets would give the right answer with both fitness functions.
 MEASURES: Mapping[str, Measure] = {
     "FlexPad": Measure(
         flexpad.Settings(WIDTH, HEIGHT, bend_deviation=10.0),
@@ -128,13 +128,13 @@ MEASURES: Mapping[str, Measure] = {
 }
 
 
-def squared_print(black: NDArray[np.bool_]) -> Texture:
-    """The print of a board from where it is black (rows, columns): with edges as blurred as a lens makes them."""
+def board_print(black: NDArray[np.bool_]) -> Texture:
+    """Texture of a board from its mask of black (rows, columns), blurred as by a lens."""
     plane = gaussian_filter(np.where(black, BLACK, WHITE), _BLUR * _DENSITY, mode="nearest").astype(np.float32)
     return Texture(np.repeat(plane[..., None], 4, axis=-1), _DENSITY)
 
 
-def places() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def texel_positions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Distances [m] of a print's texels (rows, columns) from the board's left and upper rim."""
     rows, columns = round(HEIGHT * _DENSITY) + 1, round(WIDTH * _DENSITY) + 1
     down, across = np.indices((rows, columns)) / _DENSITY
@@ -142,13 +142,13 @@ def places() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 def run(board: Board, settings: Settings, context: Context) -> Findings:
-    """Both models with both fitness functions on a board."""
-    noise = _learnt(settings.bias, settings, context)
+    """Compares both fitness functions with both models on a board."""
+    noise = _calibrated(settings.bias, settings, context)
     sequences = [_sequence(board, settings.bias, settings, context, n) for n in range(settings.sequences)]
     compared = [compare(name, noise, sequences, hybrid.Settings(), context) for name in MEASURES]
     goals = [_goal(board, comparison) for comparison in compared]
-    if settings.published:
-        short = [sequences[0][: settings.published]]
+    if settings.paper_budget_frames:
+        short = [sequences[0][: settings.paper_budget_frames]]
         compared += [compare(name, noise, short, measure.search, context) for name, measure in MEASURES.items()]
     by_bias = {bias: _of_bias(board, bias, settings, context) for bias in settings.biases}
     by_bias |= {settings.bias: compared[: len(MEASURES)]} if by_bias else {}
@@ -178,7 +178,7 @@ def compare(
 ) -> Comparison:
     """Euclidean fitness and likelihood on the same sequences, with the same mesh, priors and search.
 
-    The mesh is made with the noise model in both, so that both begin with a flat sheet.
+    The initial mesh uses the noise model in both, so that both start with a flat sheet.
     """
     measure = MEASURES[name]
     optics = OPTICS["tof"]
@@ -190,28 +190,28 @@ def compare(
         plan = demo_plan(measure.model, objective=objective, optimizer=search)
         followed[title] = [track(rig, plan, exposures) for exposures in sequences]
     errors = {title: np.concatenate([measure.error(one) for one in runs]) for title, runs in followed.items()}
-    return Comparison(name, report.words(search), measure.unit, followed, errors)
+    return Comparison(name, report.search_name(search), measure.unit, followed, errors)
 
 
-def _learnt(bias: float, settings: Settings, context: Context) -> TofAmplitude:
+def _calibrated(bias: float, settings: Settings, context: Context) -> TofAmplitude:
     context.progress(f"noise calibration, bias {bias:g}")
-    return learnt(f"dark={bias}", settings.still, context.seed)
+    return calibrated_noise(f"dark={bias}", settings.static_frames, context.seed)
 
 
 def _sequence(board: Board, bias: float, settings: Settings, context: Context, number: int) -> list[LabeledExposure]:
     context.progress(f"{board.name}, sequence {number + 1}")
-    indices = range(0, settings.frames * settings.every, settings.every)
+    indices = range(0, settings.frames * settings.stride, settings.stride)
     return expose(simulation(board, context.seed + number + 1, bias), indices)
 
 
 def _of_bias(board: Board, bias: float, settings: Settings, context: Context) -> list[Comparison]:
-    """Both models with another bias, on some frames of the first sequence, in which the board has begun to move."""
+    """Both models with another bias, on frames of the first sequence in which the board moves."""
     exposures = _sequence(board, bias, replace(settings, frames=50), context, 0)
     exposures = [exposures[0], *exposures[14:]]
-    noise = _learnt(bias, settings, context)
+    noise = _calibrated(bias, settings, context)
     return [compare(name, noise, [exposures], hybrid.Settings(), context) for name in MEASURES]
 
 
 def _goal(board: Board, comparison: Comparison) -> Goal:
     what = f"{comparison.model} on the {board.name}, error of Euclidean fitness / likelihood"
-    return at_least(what, comparison.ratio, board.least_ratios[comparison.model])
+    return at_least(what, comparison.ratio, board.min_ratios[comparison.model])

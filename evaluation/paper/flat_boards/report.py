@@ -33,7 +33,7 @@ class Published:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What both fitness functions made of the same sequences.
+    """Results of both fitness functions on the same sequences.
 
     Attributes:
         model: "FlexPad" or "NURBS".
@@ -78,8 +78,8 @@ class Comparison:
         ]  # fmt: skip
 
 
-def words(search: OptimizerSettings) -> str:
-    """What a search is called: the paper's by its budget."""
+def search_name(search: OptimizerSettings) -> str:
+    """Name of a search, with its budget."""
     if isinstance(search, cma_es.Settings):
         return f"CMA-ES, {search.generations} × {search.population} at most"
     return "hybrid"
@@ -99,7 +99,7 @@ def sections(
         board: its name.
         published: the paper's figures.
         exposures: the first sequence.
-        noise: what the static walls told.
+        noise: noise model from the static walls.
         compared: the comparisons; the first ones, one for each model, are drawn.
         by_bias: comparisons with other biases.
     """
@@ -107,10 +107,10 @@ def sections(
     scene = Section(
         "The scene",
         (
-            "Nothing bends. The sensor errs the more the less light returns, as 15 static sequences of a wall told: "
+            "Nothing bends. The sensor's error grows with falling amplitude; from 15 static sequences of a wall: "
             f"μ = {noise.mu_amplitude:.3g} m / a, {noise.mu_amplitude / 8.5:.2g} mm on the white and "
-            f"{noise.mu_amplitude / 1.5:.2g} mm on the black at 1 m. The likelihood knows that, and the Euclidean "
-            "fitness cannot.",
+            f"{noise.mu_amplitude / 1.5:.2g} mm on the black at 1 m. The likelihood models this, the Euclidean "
+            "fitness does not.",
             drawing(
                 _scene(exposures[middle], first, middle),
                 "One frame: amplitude, and cross-sections of the board along its middle.",
@@ -146,8 +146,8 @@ def _errors(published: Published, compared: Sequence[Comparison]) -> Section:
         paper,
     )
     note = (
-        "A bend of 2 is a radius of 0.1 m here; what it is in the paper is not said, so that only the ratios can be "
-        "compared. The paper's means for NURBS are lost in its text. Times are processor time of a whole frame."
+        "A bend of 2 is a radius of 0.1 m here; the paper does not define its unit, so only the ratios can be "
+        "compared. The paper's means for NURBS are missing in its text. Times are processor time of a whole frame."
     )
     return Section("Errors", (Table(caption, columns, rows), said, note, _course(compared)))
 

@@ -1,10 +1,10 @@
-"""E4 and E5 on a white board with a black centre, made to mislead: the bias of the black bends the board."""
+"""E4 and E5 on a white board with a black centre, the worst case: the bias of the black bends the board."""
 
 import numpy as np
 
 from evaluation.experiment import Context, Findings
 from evaluation.paper.flat_boards import comparison
-from evaluation.paper.flat_boards.comparison import QUICK, WIDTH, Board, Settings, places, squared_print
+from evaluation.paper.flat_boards.comparison import QUICK, WIDTH, Board, Settings, board_print, texel_positions
 from evaluation.paper.flat_boards.report import Published
 
 __all__ = ["QUICK", "TITLE", "Settings", "run"]
@@ -13,7 +13,7 @@ TITLE = "E4 and E5: a flat white board with a black centre under a bias that dep
 
 BOARD = Board(
     "stripe board",
-    squared_print(np.abs(places()[0] - WIDTH / 2) < WIDTH / 6),
+    board_print(np.abs(texel_positions()[0] - WIDTH / 2) < WIDTH / 6),
     Published((0.92, 0.23), (0.24, 0.17)),
     {"FlexPad": 3.8, "NURBS": 2.0},
 )

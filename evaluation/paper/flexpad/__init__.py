@@ -1,4 +1,4 @@
-"""E2: a sheet that bends as FlexPad says, so that the true Θ is known, before a sensor of known deviation.
+"""E2: a sheet that bends as in the FlexPad model, so that the true Θ is known, in front of a sensor of known σ.
 
 The simulator rolls a sheet onto a cylinder, exactly and with code of its own. If the bent direction is one of FlexPad's
 four and the cylinder touches the sheet's centre, both sides of that direction are bent alike and all others are flat.
@@ -30,7 +30,7 @@ from drivers.simulated.simulation import Simulation
 from evaluation.experiment import Context, Findings, at_least
 from evaluation.paper.flexpad import report
 from evaluation.paper.flexpad.report import Errors, Tracked
-from evaluation.paper.wall_calibration import learnt
+from evaluation.paper.wall_calibration import calibrated_noise
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
     TrackedSequence,
@@ -62,33 +62,33 @@ MODEL = flexpad.Settings(WIDTH, HEIGHT)
 
 @dataclass(frozen=True)
 class Settings:
-    """How much is measured.
+    """Size of the experiment.
 
     Attributes:
         directions: that sheets bend in, of `DIRECTIONS`.
         motions: sequences of each.
         frames: of each sequence.
-        every: exposures from one frame to the next, at 30 Hz; one is taken of the first second, in which nothing moves.
+        stride: exposures from one frame to the next, at 30 Hz; one is taken of the first second, at rest.
         bend: largest angle between two ends of a sheet [degrees].
-        published: frames of the first sequence that are searched with the paper's budget as well.
-        still: frames of each static sequence of the noise calibration.
+        paper_budget_frames: frames of the first sequence that are searched with the paper's budget as well.
+        static_frames: frames of each static sequence of the noise calibration.
     """
 
     directions: tuple[int, ...] = DIRECTIONS
     motions: int = 2
     frames: int = 50
-    every: int = 5
+    stride: int = 5
     bend: float = 75.0
-    published: int = 20
-    still: int = 10
+    paper_budget_frames: int = 20
+    static_frames: int = 10
 
 
-QUICK = Settings(directions=(0, 135), motions=1, frames=16, every=8, published=0, still=2)
+QUICK = Settings(directions=(0, 135), motions=1, frames=16, stride=8, paper_budget_frames=0, static_frames=2)
 
 
 @dataclass(frozen=True)
 class OneDirection:
-    """A motion of which only those bends are kept that FlexPad has.
+    """A motion restricted to bends in one of the directions of FlexPad.
 
     Attributes:
         motion: what is left of it.
@@ -132,7 +132,7 @@ class Bent:
         return Simulation(scene, {"tof": TimeOfFlight("tof", _camera(), scene, 30.0)}, self.seed, 30.0)
 
     def errors(self, followed: TrackedSequence) -> Errors:
-        """How far the estimates' parameters are from the true ones."""
+        """Errors of the estimated parameters."""
         bends, poses = followed.thetas[:, flexpad.BENDS], []
         true = np.zeros_like(bends)
         first = 2 * DIRECTIONS.index(self.degrees)
@@ -147,15 +147,15 @@ class Bent:
 def run(settings: Settings, context: Context) -> Findings:
     """Follows all sequences with the Euclidean fitness, bounded and not, and with the likelihood."""
     context.progress("noise calibration")
-    noise = learnt("", settings.still, context.seed)
+    noise = calibrated_noise("", settings.static_frames, context.seed)
     bents, tracked, sequences = [], [], []
     for degrees in settings.directions:
         for number in range(settings.motions):
             context.progress(f"bends of {degrees}°, sequence {number + 1}")
             bents.append(Bent(degrees, context.seed + 1 + 10 * degrees + number, settings.bend))
-            sequences.append(expose(bents[-1].simulation(), moving_indices(settings.frames, settings.every)))
+            sequences.append(expose(bents[-1].simulation(), moving_indices(settings.frames, settings.stride)))
             tracked.append(_track(bents[-1], sequences[-1], noise, hybrid.Settings()))
-    few, budgets = sequences[0][: settings.published], {}
+    few, budgets = sequences[0][: settings.paper_budget_frames], {}
     if few:
         context.progress("the paper's budget")
         published = cma_es.Settings(population=16, generations=400)

@@ -54,7 +54,7 @@ class Tracked:
     errors: Mapping[str, Errors]
 
     def figures(self, fitness: str) -> dict[str, float]:
-        """What was measured with a fitness function, by name."""
+        """Statistics of a fitness function, by name."""
         followed, errors = self.followed[fitness], self.errors[fitness]
         return {
             "bend": errors.bend,

@@ -1,4 +1,4 @@
-"""E1: what it is worth to know how every pixel errs, on ten geometries; and how near that comes to what is possible."""
+"""E1: value of a noise model per pixel on ten geometries, compared with the Cramér–Rao bound."""
 
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -11,17 +11,17 @@ from evaluation.experiment import Context, Findings
 from evaluation.paper.geometries import findings
 from evaluation.paper.geometries.bound import Priors
 from evaluation.paper.geometries.known_sheet import KnownSheet
-from evaluation.paper.geometries.measuring import BOTH, PAPER, Job, Sequence, Variant, measure
+from evaluation.paper.geometries.measuring import BOTH, PAPER, Job, SequenceResult, Variant, measure
 from evaluation.paper.geometries.sensor import calibrated, true_sensor
 from evaluation.scenes.geometries import GEOMETRIES, Motion, MovingSheet
 from evaluation.scenes.printed_sheet import random_print
 
 TITLE = "E1: ten geometries, Euclidean fitness against likelihood and against the Cramér–Rao bound"
 
-#: What is left of a prior that is switched off: an edge may change by any factor, a parameter move at any speed.
+#: Deviation of a prior that is switched off.
 OFF = 100.0
 
-#: Priors of a mesh of 5000 vertices: the same stretch is counted on so many edges more than on one of 600.
+#: Priors of a mesh of 5000 vertices, scaled for its larger number of edges.
 FINE = Priors(stretch=BOTH.stretch * (5000 / 600) ** 0.5, speed=BOTH.speed)
 
 #: Other deviations of the stretch prior: that of the built-in rig, and one as far on the other side.
@@ -30,7 +30,7 @@ OTHERS = (0.02, 0.04)
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How much is measured.
+    """Size of the experiment.
 
     Attributes:
         geometries: how many of them.
@@ -66,7 +66,7 @@ QUICK = Settings(
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Calibrates the camera, follows all sequences, and compares."""
+    """Calibrates the camera, tracks all sequences, and compares."""
     generator = np.random.default_rng(context.seed)
     sensor = true_sensor(generator)
     context.progress("calibrating the camera")
@@ -102,12 +102,12 @@ def run(settings: Settings, context: Context) -> Findings:
 
 
 def _main(frames: int) -> dict[str, Variant]:
-    """The two that are compared."""
+    """The two compared variants."""
     return {findings.LIKELIHOOD: Variant(True, frames), findings.EUCLIDEAN: Variant(False, frames)}
 
 
 def _variants(settings: Settings, number: int) -> dict[str, Variant]:
-    """All that follow the first sequence of a geometry."""
+    """Variants of the first sequence of a geometry."""
     variants = _main(settings.frames)
     for kind, likelihood in ((findings.LIKELIHOOD, True), (findings.EUCLIDEAN, False)):
         n = settings.prior_frames
@@ -125,7 +125,7 @@ def _variants(settings: Settings, number: int) -> dict[str, Variant]:
     return variants
 
 
-def _measured(jobs: Iterable[Job], processes: int) -> Iterator[Sequence]:
+def _measured(jobs: Iterable[Job], processes: int) -> Iterator[SequenceResult]:
     if processes == 1:
         yield from map(measure, jobs)
         return

@@ -1,11 +1,11 @@
-"""How well the control points could be known at all: the Cramér–Rao bound of one frame, from the renderer alone.
+"""Cramér–Rao bound of the control points in one frame, from the renderer alone.
 
-Near the truth Θ, distances and grey values change by J δΘ, with J the differences of two renderings, and they err by
-the true σ of each pixel; so no unbiased estimate of Θ from them has a smaller covariance than (Jᵀ σ⁻² J)⁻¹. What the
-priors say is added as what it is, information: Jₛᵀ Jₛ of the relative lengths of the mesh's edges over their deviation,
-and 1 / (speed · interval)² of every parameter. The prediction of the motion prior counts as exact up to that: what a
-filter could gain beyond, by knowing how uncertain its prediction is, is not in it. Pixels at the rim, which mix the
-sheet with what is behind, are left out; they would tell more, were their mixture modelled.
+Near the truth Θ, distances and grey values change by J δΘ, with J the finite differences of two renderings, and their
+noise has the true σ of each pixel; so no unbiased estimate of Θ has a smaller covariance than (Jᵀ σ⁻² J)⁻¹. The
+information of the priors is added: Jₛᵀ Jₛ of the relative edge lengths over their deviation, and
+1 / (speed · interval)² of every parameter. The prediction of the motion prior is taken as exact up to that; the further
+gain of a filter with the covariance of its prediction is not included. Pixels at the rim, which mix the sheet with the
+background, are left out.
 """
 
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ from evaluation.scenes.printed_sheet import GREY_DEVIATION, RATE_HZ, PrintedShee
 from evaluation.scenes.surfaces import SplineSurface
 from evaluation.scenes.time_of_flight import SR4000
 
-#: Step of the differences [m]: so large that the few micrometres do not count by which renderings err.
+#: Step of the differences [m], large against the few micrometres of rendering error.
 STEP_M = 5e-4
 
-#: Share of a pixel from which on it shows nothing but the sheet.
+#: Minimum share of a pixel covered by the sheet.
 COVERED = 0.999
 
 Array = NDArray[np.float64]
@@ -40,12 +40,12 @@ class Bound:
     """Root mean square errors [mm] of the control points and of the surface along its normal.
 
     Attributes:
-        full: that no estimate can do better than from all pixels and the priors.
-        sensors: that no unbiased estimate can do better than from what the vertices read, without priors.
-        posterior: the same with what the priors say.
-        euclidean: what squares with one deviation for all distances can do, with the priors.
+        full: bound from all pixels and the priors.
+        sensors: bound from the pixels with vertices, without priors.
+        posterior: the same with the priors.
+        euclidean: expected error of least squares with one deviation for all distances, with the priors.
         bias: error that the stretch prior causes beside the posterior's, because the true sheet stretches a little.
-        pixels: whose distance was counted.
+        pixels: number of the pixels with vertices.
     """
 
     full: tuple[float, float]
@@ -58,7 +58,7 @@ class Bound:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Derivatives:
-    """How the images change with the control points where they show nothing but the sheet.
+    """Derivatives of the images with respect to the control points, in pixels fully covered by the sheet.
 
     Attributes:
         inner: such pixels (height, width).
@@ -90,7 +90,7 @@ def derivatives(scene: PrintedSheet, control: Array) -> Derivatives:
 
 
 def bound(control: Array, known: KnownSheet, priors: Priors, found: Derivatives, mean: float) -> Bound:
-    """The bounds at true control points (4, 4, 3).
+    """Bounds at true control points (4, 4, 3).
 
     Args:
         control: true control points.
@@ -119,14 +119,14 @@ def bound(control: Array, known: KnownSheet, priors: Priors, found: Derivatives,
 
 
 def _information(found: Derivatives, pixels: NDArray[np.bool_]) -> Array:
-    """What some of the pixels tell of the control points (48, 48)."""
+    """Fisher information of some pixels on the control points (48, 48)."""
     rows = np.concatenate([found.distance / found.deviation[:, None], found.grey / GREY_DEVIATION], axis=1)
     J, G = np.split(rows[pixels], 2, axis=1)
     return J.T @ J + G.T @ G
 
 
 def _read(control: Array, known: KnownSheet, inner: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the inner pixels (k,) a vertex falls on."""
+    """Mask (k,) of the inner pixels with a vertex."""
     points = SplineSurface((4, 4), 2, *known.places).points(control).reshape(-1, 3)
     u, v = np.floor(SR4000.project(points) + 0.5).astype(int).T
     hit = np.zeros(inner.shape, bool)

@@ -1,6 +1,6 @@
-"""What E1 found out: goals, tables and pictures."""
+"""Findings of E1: goals and tables."""
 
-from collections.abc import Sequence as Several
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from abs_service.report.content import Cell, Column, Section, Table
 from evaluation.experiment import Findings, Goal, at_least, at_most
 from evaluation.paper.geometries import pictures
 from evaluation.paper.geometries.bound import Bound
-from evaluation.paper.geometries.measuring import Sequence
+from evaluation.paper.geometries.measuring import SequenceResult
 
 LIKELIHOOD, EUCLIDEAN = "likelihood", "Euclidean"
 
@@ -23,7 +23,7 @@ KINDS = {"images": "sensors", "and priors": "posterior", "squares": "euclidean",
 PAPER_RATIO, NEAR = 1.92, 1.3
 
 
-def findings(first: Several[Sequence], repeats: Several[Sequence]) -> Findings:
+def findings(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult]) -> Findings:
     """Of the first sequence of every geometry, and of further ones with other seeds."""
     ratios = np.array([_ratio(one, "control") for one in first])
     to_bound = np.array([_to_bound(one, LIKELIHOOD, "posterior") for one in first])
@@ -73,7 +73,7 @@ _MESHES = (
 )
 
 
-def _said(ratios: NDArray[np.float64], first: Several[Sequence]) -> tuple[str, ...]:
+def _said(ratios: NDArray[np.float64], first: Sequence[SequenceResult]) -> tuple[str, ...]:
     surface = np.array([_ratio(one, "surface") for one in first])
     allowed = np.mean([one.allowed for one in first])
     return (
@@ -84,7 +84,7 @@ def _said(ratios: NDArray[np.float64], first: Several[Sequence]) -> tuple[str, .
     )
 
 
-def _geometries(first: Several[Sequence], repeats: Several[Sequence]) -> Table:
+def _geometries(first: Sequence[SequenceResult], repeats: Sequence[SequenceResult]) -> Table:
     columns = (
         Column("geometry"), Column("Euclidean", "mm", ".2f"), Column("likelihood", "mm", ".2f"),
         Column("ratio", "", ".2f"), Column("SD over seeds", "", ".2f"), Column("Euclidean, surface", "mm", ".2f"),
@@ -107,7 +107,7 @@ def _geometries(first: Several[Sequence], repeats: Several[Sequence]) -> Table:
     )
 
 
-def _bounds(first: Several[Sequence]) -> Table:
+def _bounds(first: Sequence[SequenceResult]) -> Table:
     columns = (
         Column("geometry"), Column("pixels", "", ".0f"), *(Column(kind, "mm", ".2f") for kind in KINDS),
         *(Column(f"{kind}, surface", "mm", ".3f") for kind in KINDS),
@@ -120,7 +120,7 @@ def _bounds(first: Several[Sequence]) -> Table:
     return Table("Bounds of the control points and of the surface", columns, tuple(rows))
 
 
-def _variants(first: Several[Sequence], *words: str) -> Table:
+def _variants(first: Sequence[SequenceResult], *words: str) -> Table:
     """Variants whose names hold one of the words, and the main ones over the same frames."""
     columns = (
         Column("tracker"), Column("frames", "", ".0f"), Column("control points", "mm", ".2f"),
@@ -143,17 +143,17 @@ def _variants(first: Several[Sequence], *words: str) -> Table:
     return Table("Errors and bounds, over all geometries", columns, tuple(rows))
 
 
-def _ratio(one: Sequence, part: str) -> float:
+def _ratio(one: SequenceResult, part: str) -> float:
     """Mean error Euclidean over likelihood."""
     means = [float(np.mean(getattr(one.followed[name], part))) for name in (EUCLIDEAN, LIKELIHOOD)]
     return means[0] / means[1]
 
 
-def _to_bound(one: Sequence, name: str, kind: str) -> float:
+def _to_bound(one: SequenceResult, name: str, kind: str) -> float:
     return _rms(one.followed[name].control) / _of_bounds(one.bounds[name], kind)
 
 
-def _of_bounds(bounds: Several[Bound], kind: str, part: int = 0) -> float:
+def _of_bounds(bounds: Sequence[Bound], kind: str, part: int = 0) -> float:
     return _rms(np.array([getattr(each, kind)[part] for each in bounds]))
 
 

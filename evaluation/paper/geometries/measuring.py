@@ -25,18 +25,18 @@ from evaluation.scenes.time_of_flight import TimeOfFlight
 
 Array = NDArray[np.float64]
 
-#: No search is cut short.
+#: No search is limited.
 EVALUATIONS = 1_000_000
 
-#: Euclidean fitness counts distances [m] and grey values [levels] that differ by more like this much.
+#: The Euclidean fitness clamps differences of distances [m] and grey values [levels] to these.
 CUTOFF_M, CUTOFF_LEVELS = 0.1, 60.0
 
 #: The paper's budget for 48 dimensions.
 PAPER = cma_es.Settings(population=32, generations=1000)
 
 
-#: Deviations of the priors where nothing else is said. Splines of 4 × 4 control points stretch by up to 0.9 % where the
-#: sheets bend that they stand for: with 0.03 the likelihood errs least, not with the 0.02 of the built-in rig.
+#: Deviations of the priors where nothing else is said. Splines of 4 × 4 control points stretch by up to 0.9 % when the
+#: sheets bend: the likelihood has its smallest error with 0.03, not with the 0.02 of the demo rig.
 BOTH = Priors(stretch=0.03, speed=0.3)
 
 
@@ -45,8 +45,8 @@ class Variant:
     """One tracker.
 
     Attributes:
-        likelihood: whether it has the likelihood for its objective, or squares of one deviation for all.
-        frames: how many of the sequence it follows.
+        likelihood: True for the likelihood as objective, False for the Euclidean fitness.
+        frames: number of frames it tracks.
         priors: their deviations.
         vertices, inset: of its mesh, see `KnownSheet`.
         optimizer: its search.
@@ -61,7 +61,7 @@ class Variant:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Followed:
+class VariantErrors:
     """Errors (frames,) of one variant [mm], without the first frame, in which the sheet is known.
 
     Attributes:
@@ -79,7 +79,7 @@ class Followed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Job:
-    """A sequence that has to be followed; plain data, so that another process can do it.
+    """A sequence to track; plain data, so that another process can do it.
 
     Attributes:
         name, seed: of the sequence; the seed draws its noise.
@@ -102,8 +102,8 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sequence:
-    """What came of a job.
+class SequenceResult:
+    """Result of a job.
 
     Attributes:
         job: it.
@@ -115,15 +115,15 @@ class Sequence:
     """
 
     job: Job
-    followed: Mapping[str, Followed]
+    followed: Mapping[str, VariantErrors]
     bounds: Mapping[str, tuple[Bound, ...]]
     mean_deviation: float
     allowed: float
     stretch: float
 
 
-def measure(job: Job) -> Sequence:
-    """Follows a sequence with all variants at once, and tells the bounds of some of its frames."""
+def measure(job: Job) -> SequenceResult:
+    """Tracks a sequence with all variants at once, and computes the bounds of some of its frames."""
     scene = PrintedSheet(job.sheet, job.sensor, job.texture)
     rest = scene.view(scene.control(0))
     sigma = job.sensor.deviation(rest.distance, job.sensor.amplitude(rest))[rest.share > 0.999]
@@ -144,10 +144,10 @@ def measure(job: Job) -> Sequence:
     followed = {}
     for name in trackers:
         control, surface = np.array(errors[name][1:]).T
-        followed[name] = Followed(control, surface, tracked[name] / len(errors[name]), theta[name])
+        followed[name] = VariantErrors(control, surface, tracked[name] / len(errors[name]), theta[name])
     allowed = float(np.sqrt(np.mean(sigma**2) * np.mean(sigma**-2.0)))
     stretch = float(np.sqrt(np.mean([_stretch(scene.control(k), job.known) ** 2 for k in range(0, most, 5)])))
-    return Sequence(job, followed, _bounds(scene, job, mean), mean, allowed, stretch)
+    return SequenceResult(job, followed, _bounds(scene, job, mean), mean, allowed, stretch)
 
 
 def _bounds(scene: PrintedSheet, job: Job, mean: float) -> dict[str, tuple[Bound, ...]]:

@@ -1,13 +1,13 @@
 """Pictures of E1: what the camera sees, how it errs, and how the trackers err."""
 
-from collections.abc import Sequence as Several
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from abs_service.report import figures, plots
 from abs_service.report.content import Picture, drawing
-from evaluation.paper.geometries.measuring import Sequence
+from evaluation.paper.geometries.measuring import SequenceResult
 from evaluation.scenes.printed_sheet import PrintedSheet
 from evaluation.scenes.surfaces import SplineSurface
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 SHOWN = 30
 
 
-def pictures(first: Several[Sequence]) -> tuple[Picture, ...]:
+def pictures(first: Sequence[SequenceResult]) -> tuple[Picture, ...]:
     """Of the last geometry's camera, and of all geometries' errors."""
     one = first[-1]
     scene = PrintedSheet(one.job.sheet, one.job.sensor, one.job.texture)
@@ -35,7 +35,7 @@ def pictures(first: Several[Sequence]) -> tuple[Picture, ...]:
     )
 
 
-def _over_time(first: Several[Sequence]) -> "Figure":
+def _over_time(first: Sequence[SequenceResult]) -> "Figure":
     columns = min(len(first), 5)
     rows = -(-len(first) // columns)
     figure = plots.figure(2.4 * columns, 1.9 * rows + 0.4)
@@ -52,7 +52,7 @@ def _over_time(first: Several[Sequence]) -> "Figure":
     return figure
 
 
-def _meshes(one: Sequence) -> "Figure":
+def _meshes(one: SequenceResult) -> "Figure":
     frames = len(one.followed["likelihood"].control)
     truth = one.job.sheet.control(frames / 30)
     surface = SplineSurface((4, 4), 2, np.linspace(0, 1, 16), np.linspace(0, 1, 22))

@@ -1,4 +1,4 @@
-"""The camera of E1: how it really errs, and what its calibration makes of that (section 5.1 of the paper)."""
+"""The camera of E1 with its true errors, and its calibration (section 5.1 of the paper)."""
 
 from dataclasses import replace
 
@@ -39,10 +39,10 @@ def true_sensor(generator: np.random.Generator) -> TimeOfFlight:
 
 
 def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator) -> PerPixel:
-    """What static sequences of walls tell of it: a law of the image, and how every pixel differs.
+    """Noise model of a camera, fitted to static sequences of walls: a law of the image, and factors of the pixels.
 
-    It is the form that `abs-service calibrate noise` chooses for such a sensor, fitted by the same functions. The mean
-    offsets of the pixels are left out: where a sensor has none, they are noise of the calibration.
+    The form is the one that `abs-service calibrate noise` selects for such a sensor, fitted by the same functions. Mean
+    offsets of the pixels are left out: the sensor has none, so they would be noise of the calibration.
 
     Args:
         sensor: the camera.
@@ -58,7 +58,7 @@ def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator
 
 
 def _static(sensor: TimeOfFlight, wall: Wall, frames: int, generator: np.random.Generator) -> Evidence:
-    """What a static sequence of a wall tells; single measurements are those of the first frames."""
+    """Evidence of a static sequence of a wall; single measurements are those of the first frames."""
     view = Renderer(SR4000, wall).render()
     measured = [sensor.measure(view, generator) for _ in range(frames)]
     distance, amplitude = (

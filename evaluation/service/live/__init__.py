@@ -1,6 +1,6 @@
-"""The service from end to end, as a user starts it and as any other program hears it.
+"""The service from end to end, started as by a user and observed from outside.
 
-Nothing of it is looked into: a subscriber on the bus, the operating system's numbers and the finished recording.
+Observed are the messages on the bus, the operating system's statistics and the finished recording.
 """
 
 import os
@@ -14,77 +14,77 @@ from numpy.typing import NDArray
 from abs_service.report.content import Picture, Section, drawing
 from evaluation.experiment import Context, Findings, Goal, at_most
 from evaluation.service.live import losses, measurement, pictures, tables
-from evaluation.service.live.measurement import Start, Watched
-from evaluation.service.live.trend import Trend, least_within, trend
+from evaluation.service.live.measurement import ObservedRun, StartTimes
+from evaluation.service.live.trend import Trend, rolling_minimum, trend
 
 TITLE = "End to end: losses, ages, processors, memory and start"
 
-#: What is wanted: age of half of the estimates and of 99 in 100 [ms], start and help [s], growth of memory [MB/min].
+#: Bounds of the goals: median and 99th percentile of the age [ms], start and help [s], growth of memory [MB/min].
 P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.1
 
 #: The recorder holds the index of a file until the next one begins, at this rate after two minutes; with a margin [s].
 FILE_S = 150.0
 
-#: A shorter watch says nothing of growth that is to be told by the minute [s].
+#: Minimum time for estimating growth per minute [s].
 LEAST_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How long to watch.
+    """Durations and repetitions.
 
     Attributes:
-        starts: how often the service is started only to see how long that takes; each warms the caches for the next.
-        helps: how often `--help` is asked for.
-        settle_s: time after the first TRACKING that is not watched [s].
-        duration_s: time that is watched [s].
+        starts: number of starts that are timed; each warms the caches for the next.
+        help_runs: number of timed runs of `--help`.
+        settle_s: time after the first TRACKING that is not observed [s].
+        duration_s: observed time [s].
         warm_up_s: time at its beginning in which memory may still grow [s].
-        sample_s: time between two looks at the processes [s].
+        sample_s: sampling interval of CPU time and memory [s].
     """
 
     starts: int = 3
-    helps: int = 5
+    help_runs: int = 5
     settle_s: float = 5.0
     duration_s: float = 600.0
     warm_up_s: float = FILE_S
     sample_s: float = 1.0
 
 
-QUICK = Settings(starts=0, helps=2, settle_s=2.0, duration_s=20.0, warm_up_s=5.0, sample_s=0.25)
+QUICK = Settings(starts=0, help_runs=2, settle_s=2.0, duration_s=20.0, warm_up_s=5.0, sample_s=0.25)
 
 
 def run(settings: Settings, context: Context) -> Findings:
-    """Starts the service a few times, then watches it."""
-    helps_s = measurement.help_s(settings.helps)
-    starts: list[Start] = []
+    """Times the start of the service a few times, then observes a run."""
+    help_s = measurement.help_s(settings.help_runs)
+    starts: list[StartTimes] = []
     for number in range(settings.starts):
         context.progress(f"start {number + 1} of {settings.starts}")
         starts.append(measurement.started(context.seed))
     seen = measurement.watched(
         context.seed, settings.settle_s, settings.duration_s, settings.sample_s, context.progress
     )
-    return findings(settings, helps_s, (*starts, seen.start), seen)
+    return findings(settings, help_s, (*starts, seen.start), seen)
 
 
-def findings(settings: Settings, helps_s: Sequence[float], starts: Sequence[Start], seen: Watched) -> Findings:
-    """What all that says.
+def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[StartTimes], seen: ObservedRun) -> Findings:
+    """Findings of all measurements.
 
     Args:
         settings: how long was watched.
-        helps_s: how long each `--help` took [s].
-        starts: how long each start took.
-        seen: the run that was watched.
+        help_s: durations of `--help` [s].
+        starts: times of each start.
+        seen: the observed run.
     """
     published_ms = np.array([one.age_ms for one in seen.arrivals])
     arrived_ms = np.array([one.t_ns - one.exposed_ns for one in seen.arrivals]) * 1e-6
     growth = {name: _growth(seen, name, settings.warm_up_s) for name in seen.usages}
-    before, whole = losses.counted(seen.counted_before), losses.counted(seen.counted)
+    before, whole = losses.loss_counters(seen.counted_before), losses.loss_counters(seen.counted)
     goals = (
         *_complete(seen, whole - before),
         at_most("Age at publication, p50", float(np.percentile(published_ms, 50)), P50_MS, "ms"),
         at_most("Age at publication, p99", float(np.percentile(published_ms, 99)), P99_MS, "ms"),
         at_most("Start to the first estimate, the quickest", min(one.first_s for one in starts), START_S, "s"),
-        at_most("--help, the quickest", min(helps_s), HELP_S, "s"),
+        at_most("--help, the quickest", min(help_s), HELP_S, "s"),
         *(_flat(name, one) for name, one in growth.items() if settings.duration_s - settings.warm_up_s >= LEAST_S),
     )
     ages_ms = {"publication": published_ms, "arrival at the subscriber": arrived_ms}
@@ -101,13 +101,13 @@ def findings(settings: Settings, helps_s: Sequence[float], starts: Sequence[Star
                 _drawn_memory(seen),
             ),
         ),
-        Section("Start", (tables.starts(starts, helps_s),)),
+        Section("Start", (tables.starts(starts, help_s),)),
     )
     return Findings(goals, sections, _values(seen, whole - before, whole))
 
 
-def _complete(seen: Watched, counted: Mapping[str, int]) -> tuple[Goal, ...]:
-    """Whether everything came everywhere."""
+def _complete(seen: ObservedRun, counted: Mapping[str, int]) -> tuple[Goal, ...]:
+    """Goals on completeness: no frame and no message is lost."""
     return (
         at_most(f"Of {len(seen.arrivals)} frames, those in no estimate", losses.untracked(seen), 0),
         at_most("Estimates that lack a sensor", losses.partial(seen), 0),
@@ -117,21 +117,21 @@ def _complete(seen: Watched, counted: Mapping[str, int]) -> tuple[Goal, ...]:
     )
 
 
-def _growth(seen: Watched, process: str, from_s: float) -> Trend:
-    """How fast what the resident memory of a process falls back to grows [MB/min]."""
+def _growth(seen: ObservedRun, process: str, from_s: float) -> Trend:
+    """Growth rate of the lower envelope of the resident memory of a process [MB/min]."""
     late = seen.times_s >= from_s
     held = np.array([one.resident_bytes for one in seen.usages[process]])[late] * 1e-6
     samples = round(FILE_S / float(np.mean(np.diff(seen.times_s))))
-    return trend(seen.times_s[late] / 60, least_within(held, samples))
+    return trend(seen.times_s[late] / 60, rolling_minimum(held, samples))
 
 
 def _flat(process: str, growth: Trend) -> Goal:
-    """Whether the memory of a process can be called flat: nothing says that it grows faster than wanted."""
+    """Goal on memory: the confidence interval of its growth rate includes an allowed value."""
     what = f"Growth of the memory of {process}, lower end of its 95 % interval"
     return at_most(what, growth.slope - growth.half_width, GROWTH_MB_MIN, "MB/min")
 
 
-def _drawn_ages(seen: Watched, arrived_ms: NDArray[np.float64], wanted_ms: Mapping[str, float]) -> Picture:
+def _drawn_ages(seen: ObservedRun, arrived_ms: NDArray[np.float64], wanted_ms: Mapping[str, float]) -> Picture:
     return drawing(
         pictures.ages(seen, arrived_ms, wanted_ms),
         "Age of the estimates on arrival, over time and how often each occurs; grey: every single one.",
@@ -139,19 +139,19 @@ def _drawn_ages(seen: Watched, arrived_ms: NDArray[np.float64], wanted_ms: Mappi
     )
 
 
-def _drawn_cpu(seen: Watched) -> Picture:
+def _drawn_cpu(seen: ObservedRun) -> Picture:
     return drawing(
         pictures.cpu(seen), "Share of a core, on average and over time.", "A bar and a curve for each process."
     )
 
 
-def _drawn_memory(seen: Watched) -> Picture:
+def _drawn_memory(seen: ObservedRun) -> Picture:
     return drawing(
         pictures.memory(seen), "Growth of the resident memory since the watch began.", "A curve for each process."
     )
 
 
-def _values(seen: Watched, counted: Mapping[str, int], from_start: Mapping[str, int]) -> dict[str, Any]:
+def _values(seen: ObservedRun, counted: Mapping[str, int], from_start: Mapping[str, int]) -> dict[str, Any]:
     return {
         "losses": dict(counted),
         "losses_from_start": dict(from_start),

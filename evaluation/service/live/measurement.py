@@ -1,4 +1,4 @@
-"""One run of the service, watched from outside, and what was seen."""
+"""One run of the service, observed from outside."""
 
 import shutil
 import subprocess
@@ -16,44 +16,44 @@ from numpy.typing import NDArray
 from abs_service.bus import keys
 from evaluation.experiment import UnavailableError
 from evaluation.service.live import proc, recording
-from evaluation.service.live.listener import Arrival, Listener, counted
 from evaluation.service.live.rig import NAME, STREAMS, TRACKER, endpoint_of, write_rig
 from evaluation.service.live.service import Service
+from evaluation.service.live.subscriber import ReceivedEstimate, Subscriber, counted
 
 #: The first start on a machine compiles the kernels [s].
-PATIENCE_S = 180.0
-#: What an hour or a minute writes to disk depends on the noise only: it cannot be compressed [bytes/s].
+START_TIMEOUT_S = 180.0
+#: Data rate of the recording, which is noise and cannot be compressed [bytes/s].
 RECORDED_BYTES_S = 35_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
-    """How long a user waits for the first estimate, and for the first that says TRACKING [s]."""
+class StartTimes:
+    """Time from the start to the first estimate, and to the first with status TRACKING [s]."""
 
     first_s: float
     tracking_s: float
 
 
 @dataclass(frozen=True, slots=True)
-class Watched:
-    """One run, watched from when it had settled to its end.
+class ObservedRun:
+    """One run, observed from the end of its settling time on.
 
     Attributes:
         start: how it began.
-        arrivals: the estimates of exposures within the time that was watched, as they arrived.
-        begin_ns, end_ns: of that time, CLOCK_MONOTONIC [ns].
-        counted_before: what each component had counted when that time began, by component.
-        counted: what it counted until that time was over.
+        arrivals: received estimates of the exposures within the observed time.
+        begin_ns, end_ns: observed time, CLOCK_MONOTONIC [ns].
+        counted_before: counters at its beginning, by component.
+        counted: counters at its end, by component.
         times_s: moments of the usages (n,), from `begin_ns` [s].
-        usages: what each process had used at those moments, by command.
-        machine: what all processors had done at those moments.
-        recorded: numbers of the messages that the recording holds, by topic.
+        usages: CPU time and memory of each process at those times, by command.
+        machine: CPU times of the machine at those times.
+        recorded: sequence numbers of the recorded messages, by topic.
         recorded_bytes: size of the recording.
         exit_code: of the service.
     """
 
-    start: Start
-    arrivals: tuple[Arrival, ...]
+    start: StartTimes
+    arrivals: tuple[ReceivedEstimate, ...]
     begin_ns: int
     end_ns: int
     counted_before: Mapping[str, Mapping[str, int]]
@@ -67,7 +67,7 @@ class Watched:
 
 
 def help_s(times: int) -> tuple[float, ...]:
-    """How long `abs-service --help` takes, each time in a fresh process [s]."""
+    """Duration of `abs-service --help` [s], each time in a new process."""
     took: list[float] = []
     for _ in range(times):
         begin_s = time.perf_counter()
@@ -76,48 +76,54 @@ def help_s(times: int) -> tuple[float, ...]:
     return tuple(took)
 
 
-def started(seed: int) -> Start:
+def started(seed: int) -> StartTimes:
     """Starts the service, waits until it tracks and ends it."""
-    with _running(seed, 0.0) as (service, listener, _):
-        return _await_tracking(service, listener)
+    with _running(seed, 0.0) as (service, subscriber, _):
+        return _await_tracking(service, subscriber)
 
 
-def watched(seed: int, settle_s: float, duration_s: float, sample_s: float, progress: Callable[[str], None]) -> Watched:
-    """Runs the service and watches it.
+def watched(
+    seed: int, settle_s: float, duration_s: float, sample_s: float, progress: Callable[[str], None]
+) -> ObservedRun:
+    """Runs the service and observes it.
 
     Args:
         seed: of the simulated motion and noise.
-        settle_s: time after the first TRACKING that is not watched [s].
-        duration_s: time that is watched [s].
-        sample_s: time between two looks at the processes [s].
-        progress: told how far it is.
+        settle_s: time after the first TRACKING that is not observed [s].
+        duration_s: observed time [s].
+        sample_s: sampling interval of CPU time and memory [s].
+        progress: called with the current step.
 
     Raises:
         UnavailableError: the disk has no room for the recording.
         ServiceError: the service ended by itself.
     """
-    with _running(seed, settle_s + duration_s) as (service, listener, takes):
-        start = _await_tracking(service, listener)
+    with _running(seed, settle_s + duration_s) as (service, subscriber, takes):
+        start = _await_tracking(service, subscriber)
         time.sleep(settle_s)
         begin_ns = time.monotonic_ns()
         times_s, usages, machine = _sample(service, duration_s, sample_s, progress)
         end_ns = time.monotonic_ns()
-        time.sleep(1.5)  # until every component has said once more how it is
+        time.sleep(1.5)  # until every component has published its health once more
         exit_code = service.stop()
-        arrivals = tuple(one for one in listener.arrivals if begin_ns <= one.exposed_ns < end_ns)
+        arrivals = tuple(one for one in subscriber.arrivals if begin_ns <= one.exposed_ns < end_ns)
         before, all_ = (
-            {name: counted(said, t_ns) for name, said in listener.health.items()} for t_ns in (begin_ns, end_ns)
+            {name: counted(said, t_ns) for name, said in subscriber.health.items()} for t_ns in (begin_ns, end_ns)
         )
         progress("reading the recording")
-        recorded = recording.numbers(takes, [*(keys.image(*stream) for stream in STREAMS), keys.state(TRACKER)])
+        recorded = recording.sequence_numbers(
+            takes, [*(keys.image(*stream) for stream in STREAMS), keys.state(TRACKER)]
+        )
         size = sum(path.stat().st_size for path in takes.iterdir())
-    return Watched(start, arrivals, begin_ns, end_ns, before, all_, times_s, usages, machine, recorded, size, exit_code)
+    return ObservedRun(
+        start, arrivals, begin_ns, end_ns, before, all_, times_s, usages, machine, recorded, size, exit_code
+    )
 
 
 def _sample(
     service: Service, duration_s: float, sample_s: float, progress: Callable[[str], None]
 ) -> tuple[NDArray[np.float64], Mapping[str, tuple[proc.Usage, ...]], tuple[proc.Machine, ...]]:
-    """Looks at everything every `sample_s` from now on: moments (n,) from now [s], usages by command, the machine."""
+    """Samples every `sample_s` from now on: times (n,) from now [s], usages by command, the machine."""
     processes = service.processes()
     begin_s = time.monotonic()
     times_s: list[float] = []
@@ -134,20 +140,20 @@ def _sample(
     return np.array(times_s), {name: tuple(row[name] for row in rows) for name in processes}, tuple(machine)
 
 
-def _await_tracking(service: Service, listener: Listener) -> Start:
-    deadline_s = time.monotonic() + PATIENCE_S
-    while not (tracking := [one for one in listener.arrivals if one.is_tracking]):
+def _await_tracking(service: Service, subscriber: Subscriber) -> StartTimes:
+    deadline_s = time.monotonic() + START_TIMEOUT_S
+    while not (tracking := [one for one in subscriber.arrivals if one.is_tracking]):
         service.check()
         if time.monotonic() > deadline_s:
-            raise TimeoutError(f"nothing was tracked within {PATIENCE_S:.0f} s of the start")
+            raise TimeoutError(f"nothing was tracked within {START_TIMEOUT_S:.0f} s of the start")
         time.sleep(0.02)
-    first_ns, tracking_ns = listener.arrivals[0].t_ns, tracking[0].t_ns
-    return Start((first_ns - service.started_ns) * 1e-9, (tracking_ns - service.started_ns) * 1e-9)
+    first_ns, tracking_ns = subscriber.arrivals[0].t_ns, tracking[0].t_ns
+    return StartTimes((first_ns - service.started_ns) * 1e-9, (tracking_ns - service.started_ns) * 1e-9)
 
 
 @contextmanager
-def _running(seed: int, duration_s: float) -> Iterator[tuple[Service, Listener, Path]]:
-    """The service, somebody who listens, and the folder of the recordings; everything is gone afterwards."""
+def _running(seed: int, duration_s: float) -> Iterator[tuple[Service, Subscriber, Path]]:
+    """The running service, a subscriber, and the folder of the recordings; all are removed afterwards."""
     with tempfile.TemporaryDirectory(prefix="abs-live-") as name:
         folder = Path(name)
         needed, free = round(duration_s * RECORDED_BYTES_S), shutil.disk_usage(folder).free
@@ -157,5 +163,5 @@ def _running(seed: int, duration_s: float) -> Iterator[tuple[Service, Listener, 
                 "or name another folder for temporary files with TMPDIR"
             )
         rig = write_rig(folder, seed)
-        with Service(rig) as service, Listener(endpoint_of(rig), NAME, TRACKER) as listener:
-            yield service, listener, folder / "takes"
+        with Service(rig) as service, Subscriber(endpoint_of(rig), NAME, TRACKER) as subscriber:
+            yield service, subscriber, folder / "takes"

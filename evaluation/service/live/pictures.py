@@ -1,4 +1,4 @@
-"""Pictures of a run that was watched."""
+"""Pictures of an observed run."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.report import plots
-from evaluation.service.live.measurement import Watched
+from evaluation.service.live.measurement import ObservedRun
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 SPAN_S = 5.0
 
 
-def ages(seen: Watched, arrived_ms: NDArray[np.float64], goals_ms: Mapping[str, float]) -> "Figure":
-    """How old the estimates are when they arrive: over time, and how often each age occurs.
+def ages(seen: ObservedRun, arrived_ms: NDArray[np.float64], goals_ms: Mapping[str, float]) -> "Figure":
+    """Age of the estimates on arrival: over time, and as a histogram.
 
     Args:
         seen: the run.
         arrived_ms: age of each of its arrivals (n,) [ms].
-        goals_ms: what is wanted, by the percentile's name [ms].
+        goals_ms: bounds by the name of the percentile [ms].
     """
     figure = plots.figure(9, 3.4)
     over_time, histogram = figure.subplots(1, 2, width_ratios=(2, 1), sharey=True)
@@ -43,8 +43,8 @@ def ages(seen: Watched, arrived_ms: NDArray[np.float64], goals_ms: Mapping[str, 
     return figure
 
 
-def memory(seen: Watched) -> "Figure":
-    """What each process holds over time, less what it held at the beginning."""
+def memory(seen: ObservedRun) -> "Figure":
+    """Growth of each process's resident memory over time."""
     figure = plots.figure(9, 3.4)
     axes = figure.subplots()
     for name, usages in seen.usages.items():
@@ -55,8 +55,8 @@ def memory(seen: Watched) -> "Figure":
     return figure
 
 
-def cpu(seen: Watched) -> "Figure":
-    """Which share of a core each process uses, over time."""
+def cpu(seen: ObservedRun) -> "Figure":
+    """Share of a core that each process uses, over time."""
     figure = plots.figure(9, 3.0)
     mean, over_time = figure.subplots(1, 2, width_ratios=(1, 2), sharey=True)
     middle = (seen.times_s[1:] + seen.times_s[:-1]) / 2

@@ -1,4 +1,4 @@
-"""What Linux knows of a process: the time that it computed, and the memory that it holds (proc(5))."""
+"""CPU time and memory of processes and of the machine, from proc(5)."""
 
 import os
 from collections.abc import Iterable, Mapping
@@ -11,12 +11,12 @@ _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a process has used.
+    """CPU time and memory of a process.
 
     Attributes:
-        cpu_s: time that its threads computed, in user and system mode, since it began [s].
-        resident_bytes: memory that it holds now, shared or not (RSS) [bytes].
-        private_bytes: what of it is its own and no file's (RSS without files and shared memory) [bytes].
+        cpu_s: user and system time of all threads [s].
+        resident_bytes: resident set size (RSS) [bytes].
+        private_bytes: RSS without files and shared memory [bytes].
     """
 
     cpu_s: float
@@ -25,7 +25,7 @@ class Usage:
 
 
 def usage(pid: int) -> Usage:
-    """What a process has used so far.
+    """CPU time and memory of a process.
 
     Raises:
         OSError: there is no such process.
@@ -40,12 +40,11 @@ def usage(pid: int) -> Usage:
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What all processors of the machine have done together since it began.
+    """CPU times of the machine since boot, summed over all processors.
 
     Attributes:
-        busy_s: time in which they computed, for whomever [s].
-        stolen_s: time in which they had something to compute, but the host that the machine is a guest of gave them to
-            others [s].
+        busy_s: time not idle [s].
+        stolen_s: time taken by the host of a virtual machine (steal) [s].
     """
 
     busy_s: float
@@ -53,7 +52,7 @@ class Machine:
 
 
 def machine() -> Machine:
-    """What the machine's processors have done so far."""
+    """CPU times of the machine since boot."""
     fields = Path("/proc/stat").read_text(encoding="utf-8").splitlines()[0].split()
     user, nice, system, _, _, hard, soft, stolen = (int(field) * _TICK_S for field in fields[1:9])
     return Machine(user + nice + system + hard + soft, stolen)
@@ -71,6 +70,6 @@ def children(pid: int) -> Mapping[str, int]:
 
 
 def _command(words: Iterable[str]) -> str:
-    """What follows `abs_service` on a command line; "" if nothing does."""
+    """Word after `abs_service` on a command line; "" if there is none."""
     words = iter(words)
     return next(words, "") if "abs_service" in words else ""

@@ -1,4 +1,4 @@
-"""What a recording holds of some topics: the senders' numbers, so that every hole shows."""
+"""Sequence numbers of recorded messages, for counting missing ones."""
 
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -6,8 +6,8 @@ from pathlib import Path
 from mcap.reader import make_reader
 
 
-def numbers(folder: Path, topics: Collection[str]) -> Mapping[str, frozenset[int]]:
-    """The numbers of all messages of some topics in the finished recordings of a folder.
+def sequence_numbers(folder: Path, topics: Collection[str]) -> Mapping[str, frozenset[int]]:
+    """Sequence numbers of all messages of some topics in the finished recordings of a folder.
 
     Args:
         folder: with the recordings of one run; a long one is in several files.
@@ -23,6 +23,6 @@ def numbers(folder: Path, topics: Collection[str]) -> Mapping[str, frozenset[int
     return {topic: frozenset(seqs) for topic, seqs in found.items()}
 
 
-def holes(seqs: Collection[int], first: int, last: int) -> int:
-    """How many of the numbers from `first` to `last` are not among `seqs`."""
+def count_missing(seqs: Collection[int], first: int, last: int) -> int:
+    """Number of the sequence numbers from `first` to `last` that are missing in `seqs`."""
     return len(set(range(first, last + 1)).difference(seqs))

@@ -1,4 +1,4 @@
-"""The rig that is measured: the demo rig with a colour camera of full size, on a port of its own."""
+"""The measured rig: the demo rig with a colour camera of full size, on a free port."""
 
 import socket
 import tomllib
@@ -37,7 +37,7 @@ def write_rig(folder: Path, seed: int) -> Path:
 
 
 def endpoint_of(rig: Path) -> str:
-    """Where the rig of a configuration listens."""
+    """Endpoint of the rig of a configuration."""
     return str(tomllib.loads(rig.read_text(encoding="utf-8"))["bus"]["endpoint"])
 
 

@@ -12,7 +12,7 @@ from evaluation.service.live import proc
 
 
 class ServiceError(Exception):
-    """The service ended before it was told to; the message is the last that it said."""
+    """The service ended by itself; the message is its last output."""
 
 
 class Service:
@@ -25,7 +25,7 @@ class Service:
     def __init__(self, rig: Path) -> None:
         self._output = (rig.parent / "output.jsonl").open("w+", encoding="utf-8")
         self.started_ns = time.monotonic_ns()
-        # Its output goes where a script's would go, and nobody has to read it for the service to go on.
+        # To a file: a pipe that is not read would block the service.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "abs_service", "run", str(rig), "--json"],
             stdout=self._output,
@@ -37,7 +37,7 @@ class Service:
         return {"run": self._process.pid, **proc.children(self._process.pid)}
 
     def check(self) -> None:
-        """Does nothing as long as the service runs.
+        """Checks that the service runs.
 
         Raises:
             ServiceError: it has ended.
@@ -49,7 +49,7 @@ class Service:
             raise ServiceError(f"the service ended by itself with code {code}: {last}")
 
     def stop(self, timeout_s: float = 15.0) -> int:
-        """Tells it to end as Ctrl-C does, and returns its exit code; negative if it had to be killed."""
+        """Interrupts it (SIGINT) and returns its exit code; negative if it had to be killed."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
         try:

@@ -1,4 +1,4 @@
-"""What was seen of a run, as tables."""
+"""Tables of an observed run."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.bus import keys
 from abs_service.report.content import Column, Table
 from evaluation.service.live.losses import exposures
-from evaluation.service.live.measurement import Start, Watched
+from evaluation.service.live.measurement import ObservedRun, StartTimes
 from evaluation.service.live.rig import STREAMS
 from evaluation.service.live.trend import Trend
 
@@ -16,7 +16,7 @@ _PERCENTILES = (50, 90, 99)
 
 
 def ages(numbers_ms: Mapping[str, NDArray[np.float64]]) -> Table:
-    """How numbers of all estimates are spread; by what they are, (n,) each [ms]."""
+    """Percentiles of the ages of all estimates, (n,) each [ms], by name."""
     columns = (Column("from the exposure to"), *(Column(f"p{p}", "ms", ".1f") for p in _PERCENTILES))
     rows = tuple(
         (name, *(float(np.percentile(one, p)) for p in _PERCENTILES), float(one.max()))
@@ -25,8 +25,8 @@ def ages(numbers_ms: Mapping[str, NDArray[np.float64]]) -> Table:
     return Table("Age of the estimates", (*columns, Column("largest", "ms", ".1f")), rows)
 
 
-def frames(seen: Watched) -> Table:
-    """How far the exposures came that lie between the first and the last estimate watched."""
+def frames(seen: ObservedRun) -> Table:
+    """Number of the exposures between the first and the last observed estimate that were used and recorded."""
     rows: list[tuple[str | float, ...]] = []
     for sensor, stream in STREAMS:
         exposed = exposures(seen, sensor)
@@ -38,19 +38,19 @@ def frames(seen: Watched) -> Table:
 
 
 def losses(watched: Mapping[str, int], whole: Mapping[str, int]) -> Table:
-    """What the components counted as lost, by component and cause.
+    """Losses counted by the components, by component and cause.
 
     Args:
-        watched: in the time that was watched.
-        whole: from the start on: in the first moments the tracker looks for the object, and passes frames over.
+        watched: in the observed time.
+        whole: from the start on; initial detection skips frames.
     """
     rows = tuple((name, watched.get(name, 0), whole[name]) for name in sorted(whole))
-    columns = (Column("component: what"), Column("watched", format=".0f"), Column("from the start", format=".0f"))
+    columns = (Column("component: what"), Column("observed", format=".0f"), Column("from the start", format=".0f"))
     return Table("What the components counted as lost", columns, rows or (("nothing", 0, 0),))
 
 
-def processes(seen: Watched, growth: Mapping[str, Trend], growth_from_s: float) -> Table:
-    """What every process used.
+def processes(seen: ObservedRun, growth: Mapping[str, Trend], growth_from_s: float) -> Table:
+    """CPU time and memory of every process.
 
     Args:
         seen: the run.
@@ -73,8 +73,8 @@ def processes(seen: Watched, growth: Mapping[str, Trend], growth_from_s: float) 
     return Table("Processes", columns, tuple(rows))
 
 
-def machine(seen: Watched) -> Table:
-    """What the machine's processors did meanwhile, on average and in the worst interval between two looks."""
+def machine(seen: ObservedRun) -> Table:
+    """CPU time of the machine, on average and in the busiest sampling interval."""
     took_s = np.diff(seen.times_s)
     busy, stolen = (
         100 * np.diff([getattr(one, name) for one in seen.machine]) / took_s for name in ("busy_s", "stolen_s")
@@ -85,7 +85,7 @@ def machine(seen: Watched) -> Table:
         (name, float(np.average(one, weights=took_s)), float(one.max()))
         for name, one in {
             "the service": own,
-            "all else, who watches included": busy - own,
+            "all others, this program included": busy - own,
             "taken by the host (steal)": stolen,
         }.items()
     )
@@ -93,12 +93,12 @@ def machine(seen: Watched) -> Table:
     return Table("All processors of the machine", columns, rows)
 
 
-def starts(starts: Sequence[Start], helps_s: Sequence[float]) -> Table:
-    """How long everything took until there was something to see."""
+def starts(starts: Sequence[StartTimes], help_s: Sequence[float]) -> Table:
+    """Times from a command to its first effect."""
     numbers_s = {
         "start to the first estimate": [one.first_s for one in starts],
         "start to the first TRACKING": [one.tracking_s for one in starts],
-        "--help": list(helps_s),
+        "--help": list(help_s),
     }
     columns = (
         Column("what"),

@@ -1,4 +1,4 @@
-"""Whether something grows: a straight line through measurements that are not independent of each other."""
+"""Linear trend of correlated measurements."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import minimum_filter1d
 from scipy.stats import t
 
-#: Neighbouring measurements are averaged into this many before the line is fitted. Memory grows in steps and stays,
-#: so that single measurements err together and a line through them would look much surer than it is.
+#: Neighbouring measurements are averaged into this many before the line is fitted. Memory grows in steps, so
+#: single measurements are correlated, and a line through them would have too small a variance.
 BLOCKS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Trend:
-    """How fast something grows.
+    """Slope of a linear trend.
 
     Attributes:
         slope: of the straight line, per unit of time.
@@ -25,13 +25,13 @@ class Trend:
     half_width: float
 
 
-def least_within(values: NDArray[np.floating], samples: int) -> NDArray[np.floating]:
-    """The least of so many neighbouring values (n,): what a saw-tooth of that period, or less, stands on."""
+def rolling_minimum(values: NDArray[np.floating], samples: int) -> NDArray[np.floating]:
+    """Minimum filter over `samples` neighbouring values (n,): lower envelope of a saw-tooth of that period."""
     return np.asarray(minimum_filter1d(values, min(samples, len(values)), mode="nearest"))
 
 
 def trend(times: NDArray[np.floating], values: NDArray[np.floating]) -> Trend:
-    """The straight line through values (n,) at times (n,), n at least `BLOCKS`, by least squares of block means."""
+    """Least-squares line through block means of values (n,) at times (n,), n at least `BLOCKS`."""
     blocks = np.array_split(np.stack([times, values]), BLOCKS, axis=1)
     means = np.array([block.mean(axis=1) for block in blocks], np.float64).T
     (slope, _), covariance = np.polyfit(means[0], means[1], 1, cov=True)

@@ -6,21 +6,21 @@ import pytest
 from calib import pose
 from evaluation.experiment import Context
 from evaluation.paper.flat_boards import checkerboard, stripe
-from evaluation.paper.flat_boards.comparison import BLACK, WHITE, from_plane
-from evaluation.paper.wall_calibration import learnt
+from evaluation.paper.flat_boards.comparison import BLACK, WHITE, mean_plane_distance
+from evaluation.paper.wall_calibration import calibrated_noise
 
 
 def test_points_are_as_far_from_their_plane_as_they_were_put():
     places = np.random.default_rng(1).uniform(-1, 1, (500, 2))
     heights = np.where(np.arange(500) % 2, 0.02, -0.02)
     points = pose.transform(pose.from_rotation_vector([0.4, -0.7, 0.2], [1, 2, 3]), np.column_stack([places, heights]))
-    assert from_plane(points) == pytest.approx(0.02, rel=0.01)
-    assert from_plane(points[::2]) == pytest.approx(0, abs=1e-12)
+    assert mean_plane_distance(points) == pytest.approx(0.02, rel=0.01)
+    assert mean_plane_distance(points[::2]) == pytest.approx(0, abs=1e-12)
 
 
 @pytest.mark.slow
 def test_static_walls_tell_the_sensor_s_law():
-    noise = learnt("dark=-40", 2, seed=1)
+    noise = calibrated_noise("dark=-40", 2, seed=1)
     assert noise.mu_amplitude == pytest.approx(-40, rel=0.01)
     assert noise.sigma_amplitude == pytest.approx(9, rel=0.03)
 

@@ -16,9 +16,9 @@ from abs_service.config import load
 from drivers.encoding.mcap_file import McapFile
 from evaluation.experiment import Context
 from evaluation.service import live
-from evaluation.service.live import listener, losses, proc, recording
+from evaluation.service.live import losses, proc, recording, subscriber
 from evaluation.service.live.rig import write_rig
-from evaluation.service.live.trend import least_within, trend
+from evaluation.service.live.trend import rolling_minimum, trend
 
 MINUTES = np.arange(600.0) / 60
 
@@ -33,7 +33,7 @@ def test_the_slope_of_what_grows_steadily(slope):
 @pytest.mark.parametrize("slope", [0.0, 0.5])
 def test_what_a_saw_tooth_stands_on_grows_as_fast_as_it_does(slope):
     tooth = 20 * np.mod(MINUTES, 2.1)
-    found = trend(MINUTES, least_within(300 + slope * MINUTES + tooth, 150))
+    found = trend(MINUTES, rolling_minimum(300 + slope * MINUTES + tooth, 150))
     assert found.slope == pytest.approx(slope, abs=0.15)
     assert (found.slope - found.half_width > 0.1) == (slope > 0)
 
@@ -104,19 +104,19 @@ def test_a_recording_in_several_files_is_one(tmp_path):
     write_states(tmp_path / "a.mcap", [3, 4, 6])
     write_states(tmp_path / "b.mcap", [7, 9])
     (tmp_path / "c.mcap.active").write_bytes(b"unfinished")
-    found = recording.numbers(tmp_path, ["sheet/state", "never/said"])
+    found = recording.sequence_numbers(tmp_path, ["sheet/state", "never/said"])
     assert found == {"sheet/state": {3, 4, 6, 7, 9}, "never/said": frozenset()}
-    assert recording.holes(found["sheet/state"], 3, 9) == 2  # 5 and 8
-    assert recording.holes(found["sheet/state"], 1, 4) == 2  # 1 and 2
+    assert recording.count_missing(found["sheet/state"], 3, 9) == 2  # 5 and 8
+    assert recording.count_missing(found["sheet/state"], 1, 4) == 2  # 1 and 2
 
 
 def test_what_is_counted_up_to_a_moment():
     said = [Health(counters={"dropped.x": number}) for number in (1, 4, 9)]
     for t_ns, one in zip((10, 20, 30), said):
         one.header.t_host_ns = t_ns
-    assert listener.counted(said, 15) == {"dropped.x": 4}
-    assert listener.counted(said, 99) == {"dropped.x": 9}
-    assert listener.counted([], 5) == {}
+    assert subscriber.counted(said, 15) == {"dropped.x": 4}
+    assert subscriber.counted(said, 99) == {"dropped.x": 9}
+    assert subscriber.counted([], 5) == {}
 
 
 def test_which_counters_tell_of_losses():
@@ -127,7 +127,7 @@ def test_which_counters_tell_of_losses():
         "run": {"restarts.capture": 0},
     }
     counts["capture"] |= {"device.sim.frames": 270, "device.sim.unwanted": 7, "device.sim.reconnects": 1}
-    assert losses.counted(counts) == {
+    assert losses.loss_counters(counts) == {
         "capture: dropped.tof/depth/image": 2,
         "capture: device.sim.late": 3,
         "capture: device.sim.reconnects": 1,

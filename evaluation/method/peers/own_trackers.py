@@ -1,4 +1,4 @@
-"""Our own trackers on the peers' terms: the same template in its first pose, then depth images and nothing else."""
+"""Our own trackers on the peers' terms: the same template in its first pose, then depth images alone."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from abs_service.tracking.session import OptimizerSettings, Plan, Tracking
 from calib import pose
 from calib.noise.constant import Constant
 from calib.rig import Rig, Sensor
-from evaluation.scenes.bent_sheet import CAMERA, SIDE, SIZE, Moment, Shot, places
+from evaluation.scenes.bent_sheet import CAMERA, SIDE, SIZE, SheetFrame, SheetState, places
 
 #: A sheet of known size that moves faster than most: its rim is where the outline is, and its parameters may change
 #: their speed by 1 m/s from frame to frame.
@@ -73,7 +73,7 @@ SETUPS: Mapping[str, Setup] = {
 
 @dataclass(frozen=True)
 class Template:
-    """Settings of a model whose mesh and first pose are known, as the rivals know them; what is seen is not asked.
+    """Settings of a model whose mesh and first pose are known, as the competitors know them; what is seen is not asked.
 
     Attributes:
         setup: the model.
@@ -81,7 +81,7 @@ class Template:
     """
 
     setup: Setup
-    first: Moment
+    first: SheetState
 
     @property
     def board(self) -> tuple[float, float]:
@@ -97,32 +97,32 @@ class Template:
         return nurbs.Settings(self.setup.control_points, self.setup.degree).of_mesh(template(self.first))
 
 
-def template(moment: Moment) -> Mesh:
+def template(state: SheetState) -> Mesh:
     """The sheet as a mesh of 20 × 20 vertices; its chart is the places on the flat sheet."""
     grid = places(SIDE, SIDE)
     faces = triangles(np.arange(SIDE**2).reshape(SIDE, SIDE)).astype(np.int32)
     unknown = np.full((SIDE**2, 3), np.nan, np.float32)
-    return Mesh(moment.points(grid).reshape(-1, 3), faces, unknown, grid.reshape(-1, 2))
+    return Mesh(state.points(grid).reshape(-1, 3), faces, unknown, grid.reshape(-1, 2))
 
 
-class Ours:
-    """One of our trackers as a follower of shots.
+class OwnTracker:
+    """One of our trackers as a tracker of frames.
 
     Attributes:
         places: where on the flat sheet its vertices are (n, 2) [m].
-        estimate: of the last shot.
+        estimate: of the last frame.
 
     Args:
         setup: what it is made of.
-        first: the first shot, of which the pose is known; it is tracked at once.
+        first: the first frame, of which the pose is known; it is tracked at once.
         sigma: standard deviation of the distances [m].
         seed: of the search.
     """
 
-    def __init__(self, setup: Setup, first: Shot, sigma: float, seed: int):
+    def __init__(self, setup: Setup, first: SheetFrame, sigma: float, seed: int):
         plan = Plan(
             reference="tof",
-            model=Template(setup, first.moment),
+            model=Template(setup, first.state),
             region=nearest.Settings(),
             synthesis=sparse.Settings(),
             objective=OBJECTIVE,
@@ -137,13 +137,13 @@ class Ours:
         self._tracking = Tracking(Rig("peers", {"tof": Sensor("tof", CAMERA, Constant(sigma))}), plan)
         self.estimate: Estimate
         self.track(first)
-        mesh = template(first.moment) if self._tracking.mesh is None else self._tracking.mesh
+        mesh = template(first.state) if self._tracking.mesh is None else self._tracking.mesh
         self.places = mesh.chart if setup.model == "nurbs" else _inner_places(mesh.chart)
 
-    def track(self, shot: Shot) -> NDArray[np.floating]:
+    def track(self, frame: SheetFrame) -> NDArray[np.floating]:
         """Vertices (n, 3) [m] in a frame."""
-        image = DepthImage(shot.distance, np.full_like(shot.distance, np.nan))
-        seen = Observation(0, shot.t_ns, {"tof": image}, {"tof": Source(0, shot.t_ns)}, ())
+        image = DepthImage(frame.distance, np.full_like(frame.distance, np.nan))
+        seen = Observation(0, frame.t_ns, {"tof": image}, {"tof": Source(0, frame.t_ns)}, ())
         self.estimate = self._tracking.track_observation(seen, lambda: True)
         return self.estimate.vertices
 

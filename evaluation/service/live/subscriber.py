@@ -1,4 +1,4 @@
-"""A subscriber like any other: keeps when each estimate arrived, and what every component says of its health."""
+"""A subscriber of estimates, with their arrival times, and of the health of all components."""
 
 import time
 from collections.abc import Iterable, Mapping
@@ -12,20 +12,20 @@ from abs_service.bus.contract import Sample
 from abs_service.bus.session import BusError, Role
 from abs_service.bus.zenoh_bus import ZenohBus
 
-#: How often the router is looked for, each time for as long as the bus does by itself.
+#: Attempts to connect to the router, each with the timeout of the bus.
 ATTEMPTS = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Arrival:
+class ReceivedEstimate:
     """One estimate as it arrived.
 
     Attributes:
         t_ns: when, CLOCK_MONOTONIC [ns].
         exposed_ns: exposure of the frames that it was made from [ns].
         seq: number of the estimate.
-        is_tracking: whether its status is TRACKING.
-        age_ms: time from the exposure to the publication, as the tracker says [ms].
+        is_tracking: True if its status is TRACKING.
+        age_ms: time from the exposure to the publication, from the message [ms].
         solve_ms: time of the tracker's computation [ms].
         skipped: frame sets passed over before it.
         sensors: number of the exposure of each sensor that was used.
@@ -41,8 +41,8 @@ class Arrival:
     sensors: dict[str, int]
 
 
-class Listener:
-    """Listens to the estimates of one tracker, and to the health of all components.
+class Subscriber:
+    """Subscribes to the estimates of one tracker and to the health of all components.
 
     Args:
         endpoint: of the rig; may begin to listen later.
@@ -51,24 +51,24 @@ class Listener:
 
     Attributes:
         arrivals: the estimates, by arrival.
-        health: what each component said, by component and by arrival.
+        health: messages by component, in order of arrival.
 
     Raises:
-        BusError: nothing ever listened at the endpoint.
+        BusError: no router was found at the endpoint.
     """
 
     def __init__(self, endpoint: str, rig: str, tracker: str) -> None:
-        self.arrivals: list[Arrival] = []
+        self.arrivals: list[ReceivedEstimate] = []
         self.health: dict[str, list[Health]] = {}
         self._bus = connect(endpoint, rig)
         self._bus.subscribe(keys.state(tracker), self._take_state)
         self._bus.subscribe(keys.health("**"), self._take_health)
 
     def close(self) -> None:
-        """Hears nothing more."""
+        """Unsubscribes."""
         self._bus.close()
 
-    def __enter__(self) -> "Listener":
+    def __enter__(self) -> "Subscriber":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -78,7 +78,7 @@ class Listener:
         t_ns = time.monotonic_ns()
         state = DeformationState.FromString(sample.payload)
         self.arrivals.append(
-            Arrival(
+            ReceivedEstimate(
                 t_ns,
                 state.header.t_host_ns,
                 state.header.seq,
@@ -96,7 +96,7 @@ class Listener:
 
 
 def counted(health: Iterable[Health], until_ns: int) -> Mapping[str, int]:
-    """What a component has counted up to its first word after `until_ns` [CLOCK_MONOTONIC, ns], or to its last."""
+    """Counters of a component in its first health message after `until_ns` [CLOCK_MONOTONIC, ns], or in its last."""
     counters: dict[str, int] = {}
     for one in health:
         counters = dict(one.counters)
@@ -109,7 +109,7 @@ def connect(endpoint: str, rig: str) -> ZenohBus:
     """A client of a rig whose router may begin to listen later.
 
     Raises:
-        BusError: nothing ever listened at the endpoint.
+        BusError: no router was found at the endpoint.
     """
     for _ in range(ATTEMPTS - 1):
         try:

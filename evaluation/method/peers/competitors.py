@@ -1,4 +1,4 @@
-"""Other programs that deform a template to measured points, each behind one function; not all need be installed."""
+"""Other programs that deform a template to measured points; each may be missing."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import triangles
-from evaluation.scenes.bent_sheet import SIDE, Shot
+from evaluation.scenes.bent_sheet import SIDE, SheetFrame
 
 #: Coherent point drift is tuned for points that are about one apart: it gets them in units of 100 mm.
 UNIT_M = 0.1
@@ -22,10 +22,10 @@ ALPHA, BETA, ITERATIONS = 1.0, 1.0, 50
 Registration = Callable[[Any, NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
 
-class Follower(Protocol):
-    """Something that follows a template through frames, each from where it was in the last one."""
+class SheetTracker(Protocol):
+    """Tracks a template through frames, starting each from the result of the last."""
 
-    def track(self, shot: Shot) -> NDArray[np.floating]:
+    def track(self, frame: SheetFrame) -> NDArray[np.floating]:
         """Vertices (n, 3) [m] of the template in a frame."""
         ...
 
@@ -44,20 +44,20 @@ class PointSets:
         self._module = import_module(package)
         self._register = register
 
-    def track(self, shot: Shot) -> NDArray[np.float64]:
+    def track(self, frame: SheetFrame) -> NDArray[np.float64]:
         """Vertices (n, 3) [m] in a frame."""
-        moved = self._register(self._module, shot.cloud / UNIT_M, self._vertices / UNIT_M)
+        moved = self._register(self._module, frame.cloud / UNIT_M, self._vertices / UNIT_M)
         self._vertices = np.asarray(moved, np.float64) * UNIT_M
         return self._vertices
 
 
-class Still:
-    """No tracking at all: how much there was to follow."""
+class NoTracking:
+    """Baseline without tracking: the first pose in every frame."""
 
     def __init__(self, vertices: NDArray[np.float64]):
         self._vertices = vertices
 
-    def track(self, shot: Shot) -> NDArray[np.float64]:
+    def track(self, frame: SheetFrame) -> NDArray[np.float64]:
         """The template's first pose."""
         return self._vertices
 
@@ -118,8 +118,8 @@ KNOWN: Mapping[str, tuple[str, Registration]] = {
 }
 
 
-def installed(names: Sequence[str]) -> dict[str, Callable[[NDArray[np.float64]], Follower]]:
-    """Makers of those of the named rivals whose packages are installed."""
+def installed(names: Sequence[str]) -> dict[str, Callable[[NDArray[np.float64]], SheetTracker]]:
+    """Makers of those of the named competitors whose packages are installed."""
     return {
         name: partial(PointSets, package=package, register=register)
         for name, (package, register) in KNOWN.items()
