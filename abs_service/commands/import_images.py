@@ -76,12 +76,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Imports; what is wrong with the images or options is raised as an error of this package or of `drivers`."""
     rig_toml = _rig(arguments.rig)
-    footage = _foreign_recording(arguments)
+    foreign_recording = _foreign_recording(arguments)
     if arguments.out.exists():
         raise ImportOptionError(f"{arguments.out}: exists already; remove it or choose another name")
     partial = arguments.out.with_name(f"{arguments.out.name}.partial")
     try:
-        counts = import_file.write(partial, arguments.path.resolve().stem, footage, rig_toml)
+        counts = import_file.write(partial, arguments.path.resolve().stem, foreign_recording, rig_toml)
         partial.rename(arguments.out)
     except OSError as error:
         raise ImportOptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error

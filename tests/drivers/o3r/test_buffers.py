@@ -15,14 +15,14 @@ from drivers.o3r.chunks import ChunkError, ChunkType, messages
 from tests.drivers.o3r import pcic_messages
 
 
-def footage(folder: Path, content: bytes) -> O3rBuffers:
+def read_buffers(folder: Path, content: bytes) -> O3rBuffers:
     path = folder / "buffer.data"
     path.write_bytes(content)
     return O3rBuffers(path)
 
 
 def test_a_message_becomes_four_images_of_one_exposure(tmp_path: Path) -> None:
-    read = footage(tmp_path, pcic_messages.exposure(7) + pcic_messages.exposure(8))
+    read = read_buffers(tmp_path, pcic_messages.exposure(7) + pcic_messages.exposure(8))
     frames = list(read.frames())
     assert read.total == len(frames) == 8
     assert [(frame.stream, frame.seq) for frame in frames[:4]] == [
@@ -44,7 +44,7 @@ def test_a_message_becomes_four_images_of_one_exposure(tmp_path: Path) -> None:
 
 
 def test_the_camera_is_opencvs_with_pixels_counted_from_their_centres(tmp_path: Path) -> None:
-    camera = footage(tmp_path, pcic_messages.exposure()).cameras["depth"]
+    camera = read_buffers(tmp_path, pcic_messages.exposure()).cameras["depth"]
     fx, fy, mx, my, _, *distortion = pcic_messages.LENS
     point = np.array([0.2, -0.1, 0.8])
     matrix = np.array([[fx, 0, mx], [0, fy, my], [0, 0, 1]])
@@ -58,7 +58,7 @@ def test_the_lens_of_a_wide_view_is_opencvs_fisheye(tmp_path: Path) -> None:
         pcic_messages.chunk(100, bytes(96), 8, 6, 2),
         pcic_messages.chunk(420, pcic_messages.tof_info(3, lens), 8, 6, 0),
     )
-    camera = footage(tmp_path, pcic_messages.message(*chunks)).cameras["depth"]
+    camera = read_buffers(tmp_path, pcic_messages.message(*chunks)).cameras["depth"]
     point = np.array([0.7, -0.4, 0.5])
     matrix = np.array([[9.0, 0, 4.5], [0, 8, 3.25], [0, 0, 1]])
     corner, _ = cv2.fisheye.projectPoints(point[None, None], np.zeros(3), np.zeros(3), matrix, np.array(lens[5:9]))
@@ -71,7 +71,7 @@ def test_network_messages_and_older_versions_are_read(tmp_path: Path) -> None:
         pcic_messages.chunk(420, pcic_messages.tof_info(newer=False), 8, 6, 0, version=1),
         on_the_wire=True,
     )
-    (depth,) = footage(tmp_path, old).frames()
+    (depth,) = read_buffers(tmp_path, old).frames()
     assert depth.t_host_ns == 123_456_000
     assert np.isnan(depth.temperature_c)
     assert np.all(np.isnan(depth.si()))
@@ -103,7 +103,7 @@ def test_network_messages_and_older_versions_are_read(tmp_path: Path) -> None:
 )
 def test_other_files_are_rejected_with_their_name(tmp_path: Path, content: bytes, complaint: str) -> None:
     with pytest.raises(ForeignRecordingError, match=complaint) as error:
-        footage(tmp_path, content)
+        read_buffers(tmp_path, content)
     assert "buffer.data" in str(error.value)
 
 
@@ -112,7 +112,7 @@ def test_an_image_with_too_few_bytes_raises_when_read(tmp_path: Path) -> None:
         pcic_messages.chunk(100, bytes(94), 8, 6, 2), pcic_messages.chunk(420, pcic_messages.tof_info(), 8, 6, 0)
     )
     with pytest.raises(ForeignRecordingError, match="needs 96 bytes"):
-        list(footage(tmp_path, content).frames())
+        list(read_buffers(tmp_path, content).frames())
 
 
 def parsed(content: bytes) -> list[Frame]:

@@ -265,13 +265,13 @@ def test_controls_are_in_si_units_and_in_the_cameras_steps() -> None:
 
 
 def test_a_frame_queue_keeps_the_newest_and_counts_drops() -> None:
-    inbox: FrameQueue[int] = FrameQueue(2)
+    queue: FrameQueue[int] = FrameQueue(2)
     for number in range(5):
-        inbox.put(number)
-    inbox.end("over")
-    assert inbox.ended() == ""
-    assert [inbox.take(0), inbox.take(0), inbox.take(0)] == [3, 4, None]
-    assert (inbox.dropped(), inbox.dropped(), inbox.ended()) == (3, 0, "over")
+        queue.put(number)
+    queue.end("over")
+    assert queue.ended() == ""
+    assert [queue.take(0), queue.take(0), queue.take(0)] == [3, 4, None]
+    assert (queue.dropped(), queue.dropped(), queue.ended()) == (3, 0, "over")
 
 
 @given(
