@@ -11,9 +11,11 @@ What `__all__` names is the public face (docs/api.md), imported when it is first
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # true for type checkers; importing typing would make --help slower
 if TYPE_CHECKING:
+    from typing import Any
+
     from abs_service.api import (
         ArgumentError,
         Camera,
@@ -67,7 +69,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module("abs_service.api"), name)
