@@ -1,4 +1,4 @@
-"""Exit code 0 if every part of a running service reports itself, and none reports an error.
+"""Exit code 0 if a running service publishes health, and no component reports an error.
 
     python healthcheck.py [ENDPOINT]
 
@@ -13,11 +13,11 @@ import zenoh
 from absmsg.v1.health_pb2 import Health
 
 ENDPOINT = "tcp/127.0.0.1:7447"
-PATIENCE_S = 2.5  # each part speaks once a second
+TIMEOUT_S = 2.5  # each component publishes once a second
 
 
 def reports(endpoint: str) -> dict[str, Health]:
-    """The latest health of each component that spoke within the patience."""
+    """Latest health of each component that published within the timeout."""
     settings = {
         "mode": "client",
         "connect": {"endpoints": [endpoint], "timeout_ms": 2000},
@@ -26,7 +26,7 @@ def reports(endpoint: str) -> dict[str, Health]:
     latest: dict[str, Health] = {}
     config = zenoh.Config.from_json5(json.dumps(settings))
     with zenoh.open(config) as session, session.declare_subscriber("abs/*/health/**") as subscriber:
-        time.sleep(PATIENCE_S)
+        time.sleep(TIMEOUT_S)
         while (sample := subscriber.try_recv()) is not None:
             health = Health.FromString(sample.payload.to_bytes())
             latest[health.component] = health

@@ -135,7 +135,7 @@ def _pins(name: str) -> dict[str, Version]:
 
 
 def _requirements(package: str) -> set[str]:
-    """What the installed `package` requires here; empty for one that this machine does without."""
+    """Requirements of the installed `package`; empty if it is not installed."""
     try:
         wanted = map(Requirement, requires(package) or [])
     except PackageNotFoundError:

@@ -54,7 +54,7 @@ def test_a_message_arrives_as_it_was_sent(buses, qos):
     )
 
 
-def test_an_announcement_is_heard_and_answers_with_the_last(buses):
+def test_a_latched_publisher_answers_queries_with_its_last_message(buses):
     _, sender, receiver = buses
     publisher = sender.latched_publisher("config", "absmsg.v1.Config")
     assert receiver.query("config", 1) == []
@@ -64,7 +64,7 @@ def test_an_announcement_is_heard_and_answers_with_the_last(buses):
     assert receiver.query("**", 1) == [Sample("config", "absmsg.v1.Config", b"new")]
 
 
-def test_an_answer_is_made_when_asked(buses):
+def test_queries_are_answered_when_they_arrive(buses):
     _, sender, receiver = buses
     sender.answer_queries("schema", "google.protobuf.FileDescriptorSet", lambda: b"files")
     answers = []

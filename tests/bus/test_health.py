@@ -29,7 +29,7 @@ def test_it_speaks_once_a_second():
     assert {sample.topic for sample in rig.bus.sent} == {"health/capture"}
 
 
-def test_a_change_is_said_at_once_and_only_once():
+def test_a_change_of_level_is_published_at_once_and_only_once():
     rig = Rig()
     for _ in range(3):
         rig.health.report("device sim", Level.ERROR, "sim is unplugged; plug it in")
@@ -44,14 +44,14 @@ def test_a_change_is_said_at_once_and_only_once():
     ]
 
 
-def test_a_component_that_has_nothing_to_complain_of_is_ok():
+def test_a_component_without_conditions_is_ok():
     rig = Rig()
     rig.health.report("device sim", Level.OK)
     rig.health.tick()
     assert [message.level for message in rig.said] == [Message.LEVEL_OK]
 
 
-def test_numbers_and_names_are_told():
+def test_numbers_and_names_are_published():
     rig = Rig()
     rig.health.count("restarts")
     rig.health.count("restarts", 2)

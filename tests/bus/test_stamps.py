@@ -37,7 +37,7 @@ def test_slow_drift_is_followed_but_is_no_step():
     assert abs(clock.wall(0) - clocks.offset_ns) < 1000
 
 
-def test_a_header_says_who_speaks_and_when():
+def test_a_header_has_sender_and_time():
     clocks = Clocks()
     clock = WallClock(clocks.monotonic, clocks.wall)
     headers = HeaderFactory("demo", clock)

@@ -30,7 +30,7 @@ sensors.color.device = "sim"
     return path
 
 
-def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint, launch):
+def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, launch):
     with ZenohBus.open("demo", endpoint, Role.ROUTER) as bus:
         changes, health = queue.SimpleQueue(), queue.SimpleQueue()
         bus.watch_liveliness(lambda *change: changes.put(change))
@@ -59,7 +59,7 @@ def test_it_publishes_frames_and_answers_until_it_is_told_to_stop(rig, endpoint,
         assert last.counters["published.tof/depth/image"] > 0
 
 
-def test_what_the_user_has_to_change_is_said_with_exit_code_2(rig, endpoint, launch):
+def test_a_folder_that_cannot_be_written_is_a_user_error(rig, endpoint, launch):
     with ZenohBus.open("other", endpoint, Role.ROUTER):
         process = launch("capture", rig, "--listen", endpoint)
         assert process.wait(30) == 2

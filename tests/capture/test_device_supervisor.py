@@ -153,7 +153,7 @@ def test_a_failed_device_is_opened_again_in_a_later_epoch(keep):
     assert eventually(lambda: health._labels["device.sim"] == "streaming")
 
 
-def test_what_is_wrong_with_a_device_is_said_until_it_can_be_opened(keep):
+def test_a_device_error_is_reported_until_the_device_can_be_opened(keep):
     _, collector, health = keep(no_device, working)
     assert eventually(lambda: health.level == Level.ERROR)
     assert health._conditions["device sim"][1] == "sim: no such device; plug it in; trying again in 0.2 s"
@@ -191,7 +191,7 @@ def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monke
     assert health._counters["device.sim.stalls"] >= 1
 
 
-def test_only_the_same_device_will_do_after_a_reconnect(keep, asked):
+def test_only_the_same_serial_number_is_accepted_after_a_reconnect(keep, asked):
     def other():
         return FakeDevice(start=working().start, serial="2")
 
@@ -247,7 +247,7 @@ def test_a_device_that_does_not_answer_when_it_is_set_is_tried_again(keep):
     assert supervisor.fatal_error is None
 
 
-def test_frames_of_heads_that_nobody_configured_are_counted_and_left_out(keep):
+def test_frames_of_heads_that_are_not_configured_are_counted_and_dropped(keep):
     device = FakeDevice(start=lambda sink: [sink.on_frame(frame(sensor)) for sensor in ("other", "other", "head")])
     _, collector, health = keep(lambda: device)
     assert collector.frames.get(timeout=5).sensor == "tof"
@@ -319,7 +319,7 @@ def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configura
     assert (color.rotation.x, color.rotation.y, color.rotation.z, color.rotation.w) == (x, y, z, w)
 
 
-def test_viewers_are_told_of_a_fisheye_and_recordings_give_it_back():
+def test_a_fisheye_camera_is_published_and_restored_from_recordings():
     camera = dataclasses.replace(CAMERA, lens=KannalaBrandt(np.array([0.1, 0.02])))
     told = sensor_metadata.calibration("tof", camera, 0)
     assert (told.distortion_model, list(told.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
@@ -340,7 +340,7 @@ def test_a_head_that_the_device_does_not_have_is_explained(metadata):
         metadata.add_device("cam", FakeDevice(heads=["head"]))
 
 
-def test_a_step_of_the_wall_clock_is_said_once(metadata):
+def test_a_step_of_the_wall_clock_is_reported_once(metadata):
     bus, metadata = metadata
     now = {"monotonic": 10**9, "wall": 10**18}
     clock = WallClock(lambda: now["monotonic"], lambda: now["wall"])

@@ -20,7 +20,7 @@ WALL_NS = 1_700_000_000_000_000_000
 
 
 class Recordable(Protocol):
-    """What a recording is made of: a simulation, or something that changes what one shows."""
+    """Source of a recording: a simulation, or a modified one."""
 
     @property
     def heads(self) -> Mapping[str, Head]: ...

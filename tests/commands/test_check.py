@@ -92,7 +92,7 @@ def test_what_reads_well_and_cannot_work_is_named(checked, good, bad, message):
     assert message in err
 
 
-def test_all_of_it_is_told_at_once(checked):
+def test_all_problems_are_reported_at_once(checked):
     text = RIG.replace("sede", "x").replace("simulated:", "simulatde:")
     text = text.replace('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }')
     assert len(checked(text)[2].splitlines()) == 3
@@ -112,7 +112,7 @@ def test_no_driver_that_could_touch_hardware_is_opened(monkeypatch, tmp_path):
         ("[sensors.tof.camera]\nT_rs = {}", "projection from the device, pose from this file"),
     ],
 )
-def test_it_is_said_where_a_camera_comes_from(checked, camera, said):
+def test_the_origin_of_a_camera_is_shown(checked, camera, said):
     assert said in checked(RIG + camera)[1]
 
 

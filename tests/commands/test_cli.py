@@ -130,7 +130,7 @@ def test_help_imports_no_command_and_nothing_heavy():
     assert "examples:" in done.stdout
 
 
-def test_a_command_computes_with_one_thread_unless_the_user_says_otherwise():
+def test_a_command_computes_with_one_thread_unless_configured_otherwise():
     """So that as many trackers as a rig has get equal shares of the cores."""
     program = """
 import contextlib, os, sys

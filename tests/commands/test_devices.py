@@ -54,7 +54,7 @@ def test_every_device_is_listed_with_what_to_do_about_it(listed):
     assert "realsense://  pyrealsense2 is not installed:  pip install 'abs-service[realsense]'" in text
 
 
-def test_an_empty_table_says_what_works_without_a_camera(listed):
+def test_an_empty_table_shows_what_works_without_a_camera(listed):
     text = listed(NO_SDK)
     assert "No camera is attached." in text
     assert "`abs-service run` needs none" in text
@@ -76,7 +76,7 @@ def test_who_comes_goes_and_changes():
 
 
 @pytest.mark.parametrize("options", [[], ["--json"]])
-def test_hot_plug_is_followed_until_told_to_stop(monkeypatch, capsys, options):
+def test_hot_plug_is_followed_until_interrupted(monkeypatch, capsys, options):
     looks = iter([[OAK], [], [KINECT]])
     stop = devices.rig_process.stop_on_signals()
 
@@ -121,7 +121,7 @@ def test_one_device_is_described_with_its_controls(monkeypatch, capsys):
     assert not any(value == math.inf for value in told["controls"][1].values())
 
 
-def test_an_address_that_nobody_understands_is_explained(capsys):
+def test_a_malformed_address_is_explained(capsys):
     assert cli.main(["devices", "camera://1"]) == Exit.USER
     assert "scheme 'camera' is none of" in capsys.readouterr().err
 

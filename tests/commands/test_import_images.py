@@ -148,7 +148,7 @@ def test_a_recording_of_another_program_brings_its_calibration(
         (CAMERA, ["--out", "/nowhere/at/all.mcap"], "/nowhere/at/all.mcap: cannot be written: No such file"),
     ],
 )
-def test_what_is_wrong_is_said_with_exit_code_2(
+def test_a_user_error_is_reported_with_exit_code_2(
     folder: Path, capsys: pytest.CaptureFixture[str], camera: str | None, options: list[str], complaint: str
 ) -> None:
     if camera is not None:

@@ -34,7 +34,7 @@ class Tracker:
 @pytest.mark.parametrize(
     ("finds", "code", "words"), [(True, 0, "has a new mesh, version 2"), (False, 1, "found no object within")]
 )
-def test_the_tracker_is_told_and_its_new_mesh_reported(monkeypatch, capsys, finds, code, words):
+def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, finds, code, words):
     monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.2)
     bus = LoopbackBus()
     tracker = Tracker(bus, finds)

@@ -1,4 +1,4 @@
-"""How a process learns where to connect and when to stop."""
+"""Endpoint and signals of a rig's processes."""
 
 import argparse
 import os
@@ -37,7 +37,7 @@ def parse(*arguments):
     return parser.parse_args(arguments)
 
 
-def test_one_process_may_listen_and_others_connect_wherever_they_are_told(endpoint):
+def test_one_process_may_listen_and_others_connect_to_a_given_endpoint(endpoint):
     rig = rig_process.load_config(parse())
     with (
         rig_process.open_bus(rig, parse("--listen", endpoint)),

@@ -36,7 +36,7 @@ def test_the_stiffness_and_a_picture_come_out(recording, capsys):
     assert np.ptp(picture) > 100
 
 
-def test_the_text_says_what_and_how_well(recording, capsys):
+def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
     assert cli.main(["stiffness", str(recording), "--weight", "0.3"]) == Exit.OK
     said = capsys.readouterr().out
     assert "bending stiffness per width  D = " in said
@@ -55,7 +55,7 @@ def test_the_text_says_what_and_how_well(recording, capsys):
         (["--weight", "0.3", "--config", str(ROOT / "examples" / "flexpad.toml")], "no tracker has a gravity model"),
     ],
 )
-def test_what_cannot_be_done_is_said(recording, capsys, options, problem):
+def test_impossible_options_are_reported(recording, capsys, options, problem):
     assert cli.main(["stiffness", str(recording), *options]) == Exit.USER
     assert problem in capsys.readouterr().err
 

@@ -39,7 +39,7 @@ def mistakes(text: str) -> list[str]:
     return [line.strip() for line in others] or [first.removeprefix("rig.toml: ")]
 
 
-def test_what_is_not_said_has_a_default():
+def test_optional_keys_have_defaults():
     made = loads(SENSORS)
     assert made.bus.endpoint == "tcp/127.0.0.1:7447"
     assert made.record.directory == Path("/rig/recordings")
@@ -164,7 +164,7 @@ def test_a_mistake_is_named_with_its_key_its_value_and_what_is_allowed(case):
     assert message in found[0]
 
 
-def test_every_mistake_is_told_at_once():
+def test_all_problems_are_reported_at_once():
     text = (
         SENSORS.replace('device = "sim"', 'device = "sam"').replace("version = 1", "version = 2").replace("[bus]", "")
     )
@@ -188,16 +188,16 @@ def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():
     assert "trackers.tof.model: missing" in found
 
 
-def test_a_tracker_without_any_reference_is_told_where_to_put_one():
+def test_a_tracker_without_any_reference_is_an_error_with_a_remedy():
     text = SENSORS.replace('reference = "tof/depth"', "") + '[trackers.sheet]\nsensors = ["tof"]\n'
     assert any(line.startswith("trackers.sheet.reference: missing") for line in mistakes(text))
 
 
-def test_a_file_that_is_not_toml_is_told_with_the_line():
+def test_a_file_that_is_not_toml_is_reported_with_the_line():
     assert "line 2" in mistakes("version = 1\nname = \n")[0]
 
 
-def test_a_name_given_twice_is_told_with_the_line():
+def test_a_duplicate_name_is_reported_with_the_line():
     assert "line" in mistakes(SENSORS + '[devices.sim]\nuri = "simulated:x"\n')[0]
 
 

@@ -22,14 +22,14 @@ EXAMPLES = ROOT / "examples"
 #: Between two publications [s]. They go on until the reader has seen enough: nobody knows when it has subscribed.
 PERIOD_S = 0.02
 #: By when a reader must have printed what it should [s]; it is killed then.
-PATIENCE_S = 30.0
+TIMEOUT_S = 30.0
 
 
 def test_the_subscriber_prints_estimates_and_ends(endpoint, open_bus):
     state = golden(DeformationState)
     states = open_bus().publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
     with reading(python("subscribe.py", "--endpoint", endpoint, "--count", 2)) as reader, putting(states, state):
-        output, errors = reader.communicate(timeout=PATIENCE_S)
+        output, errors = reader.communicate(timeout=TIMEOUT_S)
     assert (reader.returncode, errors) == (0, "")
     assert_printed(output.splitlines(), state)
 
@@ -40,13 +40,13 @@ def test_the_subscriber_ends_at_once_with_ctrl_c(endpoint, open_bus):
         with putting(states, golden(DeformationState)):
             assert next(printed(reader))
         reader.send_signal(signal.SIGINT)  # it waits for the next estimate now, and none will come
-        _, errors = reader.communicate(timeout=PATIENCE_S)
+        _, errors = reader.communicate(timeout=TIMEOUT_S)
     assert (reader.returncode, errors) == (0, "")
 
 
-def test_the_subscriber_says_that_nothing_is_there(endpoint):
+def test_the_subscriber_reports_a_missing_service(endpoint):
     with reading(python("subscribe.py", "--endpoint", endpoint)) as reader:
-        _, errors = reader.communicate(timeout=PATIENCE_S)
+        _, errors = reader.communicate(timeout=TIMEOUT_S)
     assert reader.returncode == 1
     assert errors == f"nothing answers at {endpoint}: is abs-service running?\n"
 
@@ -67,7 +67,7 @@ def test_meshes_become_arrays_also_after_the_tracker_was_restarted(endpoint, ope
         with putting(meshes, mesh):
             assert any("100.0 cm²" in line for line in printed(reader))
         reader.send_signal(signal.SIGINT)
-        _, errors = reader.communicate(timeout=PATIENCE_S)
+        _, errors = reader.communicate(timeout=TIMEOUT_S)
     assert (reader.returncode, errors) == (0, "")
 
 
@@ -85,7 +85,7 @@ def test_the_subscriber_in_cpp_does_the_same(endpoint, open_bus, tmp_path):
     state.covariance.extend([0.5] * 1176)  # as large as an estimate with 48 parameters: zenoh-pico has limits
     states = open_bus().publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
     with reading([program, endpoint, "abs/demo/sheet/state", "2"]) as reader, putting(states, state):
-        output, errors = reader.communicate(timeout=PATIENCE_S)
+        output, errors = reader.communicate(timeout=TIMEOUT_S)
     assert (reader.returncode, errors) == (0, "")
     assert_printed(output.replace("STATUS_", "").replace("theta", "Θ").splitlines(), state)
 
@@ -130,7 +130,7 @@ def reading(command):
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment) as reader:
-        watchdog = threading.Timer(PATIENCE_S, reader.kill)
+        watchdog = threading.Timer(TIMEOUT_S, reader.kill)
         watchdog.start()
         try:
             yield reader

@@ -52,8 +52,8 @@ def folder(tmp_path_factory):
 
 
 @dataclass(frozen=True)
-class Telling:
-    """A simulation whose depth cameras also tell how much each of their distances deviates, as some sensors do."""
+class WithDeviation:
+    """A simulation whose depth cameras also deliver σ of each distance."""
 
     simulation: Simulation
 
@@ -81,7 +81,7 @@ def take(folder):
     @cache
     def made(uri: str, heads: tuple[tuple[str, str], ...]) -> Path:
         path = folder / f"{len(list(folder.glob('*.mcap')))}.mcap"
-        return write_take(path, Telling(parse(uri).build()), EXPOSURES, dict(heads))
+        return write_take(path, WithDeviation(parse(uri).build()), EXPOSURES, dict(heads))
 
     return made
 

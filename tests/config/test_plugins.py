@@ -66,7 +66,7 @@ def test_only_modules_with_settings_are_available(package):
     assert plugins.available(package) == ["around", "bendy"]
 
 
-def test_parts_that_were_not_asked_for_are_not_imported(package, tmp_path):
+def test_parts_that_are_not_configured_are_not_imported(package, tmp_path):
     (tmp_path / package / "heavy.py").write_text("raise ImportError('this takes long')")
     plugins.load(package, {"type": "bendy"}, Path())
     assert f"{package}.heavy" not in sys.modules
@@ -94,7 +94,7 @@ def test_a_type_reaches_nothing_but_the_modules_of_its_package(package, name):
     assert "no such type" in problems(package, {"type": name})[0]
 
 
-def test_all_mistakes_of_a_table_are_told_at_once(package):
+def test_all_problems_of_a_table_are_reported_at_once(package):
     found = problems(package, {"type": "bendy", "degreee": 2, "degree": 9, "control_points": [4, "4"]})
     assert found == [
         'degreee: unknown key, did you mean "degree"? allowed: control_points, degree, mask',
@@ -103,7 +103,7 @@ def test_all_mistakes_of_a_table_are_told_at_once(package):
     ]
 
 
-def test_what_the_settings_themselves_refuse_is_told_in_their_words(package):
+def test_errors_of_the_settings_class_are_reported_verbatim(package):
     assert "degree must be below" in problems(package, {"type": "bendy", "degree": 4})[0]
 
 
@@ -120,7 +120,7 @@ def test_a_part_may_hold_another_part(package):
     assert plugins.load(package, plugins.table(made), Path("/elsewhere")) == made
 
 
-def test_mistakes_in_both_parts_are_told_with_their_full_keys(package):
+def test_problems_in_both_parts_are_reported_with_their_full_keys(package):
     inner = {"type": "bendy", "degreee": 2, "degree": 9}
     assert problems(package, {"type": "around", "inner": inner, "size": "2", "sice": 2}) == [
         'sice: unknown key, did you mean "size"? allowed: inner, size',

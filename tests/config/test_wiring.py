@@ -24,7 +24,7 @@ def test_a_sensor_without_a_camera_is_named():
         wiring.rig(config.load_default(), "sheet", {"tof": TOF})
 
 
-def test_what_a_sensor_says_of_its_outliers_comes_with_its_noise():
+def test_the_outlier_settings_of_a_sensor_are_published_with_its_noise_model():
     text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
     own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\n")
     rig = wiring.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})

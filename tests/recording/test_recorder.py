@@ -1,4 +1,4 @@
-"""What the recorder promises: everything, unchanged, readable by anyone."""
+"""The recorder writes all messages, unchanged, in a standard format."""
 
 import json
 import threading

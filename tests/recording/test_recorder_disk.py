@@ -1,4 +1,4 @@
-"""What the recorder does about a disk that is slow, nearly full, full or not there."""
+"""The recorder with a disk that is slow, nearly full, full or missing."""
 
 import queue
 import threading
@@ -66,7 +66,7 @@ def test_it_stops_before_the_disk_is_full_with_a_complete_file(tmp_path):
     rig.recorder.stop(5)
 
 
-def test_a_disk_error_is_said_at_once_and_leaves_the_file_to_be_recovered(tmp_path):
+def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered(tmp_path):
     class Full(SlowFile):
         def write(self, data):
             if self._file.tell() > 5000:

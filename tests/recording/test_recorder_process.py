@@ -122,7 +122,7 @@ def test_a_killed_recorder_loses_a_second_at_most_and_the_next_one_recovers_the_
         assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1)), "a hole"
 
 
-def test_a_full_disk_is_said_and_nothing_more_is_written_and_the_file_is_recovered(rig, endpoint, launch):
+def test_a_full_disk_is_reported_ends_recording_and_the_file_is_recovered(rig, endpoint, launch):
     limit = 300_000
     recorder = launch("record", rig, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
     with Stream(endpoint) as stream:

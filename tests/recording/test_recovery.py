@@ -49,7 +49,7 @@ def read(path):
 
 
 def chunk_spans(path):
-    """Where the compressed data of each chunk lies."""
+    """Position of the compressed data of each chunk."""
     data = path.read_bytes()
     with path.open("rb") as stream:
         chunks = [r for r in StreamReader(stream, emit_chunks=True).records if isinstance(r, Chunk)]
@@ -155,7 +155,7 @@ def test_random_bytes_are_no_recording(tmp_path):
         recover(tmp_path / "b.mcap")
 
 
-def test_a_file_that_somebody_writes_is_left_alone(tmp_path):
+def test_a_file_that_is_being_written_is_not_recovered(tmp_path):
     source = write(tmp_path / "a.mcap.active", finish=False)
     with source.open("rb") as writer:
         fcntl.flock(writer, fcntl.LOCK_EX)
@@ -174,7 +174,7 @@ def test_an_interrupted_recovery_is_repeated(tmp_path, monkeypatch):
     assert recover(source).messages == 2 * FRAMES
 
 
-def test_the_command_says_what_it_did_and_goes_on_after_an_error(tmp_path, capsys):
+def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, capsys):
     import argparse
 
     source = write(tmp_path / "a.mcap.active", finish=False)

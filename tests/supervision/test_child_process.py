@@ -105,7 +105,7 @@ def test_no_child_outlives_a_supervisor_that_was_killed(handler):
 
 
 def gone(pid, seconds=5.0):
-    """Whether a process that is not ours to wait for ends within the time."""
+    """True if a process that is not our child ends within the time."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline:
         try:

@@ -163,12 +163,12 @@ def test_troubles_of_components_and_children_that_were_given_up_are_shown(live):
     assert "track/sheet: given up: needed more than 5 restarts" in text
 
 
-def test_preparing_is_said_with_a_spinner(live):
+def test_preparation_is_shown_with_a_spinner(live):
     take_health(live, Health(component="track/sheet", labels={"phase": "preparing"}))
     assert "Preparing kernels; the first start compiles them" in drawn(view(live))
 
 
-def test_before_anything_is_known_the_table_says_what_it_waits_for():
+def test_before_the_first_message_the_table_shows_the_stage_of_the_start():
     live = RigState(["sheet"], Clock())
     text = drawn(view(live))
     assert "no images yet" in text
@@ -196,7 +196,7 @@ def test_the_table_leaves_notes_above_and_the_summary_below(live):
     assert "vertex error mean 2.35 mm" in text
 
 
-def test_the_summary_tells_images_estimates_errors_losses_the_file_and_restarts(live):
+def test_the_summary_lists_images_estimates_errors_losses_file_and_restarts(live):
     assert view(live).summary() == [
         "83.4 s, 60 images, 4 dropped",
         "sheet: 12 estimates, 3 frame sets skipped, 17.3 ms each, 12 TRACKING",
@@ -214,7 +214,7 @@ def test_plain_output_is_one_line_a_second(live):
     assert len(out.getvalue().splitlines()) == 3
 
 
-def test_a_plain_line_says_it_all(live):
+def test_a_plain_line_shows_the_whole_state(live):
     text = line(view(live))
     for part in ("tof/depth 30.0 Hz", "sheet TRACKING error 2.35 mm, surface 0.99 mm", "12 estimates", "3 dropped"):
         assert part in text

@@ -1,4 +1,4 @@
-"""What keeps Python from pausing a process while a frame waits."""
+"""Switch interval and garbage collection."""
 
 import gc
 import sys

@@ -139,7 +139,7 @@ def test_what_cannot_be_read_is_counted_and_harms_nothing(live):
     assert live.malformed == 3
 
 
-def test_strangers_are_ignored(live):
+def test_messages_of_unknown_components_are_ignored(live):
     assert take(live, Sample("other/state", DeformationState.DESCRIPTOR.full_name, b"")) == []
     assert live.malformed == 0
 

@@ -98,7 +98,7 @@ class TestTheFileOfTheChildren:
             assert config.load(path) == rig
         assert not path.exists()
 
-    def test_whoever_removes_it_does_no_harm(self, rig_file, monkeypatch):
+    def test_its_removal_by_others_does_no_harm(self, rig_file, monkeypatch):
         rig = config.load(rig_file)
         monkeypatch.setattr(run, "ChildProcess", lambda component, arguments, on_line: Idle(component))
         with run.file(rig) as path:
@@ -144,7 +144,7 @@ def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
     assert "capture failed: needed more than 0 restarts" in told[-1].message
 
 
-def test_a_topology_that_the_network_lost_is_asked_for():
+def test_a_topology_that_the_network_lost_is_queried():
     bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
     asked = []
 
@@ -160,7 +160,7 @@ def test_a_topology_that_the_network_lost_is_asked_for():
     assert bench.session.view().live.missing_topologies() == []
 
 
-def test_the_processes_are_stopped_also_when_nobody_reads_the_output_any_more():
+def test_the_processes_are_stopped_also_when_the_output_is_closed():
     bench = Bench(PlainDisplay(Gone(), io.StringIO()))
     with pytest.raises(BrokenPipeError):
         bench.session.run_until(lambda: False)

@@ -179,7 +179,7 @@ def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
     assert world.events == []
 
 
-def test_health_of_strangers_is_ignored(world):
+def test_health_of_unknown_components_is_ignored(world):
     supervisor = world.supervisor("capture")
     supervisor.heartbeat("track/elsewhere")
     assert list(supervisor.children) == ["capture"]
@@ -194,7 +194,7 @@ def test_the_recorder_is_stopped_last(world):
     assert world.now_ns == 0
 
 
-def test_whoever_does_not_end_in_time_is_killed_and_the_recorder_has_the_most_time(world):
+def test_processes_that_do_not_end_in_time_are_killed_and_the_recorder_has_the_most_time(world):
     supervisor = world.supervisor("capture", "track/a", "record", stop_ns=4 * S)
     world.stubborn = {"capture", "track/a", "record"}
     times = {}
@@ -208,7 +208,7 @@ def test_whoever_does_not_end_in_time_is_killed_and_the_recorder_has_the_most_ti
     assert supervisor.children["record"].reason == "did not end in time and was killed"
 
 
-def test_stopping_twice_or_with_nobody_left_is_harmless(world):
+def test_stopping_twice_or_without_children_is_harmless(world):
     supervisor = world.supervisor("capture")
     supervisor.stop(world.wait)
     supervisor.stop(world.wait)

@@ -14,10 +14,10 @@ from typing import Any
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
+from evaluation.service.live.listener import connect
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus.contract import Sample
-from evaluation.service.live.listener import connect
 
 #: The first start on a machine compiles the kernels.
 START_S = 150.0
@@ -75,7 +75,7 @@ class RigListener:
         return [FrameInfo.FromString(one.sample.attachment) for one in self._of(topic)]
 
     def health(self, component: str) -> list[Health]:
-        """All that a component said about itself."""
+        """All health messages of a component."""
         return [Health.FromString(one.sample.payload) for one in self._of(f"health/{component}")]
 
     def tracks_since(self, t_ns: int, count: int = 3) -> Callable[[], bool]:
@@ -92,7 +92,7 @@ class RigListener:
 
 
 def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any:
-    """What the condition returns as soon as it is true."""
+    """Value of the condition as soon as it is true."""
     deadline_s = time.monotonic() + timeout_s
     while not (result := condition()):
         assert time.monotonic() < deadline_s, f"{what} did not happen within {timeout_s:g} s"
@@ -101,7 +101,7 @@ def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any
 
 
 def is_running(pid: int) -> bool:
-    """Whether a process is there and no zombie."""
+    """True if a process exists and is no zombie."""
     try:
         return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):

@@ -1,4 +1,4 @@
-"""What `kill -9` does to a running rig: whoever is killed comes back, the others go on, and no recording is lost."""
+"""`kill -9` on a running rig: the process is restarted, the others go on, and no recording is lost."""
 
 import time
 from collections.abc import Sequence

@@ -34,7 +34,7 @@ def mean_error_mm(estimates):
 
 
 def payloads(path, topic):
-    """What a file holds of a topic but the time that the search took, which differs from run to run."""
+    """Messages of a topic in a file, without the computing times, which differ between runs."""
     with path.open("rb") as stream:
         return [(message.log_time, message.data) for _, _, message in make_reader(stream).iter_messages(topics=topic)]
 

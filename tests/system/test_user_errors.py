@@ -1,4 +1,4 @@
-"""What a user gets wrong is said in one message, with exit code 2 and without a traceback."""
+"""User errors are one message, with exit code 2 and without a traceback."""
 
 import socket
 

@@ -1,4 +1,4 @@
-"""What an estimate says on the wire."""
+"""Messages of an estimate."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
 
 
 @pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])
-def test_the_covariance_of_what_is_not_tracked_says_nothing(status):
+def test_the_covariance_is_invalid_while_not_tracking(status):
     lost = replace(ESTIMATE, status=status)
     assert not estimate_messages.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {})).covariance_valid
     assert estimate_messages.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
@@ -68,7 +68,7 @@ def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
     assert (state.samples, state.clock_sigma_ns, state.skipped) == (270, 25_000, 3)
 
 
-def test_what_the_search_took_and_was_allowed_is_told():
+def test_effort_and_budget_of_the_search_are_published():
     state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
     assert (state.searcher, state.stop) == ("cma_es", estimate_messages.State.STOP_TIME)
     assert (state.generations, state.evaluations) == (3, 45)

@@ -173,7 +173,7 @@ def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
     assert counters["skipped"] + dropped[0] == 9
 
 
-def test_without_frames_nothing_is_said(bench):
+def test_without_frames_nothing_is_published(bench):
     bench.live.process_next()
     assert bench.bus.sent == []
 
@@ -195,7 +195,7 @@ def test_a_set_that_waits_for_nothing_any_more_is_taken_at_its_deadline(bench):
     assert said.message == "DEGRADED: no frame from color"
 
 
-def test_until_there_is_an_object_it_says_so_and_sends_no_topology(bench):
+def test_without_an_object_it_reports_initializing_and_sends_no_topology(bench):
     bench.expose(0, lambda frame: dataclasses.replace(frame, data=np.zeros_like(frame.data)))
     bench.live.process_next()
     assert bench.states[0].status == DeformationState.STATUS_INITIALIZING
