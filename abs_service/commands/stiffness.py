@@ -17,7 +17,7 @@ from abs_service.commands import replay
 from abs_service.display.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.models import gravity
-from abs_service.tracking.hanging_strip import HangingStrip, follow
+from abs_service.tracking.hanging_strip import HangingStrip, track_strip
 from abs_service.tracking.stiffness import Stiffness, estimate_stiffness
 from drivers.replay import Recording
 
@@ -55,10 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = replay.configuration(recording, arguments.config)
     name = _tracker(settings, arguments.tracker, path)
-    strip = follow(recording, *replay.recorded_rig(settings, name, recording), wiring.plan(settings, name))
+    strip = track_strip(recording, *replay.recorded_rig(settings, name, recording), wiring.plan(settings, name))
     model = strip.model
     seen = model.strip
-    found = estimate_stiffness(strip.hangings, seen.length, seen.length_deviation, seen.load_deviation)
+    found = estimate_stiffness(strip.inclinations, seen.length, seen.length_deviation, seen.load_deviation)
     bending = found.bending(arguments.weight * FREE_FALL, seen.length)
     title = f"D = {bending * 1e3:.3g} mN·m ± {found.deviation:.0%}, {found.frames} frames"
     try:
@@ -88,7 +88,7 @@ def _text(found: Stiffness, bending: float, strip: HangingStrip, plot: Path) -> 
     return "\n".join(
         [
             f"strip {size.length * 1e3:.0f} × {size.width * 1e3:.0f} mm, {strip.model.segments} segments, "
-            f"{found.frames} frames tracked, {strip.passed_over} not",
+            f"{found.frames} frames tracked, {strip.untracked} not",
             f"bending stiffness per width  D = {bending * 1e3:.4g} mN·m ± {found.deviation:.1%} (one deviation)",
             f"  of the whole strip        EI = {bending * size.width:.4g} N·m²",
             f"  from the scatter {found.scatter:.1%}, from where the strip's ends are {found.from_length:.1%}, "
@@ -113,7 +113,7 @@ def _json(found: Stiffness, bending: float, strip: HangingStrip, plot: Path) -> 
             "load": found.load,
             "misfit": found.misfit,
             "frames": found.frames,
-            "frames_passed_over": strip.passed_over,
+            "frames_untracked": strip.untracked,
             "length_m": size.length,
             "width_m": size.width,
             "plot": str(plot),

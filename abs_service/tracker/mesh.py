@@ -31,7 +31,7 @@ class Mesh:
     appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(()))
 
-    def looks(self, sensor: str) -> NDArray[np.float32]:
+    def appearance_of(self, sensor: str) -> NDArray[np.float32]:
         """What a sensor sees on the points of its synthesis: the vertices' colours if nothing else is known."""
         return self.appearance.get(sensor, self.colors)
 

@@ -12,7 +12,13 @@ from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.session import Plan, Tracking
-from abs_service.tracking.stiffness import Hanging, Stiffness, StiffnessError, hanging, predicted_tip
+from abs_service.tracking.stiffness import (
+    InclinationProfile,
+    Stiffness,
+    StiffnessError,
+    inclination_profile,
+    predicted_tip,
+)
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.replay import Recording
@@ -47,22 +53,22 @@ class HangingStrip:
 
     Attributes:
         model: of the strip.
-        hangings: of all frames in which it was tracked.
-        passed_over: frame sets in which it was not, or not yet.
+        inclinations: of all frames in which it was tracked.
+        untracked: frame sets in which it was not, or not yet.
         shown: an estimate from the middle of the recording, to be drawn.
         pixels: of that moment, what the reference sensor saw of the strip (k, 3) [m].
     """
 
     model: Gravity
-    hangings: list[Hanging]
-    passed_over: int
+    inclinations: list[InclinationProfile]
+    untracked: int
     shown: Estimate
     pixels: NDArray[np.float64]
 
     def profiles(self, found: Stiffness) -> Profiles:
         """What there is to be drawn of the frame that is shown."""
         model, theta, length = self.model, self.shown.theta, self.model.strip.length
-        here = hanging(model, theta, self.shown.covariance)
+        here = inclination_profile(model, theta, self.shown.covariance)
         tip = predicted_tip(found.load, here)
         shape = heavy_elastica(tip, found.load)
         return Profiles(
@@ -77,7 +83,7 @@ class HangingStrip:
         )
 
 
-def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Plan) -> HangingStrip:
+def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Plan) -> HangingStrip:
     """Tracks a recording with a gravity model.
 
     Of a strip that was lost and found again, the mesh that was tracked longest counts.
@@ -98,5 +104,5 @@ def follow(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Pla
     longest = max(tracked.values(), key=len)
     model, shown, frames = longest[len(longest) // 2]
     seen = detect_object(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
-    hangings = [hanging(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
-    return HangingStrip(model, hangings, sets - len(longest), shown, seen.points)
+    inclinations = [inclination_profile(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
+    return HangingStrip(model, inclinations, sets - len(longest), shown, seen.points)

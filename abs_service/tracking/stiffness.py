@@ -18,7 +18,7 @@ from abs_service.tracker.models.gravity import Gravity
 
 Vector = NDArray[np.float64]
 
-#: Frames that follow each other share errors; so many stretches of them tell by how much the whole may be wrong.
+#: Successive frames have correlated errors; the scatter of the load is estimated from so many blocks of frames.
 STRETCHES = 8
 
 #: With fewer frames nothing can be said about how they scatter.
@@ -42,7 +42,7 @@ class StiffnessError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hanging:
+class InclinationProfile:
     """The strip in one frame.
 
     Attributes:
@@ -81,18 +81,18 @@ class Stiffness:
         return weight * length**3 / self.load
 
 
-def hanging(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> Hanging:
+def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> InclinationProfile:
     """The inclinations of tracked parameters (dim,) with their covariance (dim, dim)."""
     offsets = STEP * np.eye(len(theta))
     slopes = np.stack(
         [(model.inclination(theta + step) - model.inclination(theta - step)) / (2 * STEP) for step in offsets], axis=1
     )
     least = LEAST_DEVIATION**2 * np.eye(model.segments + 1)
-    return Hanging(model.inclination(theta), slopes @ covariance @ slopes.T + least)
+    return InclinationProfile(model.inclination(theta), slopes @ covariance @ slopes.T + least)
 
 
 def estimate_stiffness(
-    frames: Sequence[Hanging], length: float, length_deviation: float, first_deviation: float
+    frames: Sequence[InclinationProfile], length: float, length_deviation: float, first_deviation: float
 ) -> Stiffness:
     """Fits one load to all frames, each with an inclination of its own.
 
@@ -122,7 +122,7 @@ def estimate_stiffness(
     return Stiffness(load, deviation, scatter, from_length, first_deviation, fit.misfit, len(frames))
 
 
-def predicted_tip(load: float, frame: Hanging) -> float:
+def predicted_tip(load: float, frame: InclinationProfile) -> float:
     """Inclination at the free end [rad] that goes with a load and fits a frame best."""
     inclination, weights = frame.inclination, np.linalg.inv(frame.covariance)
     tip = inclination[-1:]
@@ -142,7 +142,7 @@ class _Fit:
     misfit: float
 
 
-def _fit(frames: Sequence[Hanging]) -> _Fit:
+def _fit(frames: Sequence[InclinationProfile]) -> _Fit:
     """Gauss and Newton's method for one load and an inclination of every frame, which is eliminated."""
     inclination = np.stack([frame.inclination for frame in frames])
     weights = np.linalg.inv(np.stack([frame.covariance for frame in frames])).astype(np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.report.plots import figure
 from abs_service.tracker.models import gravity
-from abs_service.tracking.stiffness import Stiffness, estimate_stiffness, hanging
+from abs_service.tracking.stiffness import Stiffness, estimate_stiffness, inclination_profile
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
 
@@ -28,7 +28,7 @@ class Settings:
 
     Attributes:
         stiffnesses: bending stiffness per width [N·m]: the strip sags by 80° to 5°.
-        sequences: of each stiffness, with seeds that follow each other.
+        sequences: of each stiffness, with consecutive seeds.
         frames: of each sequence.
     """
 
@@ -70,9 +70,9 @@ def trial(true: float, seed: int, frames: int) -> Trial:
     model = followed.model
     if not isinstance(model, gravity.Gravity):
         raise TypeError(f"a gravity model was asked for, not {model}")
-    hangings = [hanging(model, one.theta, one.covariance) for one in followed.estimates]
+    inclinations = [inclination_profile(model, one.theta, one.covariance) for one in followed.estimates]
     strip = model.strip
-    found = estimate_stiffness(hangings, strip.length, strip.length_deviation, strip.load_deviation)
+    found = estimate_stiffness(inclinations, strip.length, strip.length_deviation, strip.load_deviation)
     return Trial(true, found.bending(WEIGHT, strip.length), found, followed.surface_mm)
 
 

@@ -27,7 +27,7 @@ def test_the_stiffness_and_a_picture_come_out(recording, capsys):
     plot = recording.with_name("profile.png")
     assert cli.main(["stiffness", str(recording), "--weight", "0.3", "--plot", str(plot), "--json"]) == Exit.OK
     said = json.loads(capsys.readouterr().out)
-    assert said["frames"] + said["frames_passed_over"] == 60
+    assert said["frames"] + said["frames_untracked"] == 60
     error = np.log(said["bending_stiffness_per_width_nm"] / 0.02)
     assert abs(error) < 4 * said["relative_deviation"] < 0.6
     assert said["bending_stiffness_nm2"] == pytest.approx(said["bending_stiffness_per_width_nm"] * said["width_m"])

@@ -9,10 +9,10 @@ from abs_service.tracker.detection.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.stiffness import (
     LEAST_FRAMES,
-    Hanging,
+    InclinationProfile,
     StiffnessError,
     estimate_stiffness,
-    hanging,
+    inclination_profile,
     predicted_tip,
 )
 from drivers.simulated.shapes.elastica import solve_elastica
@@ -31,7 +31,9 @@ T_RG = np.array(
 STRIP = Strip(T_RG, 0.3, 0.05, np.linspace(0, 0.4, 65), 0.004)
 
 
-def frames(load: float, count: int = 80, segments: int = 4, sigma: float = SIGMA, seed: int = 0) -> list[Hanging]:
+def frames(
+    load: float, count: int = 80, segments: int = 4, sigma: float = SIGMA, seed: int = 0
+) -> list[InclinationProfile]:
     """Noisy inclinations of the simulator's strips of length 1, whose gripper tilts."""
     generator = np.random.default_rng(seed)
     found = []
@@ -39,7 +41,7 @@ def frames(load: float, count: int = 80, segments: int = 4, sigma: float = SIGMA
         profile = solve_elastica(1.0, load, float(clamp))
         true = np.interp(np.linspace(0, 1, segments + 1), profile.s, np.pi / 2 - profile.angle)
         noisy = true + generator.normal(0, sigma, segments + 1)
-        found.append(Hanging(noisy, sigma**2 * np.eye(segments + 1)))
+        found.append(InclinationProfile(noisy, sigma**2 * np.eye(segments + 1)))
     return found
 
 
@@ -68,7 +70,7 @@ def test_a_nearly_straight_strip_sags_as_the_small_deflection_formula_says():
     """Horizontally clamped, the free end of a cantilever under its own weight inclines by w L³ / (6 D)."""
     load = 0.05
     inclination = load / 6 * (1 - (1 - np.linspace(0, 1, 5)) ** 3)
-    found = estimate_stiffness([Hanging(inclination, 1e-8 * np.eye(5))] * LEAST_FRAMES, 1.0, 0.0, 0.0)
+    found = estimate_stiffness([InclinationProfile(inclination, 1e-8 * np.eye(5))] * LEAST_FRAMES, 1.0, 0.0, 0.0)
     assert found.load == pytest.approx(load, rel=0.01)
     assert found.bending(weight=2.0, length=1.0) == pytest.approx(2.0 / load, rel=0.01)
 
@@ -80,21 +82,23 @@ def test_an_unknown_length_and_the_first_frame_s_shape_are_parts_of_the_deviatio
 
 
 def test_a_strip_that_is_curved_by_itself_does_not_fit():
-    curled = [Hanging(frame.inclination + np.array([0, 0.3, 0, 0.3, 0]), frame.covariance) for frame in frames(4.0)]
+    curled = [
+        InclinationProfile(frame.inclination + np.array([0, 0.3, 0, 0.3, 0]), frame.covariance) for frame in frames(4.0)
+    ]
     assert estimate_stiffness(curled, 1.0, 0.0, 0.0).misfit > 9
 
 
 def test_what_cannot_be_told_is_refused():
     with pytest.raises(StiffnessError, match=f"{LEAST_FRAMES - 1} frames .* are too few, at least {LEAST_FRAMES}"):
         estimate_stiffness(frames(4.0, LEAST_FRAMES - 1), 1.0, 0.0, 0.0)
-    straight = [Hanging(np.full(5, 0.4), 1e-8 * np.eye(5))] * LEAST_FRAMES
+    straight = [InclinationProfile(np.full(5, 0.4), 1e-8 * np.eye(5))] * LEAST_FRAMES
     with pytest.raises(StiffnessError, match="the strip bends too little"):
         estimate_stiffness(straight, 1.0, 0.0, 0.0)
 
 
 def test_the_tip_that_goes_with_a_load_is_found():
     profile = solve_elastica(1.0, 4.0, 1.0)
-    frame = Hanging(np.interp(np.linspace(0, 1, 5), profile.s, np.pi / 2 - profile.angle), np.eye(5))
+    frame = InclinationProfile(np.interp(np.linspace(0, 1, 5), profile.s, np.pi / 2 - profile.angle), np.eye(5))
     assert predicted_tip(4.0, frame) == pytest.approx(np.pi / 2 - profile.angle[-1], abs=1e-3)
 
 
@@ -104,12 +108,12 @@ def test_the_covariance_of_inclinations_is_that_of_the_parameters():
     half = generator.normal(size=(10, 10)) * 0.01
     covariance = half @ half.T
     theta = np.concatenate([[0.1, 0.05, -0.02, 0.01], generator.uniform(-0.1, 0.1, 6)])
-    found = hanging(model, theta, covariance)
+    found = inclination_profile(model, theta, covariance)
     drawn = theta + generator.multivariate_normal(np.zeros(10), covariance, 4000)
     sampled = np.cov(np.array([model.inclination(one) for one in drawn]).T)
     np.testing.assert_allclose(found.covariance, sampled, atol=0.15 * np.abs(sampled).max())
     fixed = Gravity(STRIP, 4, False, 150, DOWN)
-    held = hanging(fixed, fixed.rest, 1e-4 * np.eye(4))
+    held = inclination_profile(fixed, fixed.rest, 1e-4 * np.eye(4))
     assert np.linalg.eigvalsh(held.covariance).min() > 0  # nobody knows a gripper better than a little
 
 

@@ -46,7 +46,7 @@ class Plane:
 
 
 @dataclass(frozen=True, eq=False)
-class Hang:
+class FittedElastica:
     """An elastica in the plane of bending.
 
     Attributes:
@@ -81,13 +81,13 @@ class Hang:
         along = nearest * (self.length / (len(nodes) - 1)) + np.sum(gap * tangent, axis=1)
         return along, np.sum(gap * normals_at(phi), axis=1), phi
 
-    def cut(self, low: float, high: float) -> "Hang":
+    def cut(self, low: float, high: float) -> "FittedElastica":
         """About the part from arc length `low` to `high`; beyond the ends it goes on straight."""
         shift = (low + high - self.length) / 2
         slope = self.inclination[len(self.inclination) // 2]
         middle = self.middle + shift * np.array([np.cos(slope), np.sin(slope)])
         length = high - low
-        return Hang(self.tip, float(np.clip(self.load * (length / self.length) ** 3, *LOADS)), middle, length)
+        return FittedElastica(self.tip, float(np.clip(self.load * (length / self.length) ** 3, *LOADS)), middle, length)
 
     @cached_property
     def _shape(self) -> Elastica:
@@ -150,7 +150,7 @@ def _curve(along: Vector, beside: Vector) -> tuple[np.polynomial.Polynomial, NDA
     return curve, near
 
 
-def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> Hang:
+def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> FittedElastica:
     """The best of some shapes of about the right length, place and direction."""
     along, beside, axes = _chord(flat)
     curve, near = _curve(along, beside)
@@ -161,38 +161,42 @@ def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> Hang:
     steps = np.diff(nodes, axis=0)
     length = float(np.linalg.norm(steps, axis=1).sum())
     end = float(np.arctan2(*steps[-1, ::-1]))
-    hangs = [
-        Hang(end + np.deg2rad(turn), load, nodes.mean(axis=0), length)
+    candidates = [
+        FittedElastica(end + np.deg2rad(turn), load, nodes.mean(axis=0), length)
         for turn in (-60, -40, -20, 0, 20, 40, 60)
         for load in (0.1, 1.0, 3.0, 10.0, 30.0, 100.0)
     ]
-    return min(hangs, key=lambda hang: float(np.mean(np.minimum(np.abs(hang.unroll(flat)[1]), 10 * NOISE_M))))
+    return min(
+        candidates, key=lambda candidate: float(np.mean(np.minimum(np.abs(candidate.unroll(flat)[1]), 10 * NOISE_M)))
+    )
 
 
-def fit(hang: Hang, flat: NDArray[np.float64]) -> Hang:
-    """The hang of the same length with the least distance to points (n, 2); it may not slide along itself."""
-    bounds = ([-np.inf, -np.inf, np.log(LOADS[0] / hang.load)], [np.inf, np.inf, np.log(LOADS[1] / hang.load)])
+def fit(elastica: FittedElastica, flat: NDArray[np.float64]) -> FittedElastica:
+    """The elastica of the same length with the least distance to points (n, 2); it may not slide along itself."""
+    bounds = ([-np.inf, -np.inf, np.log(LOADS[0] / elastica.load)], [np.inf, np.inf, np.log(LOADS[1] / elastica.load)])
     found = scipy.optimize.least_squares(
-        lambda p: _changed(hang, p).unroll(flat)[1] / NOISE_M,
+        lambda p: _changed(elastica, p).unroll(flat)[1] / NOISE_M,
         np.clip(np.zeros(3), *bounds),
         bounds=bounds,
         loss="soft_l1",
         x_scale=(0.01, 0.1, 1.0),
     )
-    return _changed(hang, found.x)
+    return _changed(elastica, found.x)
 
 
-def load_deviation(hang: Hang, flat: NDArray[np.float64]) -> float:
-    """Standard deviation of the logarithm of a fitted hang's load, from how its points (n, 2) scatter."""
+def load_deviation(elastica: FittedElastica, flat: NDArray[np.float64]) -> float:
+    """Standard deviation of the logarithm of a fitted elastica's load, from how its points (n, 2) scatter."""
     steps = STEP * np.eye(3)
-    ahead, back = ([_changed(hang, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
+    ahead, back = ([_changed(elastica, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
     slopes = (np.array(ahead) - np.array(back)) / (2 * STEP)
-    scatter = 1.4826 * np.median(np.abs(hang.unroll(flat)[1]))  # of a normal distribution, whatever a few points do
+    scatter = 1.4826 * np.median(np.abs(elastica.unroll(flat)[1]))  # of a normal distribution, whatever a few points do
     return float(scatter * np.sqrt(np.linalg.inv(slopes @ slopes.T)[2, 2]))
 
 
-def _changed(hang: Hang, by: NDArray[np.float64]) -> Hang:
+def _changed(elastica: FittedElastica, by: NDArray[np.float64]) -> FittedElastica:
     """Moved beside its chord [m], with another inclination at the free end [rad] and another logarithm of the load."""
-    chord = hang.nodes[-1] - hang.nodes[0]
+    chord = elastica.nodes[-1] - elastica.nodes[0]
     beside = np.array([-chord[1], chord[0]]) / np.linalg.norm(chord)
-    return Hang(hang.tip + by[1], hang.load * float(np.exp(by[2])), hang.middle + by[0] * beside, hang.length)
+    return FittedElastica(
+        elastica.tip + by[1], elastica.load * float(np.exp(by[2])), elastica.middle + by[0] * beside, elastica.length
+    )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.elastica_fit import (
     LARGEST_GAP,
     NOISE_M,
-    Hang,
+    FittedElastica,
     Plane,
     Vector,
     find_plane,
@@ -105,20 +105,20 @@ def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Ve
         raise DetectionError(f"the strip is too small in the depth image: {len(seen)} pixels, {LEAST_PIXELS} needed")
     seen = seen[:: -(-len(seen) // MOST_PIXELS)]
     plane = find_plane(seen, gravity)
-    hang = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
+    elastica = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
     points = np.concatenate([seen, detection.beside(RIM_PX)])
-    fitted = _Fitted(plane, hang, np.arange(len(points)) < len(seen), (0.0, 0.0), False, 0.0)
+    fitted = _Fitted(plane, elastica, np.arange(len(points)) < len(seen), (0.0, 0.0), False, 0.0)
     for _ in range(5):
         fitted = _refine(fitted, points, detection.camera)
     share = float(np.mean(fitted.belongs[: len(seen)]))
-    _check((fitted.hang.length, fitted.sides[1] - fitted.sides[0]), length, share)
-    hang = fitted.hang.cut(fitted.hang.length - (length or fitted.hang.length), fitted.hang.length)
+    _check((fitted.elastica.length, fitted.sides[1] - fitted.sides[0]), length, share)
+    elastica = fitted.elastica.cut(fitted.elastica.length - (length or fitted.elastica.length), fitted.elastica.length)
     flat = fitted.plane.coordinates(points)[1][fitted.belongs]
-    along = hang.unroll(flat)[0]
+    along = elastica.unroll(flat)[0]
     # Pixels on an end show what is behind it as well, and would bend the strip most of all.
-    inner = flat[np.minimum(along, hang.length - along) > fitted.pixel / 2]
-    hang = fit(hang, inner)
-    return _strip(fitted, hang, load_deviation(hang, inner))
+    inner = flat[np.minimum(along, elastica.length - along) > fitted.pixel / 2]
+    elastica = fit(elastica, inner)
+    return _strip(fitted, elastica, load_deviation(elastica, inner))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class _Fitted:
 
     Attributes:
         plane: of bending.
-        hang: shape, from end to end of what is seen.
+        elastica: shape, from end to end of what is seen.
         belongs: which points (n,) show the strip.
         sides: first and last place across [m].
         faces: whether the camera is on the side of the plane's normals.
@@ -135,7 +135,7 @@ class _Fitted:
     """
 
     plane: Plane
-    hang: Hang
+    elastica: FittedElastica
     belongs: NDArray[np.bool_]
     sides: tuple[float, float]
     faces: bool
@@ -146,10 +146,10 @@ def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fi
     """Fits shape, outline and plane to points (n, 3) once more, one after the other."""
     plane, sight = before.plane, points - camera.center
     across, flat = plane.coordinates(points)
-    hang = fit(before.hang, flat[before.belongs])
-    along, gap, phi = hang.unroll(flat)
-    beyond = np.abs(along - hang.length / 2) - hang.length / 2
-    belongs = (np.abs(gap) < LARGEST_GAP * NOISE_M) & (beyond < LARGEST_OVERHANG * hang.length)
+    elastica = fit(before.elastica, flat[before.belongs])
+    along, gap, phi = elastica.unroll(flat)
+    beyond = np.abs(along - elastica.length / 2) - elastica.length / 2
+    belongs = (np.abs(gap) < LARGEST_GAP * NOISE_M) & (beyond < LARGEST_OVERHANG * elastica.length)
     normals = plane.normals(phi)
     high, wide = (size[belongs] for size in _pixel_sizes(sight, normals, camera.fx))
     across, along, gap, phi = across[belongs], along[belongs], gap[belongs], phi[belongs]
@@ -158,7 +158,7 @@ def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fi
     tilt = _tilt(across - (left + right) / 2, along - (first + last) / 2, gap, phi)
     faces = bool(np.mean(np.sum(normals * sight, axis=1)[belongs] < 0) > 0.5)
     pixel = float(np.median(high))
-    return _Fitted(plane.tilted(tilt), hang.cut(first, last), belongs, (left, right), faces, pixel)
+    return _Fitted(plane.tilted(tilt), elastica.cut(first, last), belongs, (left, right), faces, pixel)
 
 
 def _check(size: tuple[float, float], length: float, share: float) -> None:
@@ -222,14 +222,16 @@ def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np
     return np.linalg.lstsq(rows, np.append(gap - gap.mean(), weight * turn), rcond=None)[0]
 
 
-def _strip(fitted: _Fitted, hang: Hang, deviation: float) -> Strip:
+def _strip(fitted: _Fitted, elastica: FittedElastica, deviation: float) -> Strip:
     """The strip in the rig, whose z axis is on the camera's side."""
     plane, sides = fitted.plane, fitted.sides
-    start = hang.inclination[:1]
+    start = elastica.inclination[:1]
     sign = 1.0 if fitted.faces else -1.0
     z = sign * plane.normals(start)[0]
     x = np.cos(start) * plane.ahead + np.sin(start) * plane.down
     T_rg = np.eye(4)
     T_rg[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    T_rg[:3, 3] = hang.nodes[0] @ np.array([plane.ahead, plane.down]) + np.mean(sides) * plane.across
-    return Strip(T_rg, hang.length, sides[1] - sides[0], sign * (hang.inclination - start), fitted.pixel, deviation)
+    T_rg[:3, 3] = elastica.nodes[0] @ np.array([plane.ahead, plane.down]) + np.mean(sides) * plane.across
+    return Strip(
+        T_rg, elastica.length, sides[1] - sides[0], sign * (elastica.inclination - start), fitted.pixel, deviation
+    )

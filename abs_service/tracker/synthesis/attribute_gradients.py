@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye, level, relief
+from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye, constant, first_order
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
@@ -48,7 +48,7 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
     return float(0.5 * min((size for size in sizes if size > 0), default=2e-3))
 
 
-class Slopes(Protocol):
+class AttributeGradients(Protocol):
     """How the appearance changes around the vertices in one camera's image."""
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -79,7 +79,7 @@ class Slopes(Protocol):
         ...
 
 
-class Level:
+class Constant:
     """Around a vertex everything is taken to look like the vertex, for want of anything better."""
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -97,13 +97,13 @@ class Level:
 
     def step(self, values: NDArray[np.float32]) -> Step:
         """The values themselves."""
-        return Step(level, (values[None],))
+        return Step(constant, (values[None],))
 
 
-LEVEL = Level()
+CONSTANT = Constant()
 
 
-class Relief:
+class FirstOrder:
     """The first order of what the surroundings of the vertices look like.
 
     A measurement belongs to the centre of a pixel, up to half a pixel away from the vertex (eq. 20). In a texture with
@@ -145,7 +145,7 @@ class Relief:
 
     def step(self, values: NDArray[np.float32]) -> Step:
         """The same for one candidate of a chain, from its vertices and pixels."""
-        return Step(relief, (self._is_fisheye, *self._optics, values, self._per_pixel))
+        return Step(first_order, (self._is_fisheye, *self._optics, values, self._per_pixel))
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:

@@ -9,13 +9,15 @@ from calib.jit import composed, kernel, prange
 
 
 @kernel
-def level(vertices: NDArray[np.float32], pixel: NDArray[np.int32], values: NDArray[np.float32]) -> NDArray[np.float32]:
+def constant(
+    vertices: NDArray[np.float32], pixel: NDArray[np.int32], values: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """The values (1, n, channels)."""
     return values
 
 
 @kernel
-def relief(
+def first_order(
     vertices: NDArray[np.float32],
     pixel: NDArray[np.int32],
     is_fisheye: bool,

@@ -9,7 +9,13 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.attribute_gradients import LEVEL, Relief, Slopes, half_pixel, surroundings
+from abs_service.tracker.synthesis.attribute_gradients import (
+    CONSTANT,
+    AttributeGradients,
+    FirstOrder,
+    half_pixel,
+    surroundings,
+)
 from abs_service.tracker.synthesis.base import Sight, Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -57,7 +63,7 @@ class Sparse:
         if len(attributes) != len(self.canvas.vertices):
             return SparseView(camera, self._mesh.faces, attributes)
         return SparseView(
-            camera, self._mesh.faces, attributes[:n], Relief(camera, self._mesh, attributes[n:], self._step_m)
+            camera, self._mesh.faces, attributes[:n], FirstOrder(camera, self._mesh, attributes[n:], self._step_m)
         )
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
@@ -85,12 +91,12 @@ class SparseView:
         camera: Camera,
         faces: NDArray[np.int32],
         attributes: NDArray[np.float32],
-        slopes: Slopes = LEVEL,
+        gradients: AttributeGradients = CONSTANT,
     ):
         self.camera = camera
         self._raster = Raster(camera, faces)
         self._attributes = np.ascontiguousarray(attributes, np.float32)
-        self._slopes = slopes
+        self._gradients = gradients
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
         self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
@@ -99,7 +105,7 @@ class SparseView:
     def look(self, predicted: Surface) -> None:
         """Hides the vertices that face away, or are behind the mesh's own surface, in the predicted mesh."""
         self._hidden = np.zeros(predicted.vertices.shape[2], np.bool_)
-        self._slopes.look(predicted)
+        self._gradients.look(predicted)
         seen = self.synthesize(predicted)
         stride = self.camera.width + 2
         row, column = np.divmod(seen.pixel[0], stride)
@@ -115,16 +121,16 @@ class SparseView:
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
-        return Synthesis(pixel, distance, self._slopes.at_centers(self._attributes, surface, pixel))
+        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, surface, pixel))
 
     def sight(self) -> Sight:
         """What one candidate of a chain shows."""
         seeing = Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
-        return Sight(seeing, self._slopes.step(self._attributes))
+        return Sight(seeing, self._gradients.step(self._attributes))
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """As where the surface was expected."""
-        return self._slopes.per_pixel(self._attributes)
+        return self._gradients.per_pixel(self._attributes)
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""

@@ -41,15 +41,15 @@ def make_term(
         case DepthNoise() as noise:
             return DepthTerm(name, synthesizer, len(mesh.vertices), noise, bounds, _outline(mesh, outline_px))
         case GaussianColor() as noise:
-            return ColorTerm(name, synthesizer, mesh.looks(name), noise, bounds, misplacement)
+            return ColorTerm(name, synthesizer, mesh.appearance_of(name), noise, bounds, misplacement)
         case GaussianGrey() | GaussianBayer() as noise:
-            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds, misplacement)
+            return ChannelTerm(name, synthesizer, mesh.appearance_of(name), noise, Passive(), bounds, misplacement)
         case GaussianIntensity(illumination="active") as noise:
             return ChannelTerm(
-                name, synthesizer, mesh.looks(name), noise, Active(sensor.camera.center), bounds, misplacement
+                name, synthesizer, mesh.appearance_of(name), noise, Active(sensor.camera.center), bounds, misplacement
             )
         case GaussianIntensity() as noise:
-            return ChannelTerm(name, synthesizer, mesh.looks(name), noise, Passive(), bounds, misplacement)
+            return ChannelTerm(name, synthesizer, mesh.appearance_of(name), noise, Passive(), bounds, misplacement)
         case LightBarrier() as noise:
             return BarrierTerm(name, sensor.camera, mesh.faces, noise, bounds)
 

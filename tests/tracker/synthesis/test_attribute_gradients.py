@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.attribute_gradients import Relief, half_pixel, surroundings
+from abs_service.tracker.synthesis.attribute_gradients import FirstOrder, half_pixel, surroundings
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera
@@ -33,7 +33,7 @@ def canvas_values(mesh: Mesh) -> np.ndarray:
 
 def view_of(mesh: Mesh, camera: Camera) -> SparseView:
     n, values = len(mesh.vertices), canvas_values(mesh)
-    return SparseView(camera, mesh.faces, values[:n], Relief(camera, mesh, values[n:], STEP_M))
+    return SparseView(camera, mesh.faces, values[:n], FirstOrder(camera, mesh, values[n:], STEP_M))
 
 
 def test_the_surroundings_lie_in_the_tangential_planes_and_have_the_vertices_normals():
@@ -85,14 +85,14 @@ def test_the_kernels_are_their_equation(seed, camera):
     vertices = mesh.vertices + generator.normal(0, 0.01, mesh.vertices.shape)
     surface = as_surface((vertices, mesh.normals), (vertices + 0.5, mesh.normals))
     seen = view.synthesize(surface)
-    assert isinstance(view._slopes, Relief)
+    assert isinstance(view._gradients, FirstOrder)
     for k, attributes in enumerate(seen.attributes):
         for v, found in enumerate(attributes):
             expected = view._attributes[v].astype(float)
             if seen.pixel[k, v] > 0:
                 row, column = divmod(int(seen.pixel[k, v]), camera.width + 2)
                 place = reference.project(camera, surface.vertices[k, :, v].astype(float))
-                expected = expected + view._slopes._per_pixel[v] @ (np.array([column - 1, row - 1]) - place)
+                expected = expected + view._gradients._per_pixel[v] @ (np.array([column - 1, row - 1]) - place)
             np.testing.assert_allclose(found, expected, rtol=1e-4, atol=2e-3)
 
 
@@ -100,12 +100,12 @@ def test_what_is_unknown_beside_a_vertex_leaves_it_level_and_an_edge_on_view_doe
     mesh = sheet(height=flat)
     n, values = len(mesh.vertices), canvas_values(mesh)
     values[n : 2 * n] = np.nan
-    relief = Relief(CAMERA, mesh, values[n:], STEP_M)
+    gradients = FirstOrder(CAMERA, mesh, values[n:], STEP_M)
     half_turn = pose.from_rotation_vector([0, np.pi / 2 - 0.01, 0], [0.0, 0, 0])
     around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
-    relief.look(moved(mesh, around @ half_turn @ np.linalg.inv(around)))
-    assert np.isfinite(relief._per_pixel).all()
-    assert np.abs(relief._per_pixel).max() < 20 * np.abs(LINEAR).max() / CAMERA.fx
+    gradients.look(moved(mesh, around @ half_turn @ np.linalg.inv(around)))
+    assert np.isfinite(gradients._per_pixel).all()
+    assert np.abs(gradients._per_pixel).max() < 20 * np.abs(LINEAR).max() / CAMERA.fx
 
 
 def test_the_step_is_half_a_pixel_of_the_finest_picture():

@@ -32,7 +32,7 @@ def judging(sight: Sight, cost: Callable[..., None], measured: tuple[Any, ...], 
 
 #: What `judging` puts others in the place of.
 see: Callable[..., Any] = sampling.see
-look: Callable[..., Any] = centers.level
+look: Callable[..., Any] = centers.constant
 shine: Callable[..., Any] = as_it_is
 
 #: Where the arguments of `see`, `look` and `shine` end.
