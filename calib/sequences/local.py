@@ -11,7 +11,7 @@ _RIM = 0.03
 
 
 def normalized(
-    distance: NDArray[np.floating], claimed: NDArray[np.floating], rays: NDArray[np.floating]
+    distance: NDArray[np.floating], reported_sigma: NDArray[np.floating], rays: NDArray[np.floating]
 ) -> NDArray[np.float64]:
     """Residuals of one image from local planes over reported deviations (height, width); NaN without a plane.
 
@@ -20,7 +20,7 @@ def normalized(
 
     Args:
         distance: radial (height, width) [m]; NaN without return.
-        claimed: reported deviation (height, width) [m].
+        reported_sigma: reported deviation (height, width) [m].
         rays: unit directions (height, width, 3).
     """
     side = 2 * _REACH + 1
@@ -41,7 +41,7 @@ def normalized(
     residual = middle[flat] - 1 / np.einsum("ni,ni->n", own, q)
     z = np.full(distance.shape, np.nan)
     inner = z[_REACH:-_REACH, _REACH:-_REACH]
-    sigma = claimed[_REACH:-_REACH, _REACH:-_REACH][flat] * np.sqrt(np.clip(1 - leverage, 1e-3, 1))
+    sigma = reported_sigma[_REACH:-_REACH, _REACH:-_REACH][flat] * np.sqrt(np.clip(1 - leverage, 1e-3, 1))
     with np.errstate(divide="ignore", invalid="ignore"):
         inner[flat] = np.where(sigma > 0, residual / sigma, np.nan)
     return z

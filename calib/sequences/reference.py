@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from calib.noise.base import DepthNoise, NoiseError, pixels_where
 from calib.sequences import plane
-from calib.sequences.placed import Placed
 from calib.sequences.static import Static
+from calib.sequences.static_board import StaticBoard
 
 #: Tolerance of a pixel's mean about its plane: in its own deviations, and relative to its distance.
 _DEVIATIONS, _SHARE = 3.0, 0.008
@@ -72,7 +72,7 @@ def subtract_mean_offset(reference: Reference, static: Static, model: DepthNoise
     return _of(Kind.KNOWN, q, static, pixels)
 
 
-def on_board(static: Static, board: Placed, region: NDArray[np.bool_]) -> Reference:
+def on_board(static: Static, board: StaticBoard, region: NDArray[np.bool_]) -> Reference:
     """Board with a pose from its corners.
 
     Args:

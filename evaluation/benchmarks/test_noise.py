@@ -15,9 +15,9 @@ from calib.noise.region_polynomial import RegionPolynomial, blocks
 from calib.noise.structured_light import StructuredLight
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
-from tests.calib import laws
-from tests.calib.test_noise_shrinkage import DEGREES, HEIGHT, LABELS, WIDTH, Head
-from tests.calib.texels import render_texture
+from tests.calib.noise import laws
+from tests.calib.noise.test_shrinkage import DEGREES, HEIGHT, LABELS, WIDTH, Head
+from tests.calib.noise.texels import render_texture
 
 SIZES = {"176x144": (144, 176), "640x480": (480, 640)}
 SIGMA, MU = np.array(SIGMA_POLYNOMIAL), np.array([[0.01, -1e-6], [-2e-3, 0.0]])

@@ -15,7 +15,7 @@ from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.session import Tracking
-from tests.calib.texels import render_texture
+from tests.calib.noise.texels import render_texture
 from tests.tracker.differences import central_differences
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 from tests.tracker.scenes import sheet

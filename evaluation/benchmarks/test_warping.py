@@ -6,7 +6,7 @@ import pytest
 
 from calib.warp.mesh import MeshWarp
 from evaluation.inputs.warping.comparison import SCENES, SOURCE, TARGET, fastest_ms, opencv_alone_ms
-from tests.calib.warp_scenes import image
+from tests.calib.warp.scenes import image
 
 
 @pytest.mark.parametrize("threads", [1, 2])

@@ -13,7 +13,7 @@ from abs_service.calibration.noise import board_poses, measurement
 from abs_service.calibration.shots import sequences
 from abs_service.report.content import Cell, Column, Section, Table
 from calib.noise.base import pixels_where
-from calib.sequences.placed import Placed
+from calib.sequences.static_board import StaticBoard
 from drivers.simulated.sensors.time_of_flight import TimeOfFlight
 from drivers.simulated.simulation import Simulation
 from evaluation.experiment import Context, Findings, at_most
@@ -50,10 +50,10 @@ def true_distances(
 
 def calibrate(
     one: Scene, simulation: Simulation, poses: int, n: int
-) -> tuple[measurement.Found, list[NDArray[np.float64]], list[NDArray[np.float64]]]:
+) -> tuple[measurement.NoiseCalibration, list[NDArray[np.float64]], list[NDArray[np.float64]]]:
     """Calibrates a time-of-flight head; by pose, errors of μ [m] and relative errors of σ of the board's pixels."""
     found = [static_sequence(simulation, number, n) for number in range(poses)]
-    boards: list[float | Placed] = [board_poses.placed(one.target, sequence) for sequence in found]
+    boards: list[float | StaticBoard] = [board_poses.static_board(one.target, sequence) for sequence in found]
     everywhere = np.ones(found[0].lengths.shape[1:], bool)
     result = measurement.calibrate(found, boards, everywhere, np.random.default_rng(0), lambda text: None)
     head = simulation.heads["tof"]

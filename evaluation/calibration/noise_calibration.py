@@ -45,7 +45,7 @@ WITH_MOTION = (0.41, 0.50, 0.85, 3.68, 2.00, 2.33, 8.70, 12.27)
 PETIT = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
 
 
-def walls(query: str, count: int) -> tuple[measurement.Found, Any]:
+def walls(query: str, count: int) -> tuple[measurement.NoiseCalibration, Any]:
     """Calibrates on walls at known distances, turned by 4°, with `count` frames of each; returns the true head too."""
     found, depths, head = [], [], None
     for depth in DISTANCES:
@@ -62,7 +62,7 @@ def walls(query: str, count: int) -> tuple[measurement.Found, Any]:
     return measurement.calibrate(found, depths, region, np.random.default_rng(0), lambda text: None), head
 
 
-def errors(found: measurement.Found, head: Any) -> tuple[float, float, float, float]:
+def errors(found: measurement.NoiseCalibration, head: Any) -> tuple[float, float, float, float]:
     """Error of σ [%] and of μ [mm] over all pixels of all sequences: 99th percentiles, and root mean squares."""
     sigma, mu = [], []
     for static, reference in zip(found.statics, found.references):
@@ -112,12 +112,12 @@ def by_distance(static: Static, one: sequences.Sequence) -> list[tuple[float, fl
     return found
 
 
-def o3r(data: Path) -> list[sigma_consistency.Claim]:
+def o3r(data: Path) -> list[sigma_consistency.SigmaConsistency]:
     """Consistency of the O3R's own σ with residuals from local planes, by distance."""
     buffers = O3rBuffers(data / "tof_ifm_o3r" / "O3RBuffer.data")
     frames = {frame.kind: frame for frame in buffers.frames() if isinstance(frame, Frame)}
-    distance, claimed = (frames[kind].si().astype(np.float64) for kind in (Kind.DEPTH, Kind.DEVIATION))
-    z = local.normalized(distance, claimed, buffers.cameras["depth"].rays())
+    distance, reported_sigma = (frames[kind].si().astype(np.float64) for kind in (Kind.DEPTH, Kind.DEVIATION))
+    z = local.normalized(distance, reported_sigma, buffers.cameras["depth"].rays())
     found = [sigma_consistency.of_values("all", z)]
     for near, far in ((0.2, 0.5), (0.5, 1.0), (1.0, 1.5), (1.5, 2.0)):
         found.append(sigma_consistency.of_values(f"{near} to {far} m", z[(distance >= near) & (distance < far)]))

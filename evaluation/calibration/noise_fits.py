@@ -1,6 +1,6 @@
 """Accuracy of fitted noise models: the table of docs/noise.md.
 
-Samples are those of `tests/calib/laws.py`: 20 000 from the simulator's laws, 5 % of them uniform outliers, and as many
+Samples are those of `tests/calib/noise/laws.py`: 20 000 from the simulator, 5 % of them uniform outliers, and as many
 held out. Errors are the largest over the domain, in the worst of the seeds; all other statistics are means.
 """
 
@@ -15,7 +15,7 @@ from calib.noise.base import DepthNoise
 from calib.noise.fit.quality import Quality, goodness_of_fit
 from calib.noise.fit.samples import Samples
 from evaluation.experiment import Context, Findings, at_most
-from tests.calib import laws
+from tests.calib.noise import laws
 
 TITLE = "Accuracy of fitted noise models"
 

@@ -12,14 +12,14 @@ from rich.console import Console
 from abs_service import cli
 from abs_service.calibration.files import target_file
 from abs_service.calibration.shots.collection import Collector
-from abs_service.calibration.shots.corner_extraction import Seen, see_all
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see_all
 from abs_service.calibration.shots.guide import LineGuide, coverage_map, draw
 from abs_service.calibration.shots.shot_sources import RecordingShots
 from abs_service.supervision.exit_codes import Exit
 from calib.board.corners.errors import BlurredError, MovedError
 from drivers.replay.recording import Recording
 from drivers.simulated.shapes.printed import TARGETS
-from tests.calib.test_board_coverage import SIZES, many, view
+from tests.calib.board.test_coverage import SIZES, many, view
 
 RIG = """
 version = 1
@@ -69,7 +69,7 @@ def test_a_recording_that_exists_is_not_overwritten(files: list[str], tmp_path: 
 
 
 def test_controls_of_the_rig_file_are_set_as_for_tracking(files: list[str], tmp_path: Path, capsys) -> None:
-    """The simulated device has none, so the first is refused, by the name of its table."""
+    """The simulated device has none, so the first is rejected, by the name of its table."""
     with (tmp_path / "rig.toml").open("a", encoding="utf-8") as file:
         file.write("[devices.sim.controls]\nexposure_s = 0.01\n")
     assert cli.main(["calibrate", "capture", *files]) == Exit.USER
@@ -80,7 +80,7 @@ def test_controls_of_the_rig_file_are_set_as_for_tracking(files: list[str], tmp_
 def collected() -> Collector:
     collector = Collector(SIZES)
     for one in many():
-        collector.take(Seen(corners=(one,), sizes=SIZES))
+        collector.take(BoardObservations(corners=(one,), sizes=SIZES))
     return collector
 
 
@@ -91,19 +91,19 @@ def test_a_collection_ends_when_nothing_is_missing() -> None:
 
 def test_what_adds_nothing_and_what_moves_is_not_kept() -> None:
     collector = Collector({**SIZES, "tof": (176, 144)})
-    assert collector.take(Seen(corners=(view(),)))
-    assert not collector.take(Seen(corners=(view((0.01, 0.0, 0.0)),)))
+    assert collector.take(BoardObservations(corners=(view(),)))
+    assert not collector.take(BoardObservations(corners=(view((0.01, 0.0, 0.0)),)))
     assert collector.latest == {"color": "nothing new: change the pose"}
     moved = {(2, "tof"): MovedError("the board moved")}
-    assert not collector.take(Seen(corners=(view((0.5, 0, 0)),), refused=moved))
+    assert not collector.take(BoardObservations(corners=(view((0.5, 0, 0)),), rejected=moved))
     assert collector.latest["tof"] == "the board moved"
     assert collector.problem().startswith("color: 1 view of the board")
 
 
 def test_people_see_maps_wishes_and_reasons() -> None:
     collector = Collector(SIZES)
-    collector.take(Seen(corners=(view(),)))
-    collector.take(Seen(refused={(1, "color"): BlurredError("the image is blurred")}))
+    collector.take(BoardObservations(corners=(view(),)))
+    collector.take(BoardObservations(rejected={(1, "color"): BlurredError("the image is blurred")}))
     console = Console(width=90, record=True, file=io.StringIO())
     console.print(draw(collector))
     text = console.export_text()
@@ -116,8 +116,8 @@ def test_people_see_maps_wishes_and_reasons() -> None:
 def test_lines_are_said_once(capsys: pytest.CaptureFixture[str]) -> None:
     collector = Collector(SIZES)
     guide = LineGuide(Console())
-    blurred = Seen(refused={(1, "color"): BlurredError("the image is blurred")})
-    for seen in (blurred, blurred, Seen(corners=(view(),))):
+    blurred = BoardObservations(rejected={(1, "color"): BlurredError("the image is blurred")})
+    for seen in (blurred, blurred, BoardObservations(corners=(view(),))):
         guide.update(collector, collector.take(seen))
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "color: the image is blurred"

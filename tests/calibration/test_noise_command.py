@@ -20,7 +20,7 @@ from calib.noise.base import NoiseError
 from calib.noise.per_pixel import PerPixel
 from calib.noise.tof_amplitude import TofAmplitude
 from calib.sequences.reference import Kind
-from tests.calib.walls import frames
+from tests.calib.sequences.walls import frames
 
 DISTANCES, MATERIALS = (0.7, 1.0, 1.3, 1.6, 1.9), (0.9, 0.5, 0.3)
 
@@ -40,7 +40,7 @@ def walls(query: str, n: int = 30) -> tuple[list[sequences.Sequence], list[float
 
 def learnt(
     found: list[sequences.Sequence], depths: list[float], box: tuple[slice, slice] = (slice(None), slice(None))
-) -> measurement.Found:
+) -> measurement.NoiseCalibration:
     region = np.zeros(found[0].lengths.shape[1:], bool)
     region[box] = True
     return measurement.calibrate(found, depths, region, np.random.default_rng(0), lambda text: None)

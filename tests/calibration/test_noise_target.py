@@ -16,7 +16,7 @@ from calib.board.target import Chessboard
 from calib.sequences import reference
 from calib.sequences.reference import Kind
 from calib.sequences.static import reduce
-from evaluation.calibration.noise_board import ERRORS, at_rest, filmed, learnt, true_distances
+from evaluation.calibration.noise_board import ERRORS, calibrate, scene_of, static_sequence, true_distances
 from tests.calibration.simulated import Filmed, record, scene
 
 
@@ -24,9 +24,9 @@ from tests.calibration.simulated import Filmed, record, scene
     ("sensors", "seer"), [("tof", "tof"), ("structured_light,color", "color")], ids=["amplitudes", "another sensor"]
 )
 def test_the_board_tells_real_distances_that_a_fitted_plane_cannot(sensors: str, seer: str) -> None:
-    one, simulation = filmed(sensors, "seed=3", "color=640x480", *(ERRORS if sensors == "tof" else ()))
-    sequence = at_rest(simulation, 0, 8)
-    board = board_poses.placed(one.target, sequence)
+    one, simulation = scene_of(sensors, "seed=3", "color=640x480", *(ERRORS if sensors == "tof" else ()))
+    sequence = static_sequence(simulation, 0, 8)
+    board = board_poses.static_board(one.target, sequence)
     truth = true_distances(one, simulation, 0, sequence)
     assert board.seen_by == seer
     assert board.uncertainty < 5e-4
@@ -47,7 +47,7 @@ def test_the_board_tells_real_distances_that_a_fitted_plane_cannot(sensors: str,
 
 @pytest.mark.slow
 def test_five_poses_of_a_board_give_the_mean_offset() -> None:
-    result, mu, sigma = learnt(*filmed("tof", "seed=3", *ERRORS), poses=5, n=10)
+    result, mu, sigma = calibrate(*scene_of("tof", "seed=3", *ERRORS), poses=5, n=10)
     assert result.kind is Kind.BOARD
     assert max(abs(np.median(each)) for each in mu) < 1e-3
     assert np.quantile(np.abs(np.concatenate(mu)), 0.99) < 2e-3
@@ -62,7 +62,7 @@ def board(tmp_path: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_the_report_says_how_well_the_reference_is_known(tmp_path: Path, board: list[str], capsys) -> None:
-    _, simulation = filmed("structured_light,color", "seed=3", "color=640x480", "structured_light=160x120")
+    _, simulation = scene_of("structured_light,color", "seed=3", "color=640x480", "structured_light=160x120")
     recording = record(Filmed(simulation, 12), tmp_path / "board.mcap")
     code = main(["calibrate", "noise", str(recording), *board, "--json"])
     said = json.loads(capsys.readouterr().out)
@@ -89,21 +89,21 @@ def test_what_shows_no_board_is_said(tmp_path: Path, board: list[str], capsys) -
 
 
 def test_cameras_of_a_calibration_take_the_place_of_the_source_s_own() -> None:
-    one, simulation = filmed("tof", "seed=3")
-    sequence = at_rest(simulation, 0, 6)
+    one, simulation = scene_of("tof", "seed=3")
+    sequence = static_sequence(simulation, 0, 6)
     longer = replace(sequence.camera, fx=1.01 * sequence.camera.fx, fy=1.01 * sequence.camera.fy)
     calibrated = sequences.with_cameras(sequence, {"tof": longer, "color": longer})
     assert set(calibrated.cameras) == {"tof"}
-    near, far = (board_poses.placed(one.target, taken) for taken in (sequence, calibrated))
+    near, far = (board_poses.static_board(one.target, taken) for taken in (sequence, calibrated))
     assert np.linalg.norm(near.plane) / np.linalg.norm(far.plane) == pytest.approx(1.01, abs=1e-3)
     with pytest.raises(sequences.SequenceError, match="176 × 144 pixels, but was calibrated with 100 × 144"):
         sequences.with_cameras(sequence, {"tof": replace(longer, width=100)})
 
 
 def test_a_board_that_moves_during_the_sequence_is_refused() -> None:
-    simulation = filmed("tof", "seed=3")[1]
+    simulation = scene_of("tof", "seed=3")[1]
     taken = [frame for k in (*range(8), *range(30, 38)) for frame in simulation.frames(k)]
     cameras = {"tof": simulation.heads["tof"].camera}
     (sequence,) = sequences.of_frames("x", taken, cameras, "", 16)
     with pytest.raises(sequences.SequenceError):
-        board_poses.placed(Chessboard(8, 5, 0.04), sequence)
+        board_poses.static_board(Chessboard(8, 5, 0.04), sequence)

@@ -11,7 +11,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import rig_file, target_file
-from abs_service.calibration.shots.corner_extraction import Seen, see
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.commands.calibrate import verify as command
 from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
@@ -136,9 +136,9 @@ def test_running_devices_are_verified_by_views_that_differ(live: list[str], tmp_
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_looking_and_what_was_seen_counts(live: list[str], capsys, monkeypatch) -> None:
-    seen = Seen()
+    seen = BoardObservations()
 
-    def see_and_stop(*arguments) -> Seen:
+    def see_and_stop(*arguments) -> BoardObservations:
         nonlocal seen
         seen += (new := see(*arguments))
         if len({view.shot for view in seen.corners}) == 3:

@@ -102,7 +102,7 @@ def _cross_validation(found: Assessment) -> Section:
             text,
             Table("Halves of the shots", columns, rows),
             Table(
-                "How well projections are known by all shots",
+                "Uncertainty of projections from all shots",
                 (Column("projection"), Column("deviation", "px"), Column("95 %", "px")),
                 known,
             ),
@@ -123,7 +123,7 @@ def _sensor(name: str, solution: Solution, found: Assessment) -> Section:
     columns = (Column("parameter"), Column("value", "px, rad, m, s", ".7g"), Column("deviation", "", ".2g"))
     share = coverage(solution, name)
     text = f"Boards were seen in {share:.0%} of the image. The file keeps what was not free as it was."
-    blocks: list[str | Table | Picture] = [text, Table(f"What was determined of {name}", columns, rows)]
+    blocks: list[str | Table | Picture] = [text, Table(f"Estimated parameters of {name}", columns, rows)]
     return Section(name, (*blocks, *_pictures(name, solution, found)))
 
 
@@ -134,7 +134,7 @@ def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Pict
     if corners:
         pixels = [view.pixels for view in corners]
         drawn = figures.coverage_map(pixels, camera.width, camera.height)
-        yield drawing(drawn, "Where corners were seen", f"Coverage of the image of {name}")
+        yield drawing(drawn, "Detected corners", f"Coverage of the image of {name}")
         # Residuals in reports are measured minus predicted.
         residuals = -np.concatenate([view.residuals for view in corners])
         drawn = figures.residual_field(np.concatenate(pixels), residuals, camera.width, camera.height)
@@ -145,7 +145,7 @@ def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Pict
         fields = {name: found.images[name], **fields}
     for of, field in fields.items():
         label = f"deviation of a projection at {found.distance:g} m [px]"
-        caption = f"How well projections are known: {of} (hatched: no boards seen)"
+        caption = f"Uncertainty of projections: {of} (hatched: no boards seen)"
         yield drawing(solve_figures.uncertainty_map(field, label), caption, f"Projection uncertainty of {of}")
     if planes:
         distances = {

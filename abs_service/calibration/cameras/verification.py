@@ -7,7 +7,7 @@ import numpy as np
 
 from abs_service.calibration.cameras import verification_tables as tables
 from abs_service.calibration.files.rig_file import RigCalibration
-from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.calibration_check.changes import PairChange, pair_changes
@@ -47,12 +47,12 @@ UNNOTICED_M, WRONG_M = 0.002, 0.01
 
 
 @dataclass(frozen=True)
-class Found:
+class Verification:
     """Results of a verification.
 
     Attributes:
         fits: residuals of sensors with corners, by sensor.
-        usual_px: their reprojection errors at calibration.
+        expected_px: their reprojection errors at calibration.
         biases: distance bias of sensors with corners and distances.
         changes: relative motion of all pairs.
         explanations: hypotheses about a moved sensor; empty if nothing moved.
@@ -60,14 +60,14 @@ class Found:
     """
 
     fits: Mapping[str, CornerFit]
-    usual_px: Mapping[str, float]
+    expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
     changes: tuple[PairChange, ...]
     explanations: Mapping[str, MotionHypothesis]
     unseen: tuple[str, ...]
 
 
-def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
+def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenance) -> Report:
     """Report on a calibration.
 
     Args:
@@ -81,7 +81,7 @@ def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
     """
     found = _found(known, seen)
     sections = [
-        tables.sensors(found.fits, found.usual_px, found.biases),
+        tables.sensors(found.fits, found.expected_px, found.biases),
         *tables.pairs(found.changes, found.explanations),
     ]
     sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
@@ -89,10 +89,10 @@ def verify(known: RigCalibration, seen: Seen, provenance: Provenance) -> Report:
     return Report(f"Verification of {known.name}", provenance, tuple(verdicts(found)), tuple(sections), values)
 
 
-def verdicts(found: Found) -> list[Verdict]:
+def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
     said = [_moved(found)] if found.explanations else []
-    said += [_of_fit(name, fit, found.usual_px[name]) for name, fit in found.fits.items()]
+    said += [_of_fit(name, fit, found.expected_px[name]) for name, fit in found.fits.items()]
     said += [_of_bias(name, bias) for name, bias in found.biases.items()]
     said += [_of_pair(change) for change in found.changes]
     said += [
@@ -105,7 +105,7 @@ def verdicts(found: Found) -> list[Verdict]:
     return sorted(said, key=lambda verdict: -verdict.level)
 
 
-def _found(known: RigCalibration, seen: Seen) -> Found:
+def _found(known: RigCalibration, seen: BoardObservations) -> Verification:
     sensors = {
         name: SensorState(one.camera, one.depth_offset, one.depth_scale, one.time_offset)
         for name, one in known.sensors.items()
@@ -118,7 +118,7 @@ def _found(known: RigCalibration, seen: Seen) -> Found:
     changes = tuple(pair_changes(stored, views))
     is_alarming = any(_level(change) > Level.GOOD and change.is_significant for change in changes)
     usual = {name: known.sensors[name].residuals.corners_px for name in seeing}
-    return Found(
+    return Verification(
         {name: corner_fit(stored, views, name) for name in seeing},
         {name: USUAL_PX if px is None else px for name, px in usual.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
@@ -128,7 +128,7 @@ def _found(known: RigCalibration, seen: Seen) -> Found:
     )
 
 
-def _ours(seen: Seen, sensors: Mapping[str, SensorState]) -> Views:
+def _ours(seen: BoardObservations, sensors: Mapping[str, SensorState]) -> Views:
     return Views(
         [view for view in seen.corners if view.sensor in sensors],
         [view for view in seen.planes if view.sensor in sensors],
@@ -192,7 +192,7 @@ def _how_far(change: PairChange) -> str:
     return f"{np.linalg.norm(change.move) * 1e3:.1f} mm and {np.rad2deg(np.linalg.norm(change.turn)):.2f}°"
 
 
-def _moved(found: Found) -> Verdict:
+def _moved(found: Verification) -> Verdict:
     """Verdict on the sensor that moved."""
     worst = max(found.changes, key=lambda change: _level(change) * change.is_significant)
     level = _level(worst)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from abs_service.calibration.files.rig_file import RigCalibration
-from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report import figures
 from abs_service.report.content import Column, Section, Table, drawing
 from calib.calibration_check.changes import PairChange
@@ -15,16 +15,18 @@ from calib.calibration_check.hypotheses import CornerFit, DistanceBias, MotionHy
 
 
 def sensors(
-    fits: Mapping[str, CornerFit], usual_px: Mapping[str, float], biases: Mapping[str, DistanceBias]
+    fits: Mapping[str, CornerFit], expected_px: Mapping[str, float], biases: Mapping[str, DistanceBias]
 ) -> Section:
     """Table of each sensor alone."""
     columns = (
         Column("sensor"), Column("views"), Column("corners miss by", "px", ".3f"), Column("usual", "px", ".3f"),
         Column("distances exceed by", "mm", ".2f"), Column("±", "mm", ".2f"),
     )  # fmt: skip
-    rows = tuple((name, fit.views, fit.rms, usual_px[name], *_bias_mm(biases.get(name))) for name, fit in fits.items())
-    text = "The board is placed anew in every image, with the camera as it was stored."
-    return Section("Each sensor for itself", (text, Table("What cameras make of their own corners", columns, rows)))
+    rows = tuple(
+        (name, fit.views, fit.rms, expected_px[name], *_bias_mm(biases.get(name))) for name, fit in fits.items()
+    )
+    text = "The pose of the board is estimated in every image, with the stored camera."
+    return Section("Each sensor alone", (text, Table("Reprojection errors of the stored cameras", columns, rows)))
 
 
 def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypothesis]) -> list[Section]:
@@ -42,9 +44,7 @@ def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypoth
         )
         for one in changes
     )  # fmt: skip
-    text = (
-        "How the second sensor of a pair moved relative to the first, against what both calibrations leave to chance."
-    )
+    text = "Motion of the second sensor of a pair relative to the first, and the uncertainty of both calibrations."
     found = [Section("Pairs of sensors", (text, Table("Changes since the calibration", columns, rows)))]
     if explanations:
         freed = Table(
@@ -52,7 +52,7 @@ def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypoth
             (Column("sensor set free"), Column("explains", "%", ".1f"), Column("left", "σ²", ".4g")),
             tuple((name, 100 * one.share, one.left) for name, one in explanations.items()),
         )
-        found.append(Section("Which one moved", ("One sensor at a time may move, all others stay as stored.", freed)))
+        found.append(Section("Sensor that moved", ("One sensor at a time may move, all others stay as stored.", freed)))
     return found
 
 
@@ -68,11 +68,11 @@ def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
     return Section("Residuals", tuple(pictures))
 
 
-def refusals(seen: Seen) -> list[Section]:
+def refusals(seen: BoardObservations) -> list[Section]:
     """Reasons for rejected images; empty without any."""
-    if not seen.refused:
+    if not seen.rejected:
         return []
-    counts = Counter((sensor, str(error)) for (_, sensor), error in seen.refused.items())
+    counts = Counter((sensor, str(error)) for (_, sensor), error in seen.rejected.items())
     rows = tuple((sensor, count, why) for (sensor, why), count in counts.most_common(20))
     table = Table("The most frequent reasons", (Column("sensor"), Column("images"), Column("why")), rows)
     return [Section("Images that were not used", (table,))]

@@ -16,10 +16,10 @@ from calib.sequences import parts, reference
 from calib.sequences.candidates import Candidate, of_image, of_places
 from calib.sequences.evidence import Evidence, gather, together
 from calib.sequences.parts import Parts
-from calib.sequences.placed import Placed
 from calib.sequences.reference import Kind, Reference
 from calib.sequences.selection import FOLDS, THOROUGH, Trial, alike_from, attempt, choose, lean
 from calib.sequences.static import Static, reduce
+from calib.sequences.static_board import StaticBoard
 from calib.sequences.steps import Steps
 
 #: Maximum number of frames kept as samples per sequence, and of samples in total.
@@ -41,7 +41,7 @@ _FEW = 100
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class NoiseCalibration:
     """Result of a noise calibration.
 
     Attributes:
@@ -72,7 +72,7 @@ class Found:
     distances: Span
     amplitudes: Span
     steps: Steps
-    boards: tuple[Placed, ...]
+    boards: tuple[StaticBoard, ...]
 
     @property
     def kind(self) -> Kind:
@@ -82,11 +82,11 @@ class Found:
 
 def calibrate(
     sequences: Sequence[recorded.Sequence],
-    targets: Sequence[float | Placed],
+    targets: Sequence[float | StaticBoard],
     region: NDArray[np.bool_],
     generator: np.random.Generator,
     say: Callable[[str], None],
-) -> Found:
+) -> NoiseCalibration:
     """Selects and fits a sensor's noise model from static sequences.
 
     Args:
@@ -116,7 +116,7 @@ def calibrate(
     chosen = choose([again, *places])
     say(f"fitting {chosen.candidate.name} to everything")
     of_all = law.candidate.fit(everything)
-    return Found(
+    return NoiseCalibration(
         tuple(statics),
         tuple(references),
         chosen.candidate.fit(everything),
@@ -130,7 +130,7 @@ def calibrate(
         distances,
         _amplitudes(everything.samples.amplitude),
         steps,
-        tuple(one for one in targets if isinstance(one, Placed)),
+        tuple(one for one in targets if isinstance(one, StaticBoard)),
     )
 
 
@@ -154,15 +154,15 @@ def _reduced(sequences: Sequence[recorded.Sequence], say: Callable[[str], None])
 
 def _references(
     statics: Sequence[Static],
-    targets: Sequence[float | Placed],
+    targets: Sequence[float | StaticBoard],
     region: NDArray[np.bool_],
     generator: np.random.Generator,
 ) -> list[Reference]:
     """Boards or known distances if given, else planes if every sequence has a large one, else temporal means."""
-    boards = [one for one in targets if isinstance(one, Placed)]
+    boards = [one for one in targets if isinstance(one, StaticBoard)]
     if len(boards) == len(statics):
         return [reference.on_board(static, one, region) for static, one in zip(statics, boards)]
-    depths = [math.nan if isinstance(one, Placed) else one for one in targets]
+    depths = [math.nan if isinstance(one, StaticBoard) else one for one in targets]
     if all(map(math.isfinite, depths)):
         return [reference.known(static, depth, region, generator) for static, depth in zip(statics, depths)]
     try:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.calibration.noise.measurement import Found
+from abs_service.calibration.noise.measurement import NoiseCalibration
 from abs_service.report import plots
 from calib.noise.base import DepthNoise
 from calib.sequences.reference import Kind
@@ -21,12 +21,12 @@ _FINE = 120
 _EDGE = 5.0
 
 
-def over_distance_and_amplitude(found: Found) -> "Figure":
+def over_distance_and_amplitude(found: NoiseCalibration) -> "Figure":
     """σ, and μ if known, of the middle pixel by the model, with the measurements of every sequence as dots."""
     return _maps(found) if np.isfinite(found.amplitudes[0]) else _curves(found)
 
 
-def histogram(found: Found) -> "Figure":
+def histogram(found: NoiseCalibration) -> "Figure":
     """Normalised held-out residuals against the normal distribution."""
     figure = plots.figure(7.5, 3.6)
     axes = figure.add_subplot()
@@ -40,7 +40,7 @@ def histogram(found: Found) -> "Figure":
     return figure
 
 
-def _maps(found: Found) -> "Figure":
+def _maps(found: NoiseCalibration) -> "Figure":
     """σ and μ as colour maps over distance and amplitude."""
     near, far = found.distances
     faint, bright = (max(value, 1.0) for value in found.amplitudes)
@@ -65,7 +65,7 @@ def _maps(found: Found) -> "Figure":
     return figure
 
 
-def _curves(found: Found) -> "Figure":
+def _curves(found: NoiseCalibration) -> "Figure":
     """σ and μ over distance, without amplitudes."""
     x = np.linspace(*found.distances, _FINE)
     sigma, mu = _middle(found.model, found, x, np.zeros(_FINE))
@@ -91,7 +91,7 @@ def _curves(found: Found) -> "Figure":
 
 
 def _middle(
-    model: DepthNoise, found: Found, x: NDArray[np.float64], a: NDArray[np.float64]
+    model: DepthNoise, found: NoiseCalibration, x: NDArray[np.float64], a: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """σ and μ [m] of the middle pixel."""
     height, width = found.statics[0].mean.shape

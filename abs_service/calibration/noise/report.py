@@ -3,8 +3,8 @@
 import numpy as np
 
 from abs_service.calibration.noise import plots, verdicts
-from abs_service.calibration.noise.measurement import Found
-from abs_service.calibration.noise.sigma_consistency import Claim
+from abs_service.calibration.noise.measurement import NoiseCalibration
+from abs_service.calibration.noise.sigma_consistency import SigmaConsistency
 from abs_service.report import figures
 from abs_service.report.content import Column, Picture, Report, Section, Table, drawing, photo
 from abs_service.report.provenance import Provenance
@@ -17,26 +17,28 @@ _SHOWN = 3
 _COLORS = {"static": (60, 160, 60), "target": (60, 90, 220), "left out": (160, 160, 160)}
 
 
-def report(sensor: str, found: Found, claims: tuple[Claim, ...], provenance: Provenance) -> Report:
+def report(
+    sensor: str, found: NoiseCalibration, consistencies: tuple[SigmaConsistency, ...], provenance: Provenance
+) -> Report:
     """Report of one sensor.
 
     Args:
         sensor: its name.
         found: result of the calibration.
-        claims: consistency of the σ that the sensor reports.
+        consistencies: consistency of the σ that the sensor reports.
         provenance: provenance of the report.
     """
     sections = [
         Section("Models", (_models(found),)),
-        Section("Parts of the error", (_WHAT, _parts(found))),
+        Section("Error components", (_WHAT, _parts(found))),
         *_boards(found),
         Section("Distance and amplitude", (_over(found),)),
         Section("Pixels", tuple(_maps(found))),
         Section("Residuals", (_residuals(found),)),
-        Section("What was static", tuple(_still(found))),
+        Section("Static pixels", tuple(_still(found))),
     ]
-    if claims:
-        sections.append(Section("The sensor's own deviation", (_claims(claims),)))
+    if consistencies:
+        sections.append(Section("The sensor's own deviation", (_sigma_table(consistencies),)))
     title = f"Noise of sensor {sensor}" if sensor else "Noise"
     return Report(title, provenance, verdicts.verdicts(found), tuple(sections), values(found))
 
@@ -47,7 +49,7 @@ _WHAT = (
 )
 
 
-def values(found: Found) -> dict[str, object]:
+def values(found: NoiseCalibration) -> dict[str, object]:
     """Machine-readable values."""
     return {
         "model": found.chosen.candidate.name,
@@ -66,7 +68,7 @@ def values(found: Found) -> dict[str, object]:
     }
 
 
-def _boards(found: Found) -> tuple[Section, ...]:
+def _boards(found: NoiseCalibration) -> tuple[Section, ...]:
     """Board poses, if they are the reference."""
     if found.kind is not Kind.BOARD:
         return ()
@@ -79,10 +81,10 @@ def _boards(found: Found) -> tuple[Section, ...]:
          board.uncertainty * 1e3)
         for static, one, board in zip(found.statics, found.references, found.boards)
     )  # fmt: skip
-    return (Section("Boards", (Table("Where the board was, by the mean images of the sequences", columns, rows),)),)
+    return (Section("Boards", (Table("Board poses from the mean images of the sequences", columns, rows),)),)
 
 
-def _models(found: Found) -> Table:
+def _models(found: NoiseCalibration) -> Table:
     columns = (
         Column("model"), Column("coefficients of", "", ""), Column("number"),
         Column("log-likelihood held out", "", ".3f"),
@@ -101,10 +103,10 @@ def _models(found: Found) -> Table:
              quality.within_one, quality.within_95, quality.variance, quality.outlier_share, remark)
         )  # fmt: skip
     held = "whole sequences" if found.by_sequence else "a third of the frames"
-    return Table(f"What was compared; {held} were held out in turn", columns, tuple(rows))
+    return Table(f"Compared models; {held} were held out in turn", columns, tuple(rows))
 
 
-def _parts(found: Found) -> Table:
+def _parts(found: NoiseCalibration) -> Table:
     columns = (
         Column("sequence"), Column("pixels"), Column("distance", "m", ".3f"), Column("amplitude", "", ".0f"),
         Column("temporal", "mm", ".2f"), Column("fixed", "mm", ".2f"), Column("offset", "mm", ".2f"),
@@ -118,26 +120,26 @@ def _parts(found: Found) -> Table:
     return Table("Temporal, fixed and systematic part of the error", columns, rows)
 
 
-def _over(found: Found) -> Picture:
+def _over(found: NoiseCalibration) -> Picture:
     caption = "The model's σ and μ of the middle pixel, as in Fig. 8 of the paper; dots are what was measured."
     return drawing(plots.over_distance_and_amplitude(found), caption, "σ and μ over distance and amplitude")
 
 
-def _maps(found: Found) -> list[str | Picture]:
+def _maps(found: NoiseCalibration) -> list[str | Picture]:
     if found.kind is Kind.MEAN:
         return ["Without a flat target, what a pixel errs by for ever cannot be told from what it looks at."]
     shown: list[str | Picture] = []
     pattern, deviation = found.pattern
     size = f"deviation {_pattern_deviation(found) * 1e3:.2g} mm, known to {np.nanmedian(deviation) * 1e3:.2g} mm."
     figure = figures.difference_map(pattern * 1e3, "pixel's own offset [mm]")
-    shown.append(drawing(figure, f"What each pixel errs by in all sequences alike: {size}", "map of the fixed pattern"))
+    shown.append(drawing(figure, f"Fixed-pattern noise over all sequences: {size}", "map of the fixed pattern"))
     if isinstance(found.model, PerPixel):
         figure = figures.image_map(found.model.factor, "pixel's own factor on σ")
-        shown.append(drawing(figure, "How the pixels' σ differ from the law of the image.", "map of factors on σ"))
+        shown.append(drawing(figure, "Factors on σ relative to the image's model.", "map of factors on σ"))
     return shown
 
 
-def _pattern_deviation(found: Found) -> float:
+def _pattern_deviation(found: NoiseCalibration) -> float:
     """Deviation of the fixed pattern without the uncertainty of its map [m]; NaN if undetermined."""
     if found.kind is Kind.MEAN:
         return float("nan")
@@ -146,11 +148,11 @@ def _pattern_deviation(found: Found) -> float:
     return float(np.sqrt(max(float(np.mean(middle**2) - np.mean(deviation**2)), 0.0)))
 
 
-def _residuals(found: Found) -> Picture:
+def _residuals(found: NoiseCalibration) -> Picture:
     return drawing(plots.histogram(found), "Held-out residuals over their deviations.", "histogram of residuals")
 
 
-def _still(found: Found) -> list[str | Picture]:
+def _still(found: NoiseCalibration) -> list[str | Picture]:
     every = max(1, len(found.statics) // _SHOWN)
     pictures: list[str | Picture] = [
         "Green: static. Blue: static and on the target. Grey: moving, at a rim or without returns."
@@ -166,10 +168,10 @@ def _still(found: Found) -> list[str | Picture]:
     return pictures
 
 
-def _claims(claims: tuple[Claim, ...]) -> Table:
+def _sigma_table(consistencies: tuple[SigmaConsistency, ...]) -> Table:
     columns = (
         Column("sequence"), Column("pixels"), Column("within σ", "", ".3f"), Column("within 1.96 σ", "", ".3f"),
-        Column("deviation over claimed", "", ".2f"),
+        Column("deviation over reported σ", "", ".2f"),
     )  # fmt: skip
-    rows = tuple((c.name, c.pixels, c.within_one, c.within_95, c.ratio) for c in claims)
-    return Table("Residuals from local planes over the deviation that the sensor claims", columns, rows)
+    rows = tuple((c.name, c.pixels, c.within_one, c.within_95, c.ratio) for c in consistencies)
+    return Table("Residuals from local planes over the σ that the sensor reports", columns, rows)

@@ -11,7 +11,7 @@ from calib.sequences import local
 
 
 @dataclass(frozen=True, slots=True)
-class Claim:
+class SigmaConsistency:
     """Residuals from local planes, normalised by the reported σ.
 
     Attributes:
@@ -28,18 +28,18 @@ class Claim:
     ratio: float
 
 
-def of_values(name: str, z: NDArray[np.floating]) -> Claim:
+def of_values(name: str, z: NDArray[np.floating]) -> SigmaConsistency:
     """Consistency from normalised residuals; NaN is ignored."""
     size = np.abs(z[np.isfinite(z)])
     if not size.size:
-        return Claim(name, 0, np.nan, np.nan, np.nan)
+        return SigmaConsistency(name, 0, np.nan, np.nan, np.nan)
     ratio = MAD_TO_SIGMA * float(np.median(size))
-    return Claim(name, size.size, float(np.mean(size < 1)), float(np.mean(size < 1.959964)), ratio)
+    return SigmaConsistency(name, size.size, float(np.mean(size < 1)), float(np.mean(size < 1.959964)), ratio)
 
 
-def of_sequence(sequence: Sequence) -> tuple[Claim, ...]:
+def of_sequence(sequence: Sequence) -> tuple[SigmaConsistency, ...]:
     """Consistency of a sequence's first frame, which is not averaged; none without reported σ."""
-    if not np.isfinite(sequence.claimed).any():
+    if not np.isfinite(sequence.reported_sigma).any():
         return ()
     distance = sequence.lengths[0] * sequence.along
-    return (of_values(sequence.name, local.normalized(distance, sequence.claimed, sequence.camera.rays())),)
+    return (of_values(sequence.name, local.normalized(distance, sequence.reported_sigma, sequence.camera.rays())),)

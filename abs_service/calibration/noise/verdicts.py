@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from abs_service.calibration.noise.measurement import Found
+from abs_service.calibration.noise.measurement import NoiseCalibration
 from abs_service.report.content import Level, Verdict
 from calib.sequences.candidates import Level as Places
 from calib.sequences.reference import Kind
@@ -26,7 +26,7 @@ _WELL_KNOWN = 2e-3
 _OUTSIDE = 10.0
 
 
-def verdicts(found: Found) -> tuple[Verdict, ...]:
+def verdicts(found: NoiseCalibration) -> tuple[Verdict, ...]:
     """All verdicts, the most important first."""
     return (
         _use(found),
@@ -40,7 +40,7 @@ def verdicts(found: Found) -> tuple[Verdict, ...]:
     )
 
 
-def _use(found: Found) -> Verdict:
+def _use(found: NoiseCalibration) -> Verdict:
     near, far = found.distances
     amplitudes = f" and amplitudes {found.amplitudes[0]:.0f} to {found.amplitudes[1]:.0f}"
     domain = f"{near:.2f} to {far:.2f} m" + (amplitudes if math.isfinite(found.amplitudes[0]) else "")
@@ -52,7 +52,7 @@ def _use(found: Found) -> Verdict:
     )
 
 
-def _agreement(found: Found) -> Verdict:
+def _agreement(found: NoiseCalibration) -> Verdict:
     quality = found.chosen.quality
     text = (
         f"{quality.within_one:.1%} of what was held out lies within σ (68.3 % if the model is right), "
@@ -66,7 +66,7 @@ def _agreement(found: Found) -> Verdict:
     )
 
 
-def _boards(found: Found) -> list[Verdict]:
+def _boards(found: NoiseCalibration) -> list[Verdict]:
     """Uncertainty of the true distances from board poses."""
     if found.kind is not Kind.BOARD:
         return []
@@ -85,7 +85,7 @@ def _boards(found: Found) -> list[Verdict]:
     return [Verdict(Level.DOUBTFUL, text, "Take a larger board, tilt it by 20° or so, or come closer.")]
 
 
-def _undetermined(found: Found) -> list[Verdict]:
+def _undetermined(found: NoiseCalibration) -> list[Verdict]:
     """Quantities that the sequences do not determine."""
     said = []
     if found.kind is Kind.MEAN:
@@ -124,7 +124,7 @@ def _undetermined(found: Found) -> list[Verdict]:
     return said
 
 
-def _places(found: Found) -> Verdict:
+def _places(found: NoiseCalibration) -> Verdict:
     """Gain of maps of regions and pixels."""
     parts = []
     for trial in found.trials:
@@ -146,7 +146,7 @@ def _none() -> Verdict:
     return Verdict(Level.DOUBTFUL, "Maps of regions and pixels could not be fitted.")
 
 
-def _outside(found: Found) -> Verdict:
+def _outside(found: NoiseCalibration) -> Verdict:
     """Check of the model's extrapolation."""
     near, far = found.distances
     _, high, _ = extremes(found.model, found.distances, _amplitudes(found))
@@ -161,11 +161,11 @@ def _outside(found: Found) -> Verdict:
     return Verdict(Level.GOOD if sound else Level.BAD, text + known)
 
 
-def _amplitudes(found: Found) -> tuple[float, float]:
+def _amplitudes(found: NoiseCalibration) -> tuple[float, float]:
     return found.amplitudes if math.isfinite(found.amplitudes[0]) else (0.0, 1.0)
 
 
-def _steps(found: Found) -> list[Verdict]:
+def _steps(found: NoiseCalibration) -> list[Verdict]:
     far = found.distances[1]
     step = float(found.steps.at(np.array(far)))
     if found.steps.growth > 0:
@@ -178,7 +178,7 @@ def _steps(found: Found) -> list[Verdict]:
     return [Verdict(Level.GOOD, text)] if found.steps.digit > 0 else []
 
 
-def _motion(found: Found) -> list[Verdict]:
+def _motion(found: NoiseCalibration) -> list[Verdict]:
     said = []
     for static in found.statics:
         if static.moving > _MOVING:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from calib.board import coverage
 from calib.board.corners.errors import MovedError
 from calib.board.coverage import MissingView
@@ -33,13 +33,13 @@ class Collector:
         """Missing views, the most important first; empty if sufficient."""
         return coverage.missing_views(self.views, self.sizes)
 
-    def take(self, seen: Seen) -> bool:
+    def take(self, seen: BoardObservations) -> bool:
         """Keeps a shot if it adds information; returns True if kept.
 
         A shot is rejected if the board moved in front of any sensor, because the others may have seen it elsewhere.
         """
-        self.latest = {sensor: str(error) for (_, sensor), error in seen.refused.items()}
-        moved = any(isinstance(error, MovedError) for error in seen.refused.values())
+        self.latest = {sensor: str(error) for (_, sensor), error in seen.rejected.items()}
+        moved = any(isinstance(error, MovedError) for error in seen.rejected.values())
         new = {
             view.sensor: coverage.adds_information(view, self.views, self.sizes[view.sensor]) for view in seen.corners
         }

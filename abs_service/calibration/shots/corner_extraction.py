@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from abs_service.calibration.shots.shots import Look, Shot
+from abs_service.calibration.shots.shots import SensorShot, Shot
 from calib.board import plane
 from calib.board.corners import detection, errors, quality, stillness
 from calib.board.corners.detection import Detection
@@ -18,39 +18,39 @@ _SLACK_PX = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class BoardObservations:
     """Observations of a board in some shots.
 
     Attributes:
         corners: views of its points.
         planes: distances on it.
-        refused: errors of rejected images, by (shot, sensor).
+        rejected: errors of rejected images, by (shot, sensor).
         sizes: width and height of each sensor's images [px], by sensor name.
     """
 
     corners: tuple[CornerView, ...] = ()
     planes: tuple[PlaneView, ...] = ()
-    refused: Mapping[tuple[int, str], BoardError] = field(default_factory=dict)
+    rejected: Mapping[tuple[int, str], BoardError] = field(default_factory=dict)
     sizes: Mapping[str, tuple[int, int]] = field(default_factory=dict)
 
-    def __add__(self, other: "Seen") -> "Seen":
-        return Seen(
+    def __add__(self, other: "BoardObservations") -> "BoardObservations":
+        return BoardObservations(
             self.corners + other.corners,
             self.planes + other.planes,
-            {**self.refused, **other.refused},
+            {**self.rejected, **other.rejected},
             {**self.sizes, **other.sizes},
         )
 
 
-def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
+def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations of a board in all shots; see `see`."""
-    seen = Seen()
+    seen = BoardObservations()
     for shot in shots:
         seen += see(target, shot, cameras)
     return seen
 
 
-def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> Seen:
+def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations of a board in one shot.
 
     Corners come from a sensor's image, and distances from within their hull. For a sensor that measures distances only,
@@ -59,28 +59,28 @@ def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> Seen:
     """
     corners: list[CornerView] = []
     planes: list[PlaneView] = []
-    refused: dict[tuple[int, str], BoardError] = {}
+    rejected: dict[tuple[int, str], BoardError] = {}
     sizes: dict[str, tuple[int, int]] = {}
-    for sensor, look in shot.looks.items():
+    for sensor, look in shot.sensor_shots.items():
         if not look.image.size:
             continue
         sizes[sensor] = (look.image.shape[1], look.image.shape[0])
         try:
             found = _find(target, look)
         except BoardError as error:
-            refused[shot.number, sensor] = error
+            rejected[shot.number, sensor] = error
             continue
         view = found.view(target, sensor, shot.number, look.t_ns * 1e-9)
         corners.append(view)
         planes += _plane(view, look)
-    for sensor, look in shot.looks.items():
+    for sensor, look in shot.sensor_shots.items():
         if not look.image.size and look.distance.size:
             sizes[sensor] = (look.distance.shape[1], look.distance.shape[0])
             planes += _hidden_plane(target, sensor, shot, corners, cameras)
-    return Seen(tuple(corners), tuple(planes), refused, sizes)
+    return BoardObservations(tuple(corners), tuple(planes), rejected, sizes)
 
 
-def _find(target: Target, look: Look) -> Detection:
+def _find(target: Target, look: SensorShot) -> Detection:
     largest = detection.MAX_SATURATED_ACTIVE if look.own_light else detection.MAX_SATURATED
     found = detection.detect(target, look.image, largest)
     if look.before is not look.image and look.before.shape == look.image.shape:
@@ -90,7 +90,7 @@ def _find(target: Target, look: Look) -> Detection:
     return found
 
 
-def _plane(view: CornerView, look: Look) -> list[PlaneView]:
+def _plane(view: CornerView, look: SensorShot) -> list[PlaneView]:
     if look.distance.shape != look.image.shape[:2]:
         return []
     inside = plane.white_pixels(look.image, plane.region(view.pixels, look.distance.shape))
@@ -109,7 +109,7 @@ def _hidden_plane(
     T_rb = plane.board_pose(best, cameras[best.sensor])
     if T_rb is None:
         return []
-    look = shot.looks[sensor]
+    look = shot.sensor_shots[sensor]
     inside = plane.projected_region(target, T_rb, cameras[sensor], _SLACK_PX)
     found = plane.plane_view(sensor, shot.number, look.t_ns * 1e-9, inside, look.distance, look.sigma)
     return [] if found is None else [found]

@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.calibration.shots.shots import OWN_LIGHT, SOUGHT, Look, pixels
+from abs_service.calibration.shots.shots import OWN_LIGHT, SOUGHT, SensorShot, pixels
 from drivers.contract.frame import Frame, Kind
 
 #: Number of initial images whose mean is compared with the mean of the others to detect motion.
 _FIRST = 5
 
 
-class MeanLooks:
+class FrameAverager:
     """Mean image of every sensor, of the kind best suited for corner detection."""
 
     def __init__(self) -> None:
@@ -23,13 +23,13 @@ class MeanLooks:
         if frame.kind in SOUGHT:
             self._means.setdefault((frame.sensor, frame.kind), _Mean()).add(frame)
 
-    def looks(self) -> dict[str, Look]:
+    def sensor_shots(self) -> dict[str, SensorShot]:
         """Mean image of each sensor; `before` is the mean of the first few."""
-        found: dict[str, Look] = {}
+        found: dict[str, SensorShot] = {}
         for (sensor, kind), mean in sorted(self._means.items(), key=lambda item: -SOUGHT.index(item[0][1])):
             image = mean.image()
             before = mean.first() if mean.moves_show else image
-            found[sensor] = Look(mean.t_ns, image, before, kind in OWN_LIGHT)
+            found[sensor] = SensorShot(mean.t_ns, image, before, kind in OWN_LIGHT)
         return found
 
 

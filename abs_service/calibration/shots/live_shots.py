@@ -18,7 +18,7 @@ SILENCE_S = 10.0
 
 
 @dataclass(frozen=True)
-class Wired:
+class NamedDevice:
     """Opened device, with the rig names of its selected heads."""
 
     device: Device
@@ -38,7 +38,7 @@ class LiveShots:
 
     def __init__(
         self,
-        devices: Mapping[str, Wired],
+        devices: Mapping[str, NamedDevice],
         cameras: Mapping[str, Camera],
         tolerance_ns: int,
         clock: Callable[[], int],

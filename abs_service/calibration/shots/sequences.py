@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.calibration.shots.frame_averaging import MeanLooks
-from abs_service.calibration.shots.shots import Look
+from abs_service.calibration.shots.frame_averaging import FrameAverager
+from abs_service.calibration.shots.shots import SensorShot
 from calib.camera import Camera
 from drivers.contract.device import Device, DeviceState, Truth
 from drivers.contract.frame import Frame, Geometry, Kind
@@ -34,12 +34,12 @@ class Sequence:
         camera: its camera.
         lengths: measurements (n, height, width) [m], z or radial; NaN without return.
         amplitude: (n, height, width); NaN without.
-        claimed: mean σ that the sensor reports (height, width) [m]; NaN without.
+        reported_sigma: mean σ that the sensor reports (height, width) [m]; NaN without.
         radial: True if the lengths are radial.
         digit: resolution of the lengths [m]; 0 if they are not integers.
         exposure: setting, for display; "" if unknown.
         filters: filters that the device applied.
-        looks: mean images of this and other sensors, by sensor, for board detection.
+        sensor_shots: mean images of this and other sensors, by sensor, for board detection.
         cameras: of all sensors, by name.
     """
 
@@ -48,12 +48,12 @@ class Sequence:
     camera: Camera
     lengths: NDArray[np.float32]
     amplitude: NDArray[np.float32]
-    claimed: NDArray[np.float32]
+    reported_sigma: NDArray[np.float32]
     radial: bool
     digit: float
     exposure: str
     filters: tuple[str, ...]
-    looks: Mapping[str, Look]
+    sensor_shots: Mapping[str, SensorShot]
     cameras: Mapping[str, Camera]
 
     @property
@@ -121,7 +121,7 @@ def of_frames(
 ) -> list[Sequence]:
     """Groups frames into sequences by exposure setting; arguments and errors as in `of_recording`."""
     gathered: dict[str, _Gathered] = {}
-    others = MeanLooks()
+    others = FrameAverager()
     chosen = sensor
     for frame in frames:
         if frame.kind is Kind.DEPTH and not chosen:
@@ -139,7 +139,7 @@ def of_frames(
         raise SequenceError(f"{name}: there is no depth image" + (f" of a sensor {sensor!r}" if sensor else ""))
     if chosen not in cameras:
         raise SequenceError(f"{name}: nothing says which camera sensor {chosen!r} has")
-    seen = others.looks()
+    seen = others.sensor_shots()
     return [one.sequence(name, setting, cameras, seen, most) for setting, one in gathered.items()]
 
 
@@ -149,17 +149,17 @@ class _Gathered:
 
     depth: dict[tuple[int, int], Frame] = field(default_factory=dict)
     amplitude: dict[tuple[int, int], Frame] = field(default_factory=dict)
-    claimed: dict[tuple[int, int], Frame] = field(default_factory=dict)
-    looks: MeanLooks = field(default_factory=MeanLooks)
+    reported_sigma: dict[tuple[int, int], Frame] = field(default_factory=dict)
+    sensor_shots: FrameAverager = field(default_factory=FrameAverager)
 
     def add(self, frame: Frame) -> None:
         """Adds a frame of any kind."""
-        places = {Kind.DEPTH: self.depth, Kind.AMPLITUDE: self.amplitude, Kind.DEVIATION: self.claimed}
+        places = {Kind.DEPTH: self.depth, Kind.AMPLITUDE: self.amplitude, Kind.DEVIATION: self.reported_sigma}
         places.get(frame.kind, {})[frame.epoch, frame.seq] = frame
-        self.looks.add(frame)
+        self.sensor_shots.add(frame)
 
     def sequence(
-        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, Look], most: int
+        self, name: str, setting: str, cameras: Mapping[str, Camera], others: Mapping[str, SensorShot], most: int
     ) -> Sequence:
         """Sequence of the first depth images; without amplitudes if one of them has none."""
         numbers = list(self.depth)[:most]
@@ -167,19 +167,19 @@ class _Gathered:
         lengths = np.stack([self.depth[number].si() for number in numbers])
         nothing = np.full((1, *lengths.shape[1:]), np.nan, np.float32)
         amplitude = self._images(self.amplitude, numbers, np.broadcast_to(nothing, lengths.shape))
-        claimed = self._images(self.claimed, numbers, nothing)
+        reported_sigma = self._images(self.reported_sigma, numbers, nothing)
         return Sequence(
             f"{name} ({setting})" if setting else name,
             first.sensor,
             cameras[first.sensor],
             lengths,
             amplitude,
-            claimed.mean(axis=0),
+            reported_sigma.mean(axis=0),
             first.geometry == Geometry.RADIAL,
             first.scale if first.data.dtype.kind in "ui" else 0.0,
             setting,
             first.filters,
-            {**others, **self.looks.looks()},
+            {**others, **self.sensor_shots.sensor_shots()},
             cameras,
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import cv2
 
-from abs_service.calibration.shots.shots import USED, Assembler, Look, Shot, ShotsError, thinned
+from abs_service.calibration.shots.shots import USED, Assembler, SensorShot, Shot, ShotsError, thinned
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.camera import Camera
 from drivers.contract.frame import Frame, FrameSet
@@ -91,9 +91,9 @@ class FolderShots:
             raise ShotsError(f"images of {sensor}: {error}") from error
 
 
-def _look(file: ImageFile) -> Look:
+def _look(file: ImageFile) -> SensorShot:
     # Without EXIF rotation: the image is used as the sensor delivered it.
     image = cv2.imread(str(file.path), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise ShotsError(f"{file.path}: this is no image that can be read")
-    return Look(file.t_ns, image, image)
+    return SensorShot(file.t_ns, image, image)

@@ -41,7 +41,7 @@ class ShotsError(Exception):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class SensorShot:
     """Observation of one sensor in a shot.
 
     Attributes:
@@ -67,18 +67,18 @@ class Shot:
 
     Attributes:
         number: of the shot.
-        looks: observation of each sensor, by sensor name; sensors without one are missing.
+        sensor_shots: observation of each sensor, by sensor name; sensors without one are missing.
         frames: its frames, and preceding ones for motion detection; empty for image files.
     """
 
     number: int
-    looks: Mapping[str, Look]
+    sensor_shots: Mapping[str, SensorShot]
     frames: tuple[Frame, ...] = ()
 
     @property
     def t_ns(self) -> int:
         """Time of the earliest exposure [ns]."""
-        return min((look.t_ns for look in self.looks.values()), default=0)
+        return min((look.t_ns for look in self.sensor_shots.values()), default=0)
 
 
 class Assembler:
@@ -99,13 +99,13 @@ class Assembler:
             ShotsError: the size of a depth image differs from its camera's.
         """
         sensors = dict.fromkeys(sensor for sensor, _ in frames.frames)
-        looks = {sensor: self._look(sensor, frames, before) for sensor in sensors}
+        sensor_shots = {sensor: self._look(sensor, frames, before) for sensor in sensors}
         both = {
             (frame.key, frame.t_host_ns): frame for frames_ in (before, frames) for frame in frames_.frames.values()
         }
-        return Shot(number, looks, tuple(both.values()))
+        return Shot(number, sensor_shots, tuple(both.values()))
 
-    def _look(self, sensor: str, frames: FrameSet, before: FrameSet) -> Look:
+    def _look(self, sensor: str, frames: FrameSet, before: FrameSet) -> SensorShot:
         now, earlier = _by_kind(sensor, frames), _by_kind(sensor, before)
         sought = next((kind for kind in SOUGHT if kind in now), None)
         depth = now.get(Kind.DEPTH)
@@ -114,10 +114,10 @@ class Assembler:
         sigma = np.full_like(distance, np.nan) if deviation is None else deviation.si()
         if sought is None:
             first = depth if depth is not None else next(iter(now.values()))
-            return Look(first.t_host_ns, NO_IMAGE, NO_IMAGE, distance=distance, sigma=sigma)
+            return SensorShot(first.t_host_ns, NO_IMAGE, NO_IMAGE, distance=distance, sigma=sigma)
         image = pixels(now[sought])
         former = pixels(earlier.get(sought, now[sought]))
-        return Look(now[sought].t_host_ns, image, former, sought in OWN_LIGHT, distance, sigma)
+        return SensorShot(now[sought].t_host_ns, image, former, sought in OWN_LIGHT, distance, sigma)
 
     def _radial(self, depth: Frame) -> NDArray[np.float32]:
         distance = depth.si()

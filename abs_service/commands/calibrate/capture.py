@@ -30,7 +30,7 @@ from abs_service.calibration.files import target_file
 from abs_service.calibration.shots.collection import Collector
 from abs_service.calibration.shots.corner_extraction import see
 from abs_service.calibration.shots.guide import Guide, LineGuide, LiveGuide, coverage_map
-from abs_service.calibration.shots.live_shots import LiveShots, Wired
+from abs_service.calibration.shots.live_shots import LiveShots, NamedDevice
 from abs_service.calibration.shots.shot_recording import ShotFileError, ShotRecording
 from abs_service.calibration.shots.shots import SOUGHT, Shot
 from abs_service.commands import rig_devices, rig_process
@@ -80,21 +80,21 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def opened(rig: config.ServiceConfig, path: Path) -> Iterator[tuple[dict[str, Wired], dict[str, Camera]]]:
+def opened(rig: config.ServiceConfig, path: Path) -> Iterator[tuple[dict[str, NamedDevice], dict[str, Camera]]]:
     """Opens and configures the devices of a rig file; yields them with their cameras, and closes them afterwards.
 
     Raises:
         DeviceError: one cannot be opened.
         SettingError, HeadError: the file names a control or a head that a device lacks.
     """
-    devices: dict[str, Wired] = {}
+    devices: dict[str, NamedDevice] = {}
     cameras: dict[str, Camera] = {}
     with ExitStack() as stack:
         for name in rig.devices:
             device = open_device(rig.devices[name].uri, time.monotonic_ns)
             stack.callback(device.close)
             rig_devices.set_controls(device, rig.devices[name].controls, f"{path}: devices.{name}.controls")
-            devices[name] = Wired(device, rig.heads(name))
+            devices[name] = NamedDevice(device, rig.heads(name))
             cameras |= rig_devices.cameras(rig, name, device)
         yield devices, cameras
 
@@ -122,7 +122,7 @@ def _collect(
             return
 
 
-def _sizes(devices: Mapping[str, Wired]) -> dict[str, tuple[int, int]]:
+def _sizes(devices: Mapping[str, NamedDevice]) -> dict[str, tuple[int, int]]:
     """Width and height of the images for corner detection, by rig name [px]."""
     return {
         wired.heads[stream.sensor]: (stream.width, stream.height)
@@ -133,7 +133,7 @@ def _sizes(devices: Mapping[str, Wired]) -> dict[str, tuple[int, int]]:
 
 
 def _picture(shot: Shot, collector: Collector, out: Path) -> None:
-    for sensor, look in shot.looks.items():
+    for sensor, look in shot.sensor_shots.items():
         if look.image.size:
             views = [view for view in collector.views if view.sensor == sensor]
             path = _picture_path(out, sensor)

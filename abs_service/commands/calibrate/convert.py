@@ -144,7 +144,7 @@ def _chosen(contents: list[Content], options: Options) -> Content:
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
     """Writes the file; returns what was lost."""
     if target == exchange.OWN:
-        origin = provenance.trace(_said(arguments), arguments.inputs)
+        origin = provenance.trace(_command_line(arguments), arguments.inputs)
         sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}
         name = re.sub(r"[^A-Za-z0-9_-]+", "_", out.name.partition(".")[0]) or "rig"
         rig_file.write(rig_file.RigCalibration(name, sensors, origin, "unknown"), out)
@@ -157,7 +157,7 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
     return written.lost
 
 
-def _said(arguments: argparse.Namespace) -> list[str]:
+def _command_line(arguments: argparse.Namespace) -> list[str]:
     """Command line without options that do not affect the result."""
     options = [("--from", arguments.source), ("--size", arguments.size)]
     options += [("--unit-m", str(arguments.unit_m))] if arguments.unit_m != 1 else []

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from abs_service import config
-from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.live_shots import LiveShots
 from abs_service.commands.calibrate.capture import opened
 from calib.board import coverage
@@ -42,11 +42,11 @@ def streaming(
             yield shots, known
 
 
-def adds(new: Seen, seen: Seen) -> bool:
+def adds(new: BoardObservations, seen: BoardObservations) -> bool:
     """True if a shot adds a view unlike all previous ones for some sensor; repeated views add no information."""
     return any(coverage.adds_information(view, seen.corners, new.sizes[view.sensor]) for view in new.corners)
 
 
-def views(seen: Seen) -> int:
+def views(seen: BoardObservations) -> int:
     """Number of shots with a view of some sensor."""
     return len({view.shot for view in seen.corners})

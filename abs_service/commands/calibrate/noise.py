@@ -43,7 +43,7 @@ from abs_service.report.content import Report, to_json
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
-from calib.sequences.placed import Placed
+from calib.sequences.static_board import StaticBoard
 from drivers.contract.frame import Geometry
 from drivers.image_folder.images import DepthImages, ImageFolder
 from drivers.image_folder.listing import by_number
@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
         groups = _groups(arguments)
     paths = [Path(source) for source in arguments.sources if "://" not in source]
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
-    trace = provenance.trace(["calibrate", "noise", *_said(arguments)], paths)
+    trace = provenance.trace(["calibrate", "noise", *_command_line(arguments)], paths)
     worst = Exit.OK
     for number, (setting, group) in enumerate(groups.items()):
         with console.status("learning") as status:
@@ -109,18 +109,18 @@ def run(arguments: argparse.Namespace) -> int:
     return worst
 
 
-def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Sequence, float | Placed]]]:
+def _groups(arguments: argparse.Namespace) -> dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]]:
     """Sequences of all sources by exposure setting, each with its target."""
     depths = _depths(arguments.distance_m, len(arguments.sources))
     if arguments.target is not None and not math.isnan(depths[0]):
         raise NoiseOptionError("--target, --distance-m: give only one of them; a board tells its own distance")
     target = None if arguments.target is None else target_file.read(arguments.target)
     cameras = _cameras(arguments.calibration)
-    groups: dict[str, list[tuple[sequences.Sequence, float | Placed]]] = {}
+    groups: dict[str, list[tuple[sequences.Sequence, float | StaticBoard]]] = {}
     for source, depth in zip(arguments.sources, depths):
         for one in _read(source, arguments):
             seen = sequences.with_cameras(one, cameras)
-            where = depth if target is None else board_poses.placed(target, seen)
+            where = depth if target is None else board_poses.static_board(target, seen)
             groups.setdefault(seen.exposure, []).append((seen, where))
     return groups
 
@@ -173,7 +173,7 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
     return region
 
 
-def _write_model(found: measurement.Found, sensor: str, out: Path) -> list[Path]:
+def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path) -> list[Path]:
     """Writes the table for the rig file, and its maps."""
     toml, written, model = out.with_suffix(".toml"), [], found.model
     try:
@@ -210,7 +210,7 @@ def _say(made: Report, setting: str, written: Sequence[Path], as_json: bool) -> 
     print(f"wrote {', '.join(map(str, written))}", file=sys.stderr if as_json else sys.stdout)
 
 
-def _said(arguments: argparse.Namespace) -> list[str]:
+def _command_line(arguments: argparse.Namespace) -> list[str]:
     """Command line of these arguments."""
     said = list(arguments.sources)
     if not math.isnan(arguments.distance_m[0]):

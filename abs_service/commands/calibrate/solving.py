@@ -15,7 +15,7 @@ from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file, target_file
 from abs_service.calibration.files.rig_file import SensorCalibration
 from abs_service.calibration.shots import corner_extraction
-from abs_service.calibration.shots.corner_extraction import Seen
+from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands import calibrations
@@ -47,7 +47,7 @@ class Material:
         data: image files.
     """
 
-    seen: Seen
+    seen: BoardObservations
     known: Mapping[str, SensorCalibration]
     data: tuple[Path, ...]
 
@@ -99,7 +99,7 @@ def material(arguments: argparse.Namespace) -> Material:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
-        seen = Seen()
+        seen = BoardObservations()
         for shot in shots:
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
@@ -150,13 +150,13 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
 def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
     """Solves, cross-validates, writes calibration and report, and prints the verdict."""
     solution = calibrate(task, say)
-    distance = arguments.distance or _usual(solution.task.reference, solution)
+    distance = arguments.distance or _middle_distance(solution.task.reference, solution)
     assessment = assess(solution, distance, arguments.needed, say)
     data = [path for path in (*found.data, arguments.target) if path.exists()]
     origin = provenance.trace(sys.argv[1:], data)
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", arguments.out.name.partition(".")[0]) or "rig"
     made = report.calibration(name, origin, solution, assessment.trusted, found.known)
-    notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.refused.items()]
+    notes = [f"{sensor}, shot {shot}: {error}" for (shot, sensor), error in found.seen.rejected.items()]
     result = report.report(title, origin, solution, assessment, notes)
     written = [*rig_file.write(made, arguments.out), *page.write(result, arguments.out)]
     if arguments.json:
@@ -169,7 +169,7 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     return Exit.OK if assessment.trusted else Exit.FAILED
 
 
-def _usual(reference: str, solution) -> float:
+def _middle_distance(reference: str, solution) -> float:
     """Middle of the boards' range of distances from the reference."""
     from calib.solve.validation.projection_uncertainty import reach  # noqa: PLC0415
 

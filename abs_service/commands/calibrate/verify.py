@@ -21,7 +21,7 @@ from pathlib import Path
 from abs_service.calibration.cameras import verification
 from abs_service.calibration.files import target_file
 from abs_service.calibration.files.rig_file import RigCalibration
-from abs_service.calibration.shots.corner_extraction import Seen, see
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands import calibrations, rig_process
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     known = calibrations.load(arguments.calibration)
     target = target_file.read(arguments.target)
     seen, files = _look(arguments, target, known)
-    origin = provenance.trace(_said(arguments), [arguments.calibration, arguments.target, *files])
+    origin = provenance.trace(_command_line(arguments), [arguments.calibration, arguments.target, *files])
     report = verification.verify(known, seen, origin)
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
     page_path, _ = page.write(report, path)
@@ -72,7 +72,7 @@ def run(arguments: argparse.Namespace) -> int:
     return int(report.level)
 
 
-def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) -> tuple[Seen, list[Path]]:
+def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) -> tuple[BoardObservations, list[Path]]:
     """Observations of the board, and their source files."""
     if (arguments.source is None) == (not arguments.images):
         raise VerifyOptionError("give either a recording or a rig as SOURCE, or --images NAME=GLOB for each sensor")
@@ -89,9 +89,9 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
     return _see_all(target, shots, cameras), [arguments.source]
 
 
-def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> Seen:
+def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations in all shots, with progress on standard error."""
-    seen = Seen()
+    seen = BoardObservations()
     for number, shot in enumerate(shots, start=1):
         seen += see(target, _of(cameras, shot), cameras)
         print(f"\r{number} shots, {len(seen.corners)} images show the board", end="", file=sys.stderr)
@@ -99,12 +99,12 @@ def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera
     return seen
 
 
-def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> Seen:
+def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[str, Camera]) -> BoardObservations:
     """Observations in distinct shots of running devices, until sufficient or interrupted by a signal."""
     if arguments.shots < 1:
         raise VerifyOptionError(f"--shots {arguments.shots}: must be 1 at least")
     stop = rig_process.stop_on_signals()
-    seen = Seen()
+    seen = BoardObservations()
     with live.streaming(arguments.source, cameras, stop.is_set) as (shots, there):
         if not set(there) & set(cameras):
             raise VerifyOptionError(
@@ -125,7 +125,7 @@ def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[st
 
 def _of(cameras: Mapping[str, Camera], shot: Shot) -> Shot:
     """Shot without the sensors that the calibration does not contain."""
-    return Shot(shot.number, {name: look for name, look in shot.looks.items() if name in cameras})
+    return Shot(shot.number, {name: look for name, look in shot.sensor_shots.items() if name in cameras})
 
 
 def _text(report: Report, path: Path) -> str:
@@ -137,7 +137,7 @@ def _text(report: Report, path: Path) -> str:
     return "\n".join([*lines, f"wrote {path}", report.wording.headlines[report.level]])
 
 
-def _said(arguments: argparse.Namespace) -> list[str]:
+def _command_line(arguments: argparse.Namespace) -> list[str]:
     images = [word for one in arguments.images for word in ("--images", one)]
     source = [] if arguments.source is None else [str(arguments.source)]
     given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--target", str(arguments.target)]

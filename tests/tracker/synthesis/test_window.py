@@ -25,7 +25,7 @@ from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.per_pixel import PerPixel
-from tests.calib.texels import render_texture
+from tests.calib.noise.texels import render_texture
 from tests.tracker.scenes import CAMERA, FISHEYE, as_surface, depth_image, flat, plane_distance, sheet, sparse
 
 WIDE = Camera(200, 120, 220.0, 220.0, 99.5, 59.5)

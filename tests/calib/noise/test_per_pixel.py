@@ -15,8 +15,8 @@ from calib.noise.fit.samples import Samples
 from calib.noise.fit.shrinkage import Repeats
 from calib.noise.region_polynomial import blocks
 from calib.noise.tof_amplitude import TofAmplitude
-from tests.calib.noise_models import DISTANCES, HEIGHT, WIDTH, own_of_pixels
-from tests.calib.test_noise_shrinkage import Head
+from tests.calib.noise.models import DISTANCES, HEIGHT, WIDTH, own_of_pixels
+from tests.calib.noise.test_shrinkage import Head
 
 SHAPE = (18, 24)
 LABELS = blocks(*SHAPE, 6)

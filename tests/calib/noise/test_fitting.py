@@ -12,7 +12,7 @@ from calib.noise.base import NoiseError
 from calib.noise.fit import fitting
 from calib.noise.fit.quality import goodness_of_fit
 from calib.noise.fit.samples import Samples, domain, from_images, joined
-from tests.calib import laws
+from tests.calib.noise import laws
 
 SEEDS = range(4)
 

@@ -9,8 +9,8 @@ from numpy.polynomial.polynomial import polyval2d
 
 from calib.noise.base import WINDOW_M, log_density, sample
 from calib.noise.fit.polynomial import evaluate
-from tests.calib.noise_models import AMPLITUDES, DISTANCES, HEIGHT, MODELS, WIDTH, any_model
-from tests.calib.texels import negative_log_density, render_texture
+from tests.calib.noise.models import AMPLITUDES, DISTANCES, HEIGHT, MODELS, WIDTH, any_model
+from tests.calib.noise.texels import negative_log_density, render_texture
 
 PIXEL = st.tuples(st.integers(0, HEIGHT - 1), st.integers(0, WIDTH - 1))
 INSIDE = st.tuples(st.floats(*DISTANCES), st.floats(*AMPLITUDES))

@@ -12,8 +12,8 @@ from calib.solve.start import extrinsics_graph
 from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
 from calib.solve.validation.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from calib.views import CornerView, PlaneView
-from tests.calib import board_views
-from tests.calib.board_views import Head
+from tests.calib.solve import board_views
+from tests.calib.solve.board_views import Head
 
 SHOTS = 12
 

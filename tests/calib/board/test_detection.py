@@ -8,7 +8,7 @@ from calib import pose
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
-from tests.calib.boards import TOF, VGA, as_bytes, centered, photograph
+from tests.calib.board.boards import TOF, VGA, as_bytes, centered, photograph
 
 CHESSBOARD = Chessboard(9, 6, 0.03)
 CHARUCO = Charuco(10, 7, 0.03, 0.0225, "4x4_100")

@@ -12,8 +12,8 @@ from calib.sequences.reference import Kind
 from calib.sequences.selection import Trial, attempt, choose, extremes
 from calib.sequences.steps import Steps, recognize
 from drivers.simulated.address import parse
-from tests.calib.noise_models import MODELS, TOF
-from tests.calib.walls import frames, sequence
+from tests.calib.noise.models import MODELS, TOF
+from tests.calib.sequences.walls import frames, sequence
 
 RANDOM = np.random.default_rng
 SMALL = "&tof=88x72"
@@ -145,9 +145,9 @@ def test_an_error_that_hides_within_a_step_is_not_forgotten() -> None:
 
 def test_a_sensor_s_own_deviations_are_judged_by_local_planes() -> None:
     taken, head = frames("simulated://wall?sensors=tof&distance=1.1&tilt=25", 0, 1)
-    claimed = head.noise.sigma(*head.ideal(()))
+    reported_sigma = head.noise.sigma(*head.ideal(()))
     for factor, inside in ((1.0, 0.683), (2.0, 0.954)):
-        z = local.normalized(taken[0].si(), factor * claimed, head.camera.rays())
+        z = local.normalized(taken[0].si(), factor * reported_sigma, head.camera.rays())
         assert np.isfinite(z).mean() > 0.9
         assert np.mean(np.abs(z[np.isfinite(z)]) < 1) == pytest.approx(inside, abs=0.012)
 

@@ -8,7 +8,7 @@ import pytest
 from calib.noise import pixel_polynomial, region_polynomial
 from calib.noise.base import NoiseError
 from calib.noise.region_polynomial import blocks
-from tests.calib.noise_models import varied
+from tests.calib.noise.models import varied
 
 X, A = np.array([0.6, 1.0, 2.5]), np.array([200.0, 3000.0, 9000.0])
 P = (np.array([0, 3, 2]), np.array([4, 1, 0]))

@@ -7,7 +7,7 @@ from calib import pose
 from calib.board.target import Chessboard
 from calib.camera import Camera
 from calib.noise.base import NoiseError
-from calib.sequences.placed import place
+from calib.sequences.static_board import locate
 from calib.views import CornerView
 
 TOF = Camera(176, 144, 200.0, 200.0, 87.5, 71.5)
@@ -31,7 +31,7 @@ def along_rays(inside: np.ndarray) -> np.ndarray:
 def test_distances_err_by_as_much_as_is_said(camera: Camera) -> None:
     errors, said = [], []
     for seed in range(30):
-        found = place(seen(camera, 0.1, seed), camera, TOF)
+        found = locate(seen(camera, 0.1, seed), camera, TOF)
         distance = 1 / (TOF.rays()[found.inside] @ found.plane)
         errors.append(np.mean((distance - along_rays(found.inside)) ** 2))
         said.append(found.uncertainty**2)
@@ -40,7 +40,7 @@ def test_distances_err_by_as_much_as_is_said(camera: Camera) -> None:
 
 
 def test_only_pixels_well_inside_the_points_count() -> None:
-    found = place(seen(COLOR, 0.0, 0), COLOR, TOF)
+    found = locate(seen(COLOR, 0.0, 0), COLOR, TOF)
     hull = TOF.project(pose.transform(T_RB, POINTS))
     rows, columns = np.nonzero(found.inside)
     assert found.inside.sum() > 1000
@@ -53,4 +53,4 @@ def test_only_pixels_well_inside_the_points_count() -> None:
 def test_a_board_that_the_depth_sensor_cannot_see_is_refused() -> None:
     away = Camera(176, 144, 200.0, 200.0, 87.5, 71.5, T_rs=pose.from_rotation_vector((0, np.pi, 0), (0, 0, 0)))
     with pytest.raises(NoiseError, match="does not see the board"):
-        place(seen(COLOR, 0.0, 0), COLOR, away)
+        locate(seen(COLOR, 0.0, 0), COLOR, away)

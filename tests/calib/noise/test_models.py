@@ -12,7 +12,7 @@ from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
 from calib.noise.structured_light import StructuredLight
 from calib.noise.tof_amplitude import TofAmplitude
-from tests.calib.noise_models import DISTANCES, GLOBAL, MODELS, SIGMA, TOF, pixel_maps, region_tables
+from tests.calib.noise.models import DISTANCES, GLOBAL, MODELS, SIGMA, TOF, pixel_maps, region_tables
 
 X, A = np.array([0.6, 1.0, 2.5]), np.array([200.0, 3000.0, 9000.0])
 P = (np.array([0, 3, 2]), np.array([4, 1, 0]))

@@ -13,7 +13,7 @@ from calib.warp import errors
 from calib.warp.mesh import LARGEST_STEP_M, MeshWarp
 from calib.warp.pictures import PictureLookup
 from tests import reference
-from tests.calib.warp_scenes import BOARD, SOURCE, VIEWS, WALL, Ball, Plane, image, seen_by
+from tests.calib.warp.scenes import BOARD, SOURCE, VIEWS, WALL, Ball, Plane, image, seen_by
 
 ANY_VIEW = pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
 slopes = st.tuples(st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))

@@ -10,7 +10,7 @@ from calib.camera import Camera
 from calib.warp import errors
 from calib.warp.mesh import LARGEST_STEP_M
 from calib.warp.splat import WIDTH, SplatWarp
-from tests.calib.warp_scenes import BOARD, SOURCE, VIEWS, WALL, image, seen_by
+from tests.calib.warp.scenes import BOARD, SOURCE, VIEWS, WALL, image, seen_by
 
 ANY_VIEW = pytest.mark.parametrize("view", VIEWS.values(), ids=VIEWS)
 

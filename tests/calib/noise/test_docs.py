@@ -9,7 +9,7 @@ import pytest
 from abs_service.config import SensorTable, plugins
 from calib.noise import pixel_polynomial
 
-PAGE = (Path(__file__).parents[2] / "docs" / "noise.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "noise.md").read_text(encoding="utf-8")
 TABLES = {
     name: sensor
     for block in re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)

@@ -8,7 +8,7 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL
-from tests.calib.texels import negative_log_density, render_texture
+from tests.calib.noise.texels import negative_log_density, render_texture
 
 #: The simulated time-of-flight head's law, the same with a mean offset that depends on both, and a Kinect's.
 TOF = GaussianPolynomial(SIGMA_POLYNOMIAL, amplitudes=(400.0, 10_000.0))

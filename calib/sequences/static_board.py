@@ -22,7 +22,7 @@ _LEAST_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Placed:
+class StaticBoard:
     """Board in front of a depth sensor.
 
     Attributes:
@@ -45,7 +45,7 @@ class Placed:
     uncertainty: float
 
 
-def place(view: CornerView, seeing: Camera, depth: Camera) -> Placed:
+def locate(view: CornerView, seeing: Camera, depth: Camera) -> StaticBoard:
     """Estimates the pose of a board seen by one sensor relative to a depth sensor, which may be the same.
 
     Args:
@@ -70,7 +70,7 @@ def place(view: CornerView, seeing: Camera, depth: Camera) -> Placed:
     variance = np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
     rms_px = float(np.sqrt(2 * np.mean(np.square(misses))))
     uncertainty = float(np.sqrt(np.mean(variance)))
-    return Placed(view.sensor, len(view.points_b), rms_px, T_rb, _plane(T_rb, depth), inside, uncertainty)
+    return StaticBoard(view.sensor, len(view.points_b), rms_px, T_rb, _plane(T_rb, depth), inside, uncertainty)
 
 
 def _refined(T_rb: Pose, view: CornerView, camera: Camera) -> tuple[Pose, NDArray[np.float64], NDArray[np.float64]]:

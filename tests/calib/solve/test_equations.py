@@ -17,7 +17,7 @@ from calib.solve.bundle.lens_parameters import BROWN_CONRADY, FISHEYE, RATIONAL,
 from calib.solve.bundle.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.validation import projection_uncertainty
-from tests.calib import board_views
+from tests.calib.solve import board_views
 
 KINDS = {"tof": BROWN_CONRADY, "light": RATIONAL, "color": FISHEYE}
 
