@@ -34,10 +34,10 @@ def run(arguments: argparse.Namespace) -> int:
     name = arguments.tracker or next(iter(settings.trackers), "")
     wiring.plan(settings, name)
     with rig_process.open_bus(settings, arguments) as bus:
-        return _reinitialize(bus, name, HeaderFactory(settings.name, WallClock()))
+        return request(bus, name, HeaderFactory(settings.name, WallClock()))
 
 
-def _reinitialize(bus: Bus, tracker: str, headers: HeaderFactory) -> int:
+def request(bus: Bus, tracker: str, headers: HeaderFactory) -> int:
     """Sends the command once the tracker's first state shows that it runs, and waits for another mesh version."""
     versions: list[int] = []
     received, renewed = threading.Event(), threading.Event()

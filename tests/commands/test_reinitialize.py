@@ -46,12 +46,12 @@ def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, find
         return subscription
 
     monkeypatch.setattr(bus, "subscribe", and_publish)
-    assert reinitialize._reinitialize(bus, "sheet", HeaderFactory("demo", WallClock())) == code
+    assert reinitialize.request(bus, "sheet", HeaderFactory("demo", WallClock())) == code
     assert [header.rig for header in tracker.told] == ["demo"]
     assert words in capsys.readouterr().out
 
 
 def test_a_silent_tracker_is_named(monkeypatch, capsys):
     monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.05)
-    assert reinitialize._reinitialize(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock())) == 1
+    assert reinitialize.request(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock())) == 1
     assert 'tracker "sheet" says nothing' in capsys.readouterr().out

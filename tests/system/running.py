@@ -14,10 +14,10 @@ from typing import Any
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
-from evaluation.service.live.subscriber import connect
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus.contract import Sample
+from evaluation.service.live.subscriber import connect
 
 #: The first start on a machine compiles the kernels.
 START_S = 150.0
