@@ -54,4 +54,4 @@ def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, find
 def test_a_silent_tracker_is_named(monkeypatch, capsys):
     monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.05)
     assert reinitialize.request(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock())) == 1
-    assert 'tracker "sheet" says nothing' in capsys.readouterr().out
+    assert 'tracker "sheet" publishes nothing' in capsys.readouterr().out
