@@ -7,7 +7,8 @@ from abs_service.config import ServiceConfig, plugins
 from abs_service.pairing.image_decoders import kinds
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.models import nurbs
-from abs_service.tracking.session import Plan, streams
+from abs_service.tracking.plan import Plan
+from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.per_pixel import PerPixel

@@ -15,7 +15,8 @@ from abs_service.pairing.observation import Observer
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import euclidean
-from abs_service.tracking.session import ModelSettings, Plan, Tracking
+from abs_service.tracking.plan import ModelSettings, Plan
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors, TruthComparison
 from calib.noise.base import DepthNoise, pixels_where
 from calib.rig import Noise, Rig
@@ -147,7 +148,7 @@ class TruthEvaluator:
         tracking: the session. The caller tracks, so that the comparison is not part of the measured time.
     """
 
-    def __init__(self, tracking: Tracking):
+    def __init__(self, tracking: TrackingSession):
         self._tracking = tracking
         self._truths = TruthComparison()
         self._known = tracking.mesh_version
@@ -186,7 +187,7 @@ def track(rig: Rig, plan: Plan, exposures: Sequence[LabeledExposure]) -> Tracked
     Raises:
         UntrackedError: no object is detected in the first exposure.
     """
-    tracking = Tracking(rig, plan)
+    tracking = TrackingSession(rig, plan)
     evaluator = TruthEvaluator(tracking)
     models, estimates, errors, material, cpu_ms = [], [], [], [], []
     for exposure in exposures:

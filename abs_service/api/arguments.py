@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 from abs_service import config
 from abs_service.api.errors import ArgumentError
-from abs_service.tracking.session import ModelSettings
+from abs_service.tracking.plan import ModelSettings
 from calib.rig import Noise
 
 #: What a rig file holds for a part of a tracker, `{"type": "hybrid", "steps": 4}`.

@@ -19,7 +19,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.session import streams as streams_of
 from abs_service.tracking.warmup import warm_up
 from calib.camera import Camera
@@ -138,7 +138,7 @@ class Tracker:
         self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
         self._budget_ns = np.inf if budget_ms is None else budget_ms * 1e6
         self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
-        self._session = Tracking(rig, replace(plan, region=self._region))
+        self._session = TrackingSession(rig, replace(plan, region=self._region))
 
     def track(
         self,

@@ -27,7 +27,7 @@ from abs_service.commands import run as run_command
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
-from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.session import TrackingSession, streams
 from calib.rig import Rig
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
@@ -119,7 +119,7 @@ def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, fi
     clock = WallClock(monotonic=lambda: 0, wall=lambda: recording.wall_offset_ns)
     return OfflineTracker(
         name,
-        Tracking(rig, wiring.plan(settings, name)),
+        TrackingSession(rig, wiring.plan(settings, name)),
         synchroniser,
         wiring.model_name(settings, name),
         rig.calib_id,

@@ -24,7 +24,8 @@ from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
 from abs_service.tracking.noise_monitor import NoiseMonitor
-from abs_service.tracking.session import Plan, Tracking, streams
+from abs_service.tracking.plan import Plan
+from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup import warm_up
 from calib.camera import Camera
 from calib.rig import Noise, Rig
@@ -64,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
         rig = wiring.rig(settings, name, cameras)
-        tracking = Tracking(rig, plan)
+        tracking = TrackingSession(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
         live = _live(bus, settings, name, rig, tracking, headers, health)
         while not stop.is_set():
@@ -83,7 +84,7 @@ def _live(
     settings: config.ServiceConfig,
     name: str,
     rig: Rig,
-    tracking: Tracking,
+    tracking: TrackingSession,
     headers: HeaderFactory,
     health: Health,
 ) -> LiveTracker:

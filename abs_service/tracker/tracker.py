@@ -1,4 +1,8 @@
-"""The method on one screen (Fig. 1 of the paper): deform, synthesise, compare, search."""
+"""The method of the paper on one page (Fig. 1): predict, observe, search by synthesis, posterior, status.
+
+Equation numbers: A. Jordt, R. Koch, Reconstruction of Deformation from Depth and Color Video with Explicit Noise
+Models.
+"""
 
 from collections.abc import Callable
 
@@ -8,20 +12,28 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracker.models.base import DeformationModel, Surface
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome
-from abs_service.tracker.posterior.covariance import along_normals, propagated, remaining, sandwich
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
+from abs_service.tracker.posterior.covariance import along_normals, propagated, sandwich
 from abs_service.tracker.posterior.curvature import posterior_covariance
-from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracker.posterior.mesh_noise import MeshNoise
+from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
 from abs_service.tracker.posterior.relocation import laid_over
-from abs_service.tracker.terms.base import SensorFit, inlier_share
+from abs_service.tracker.terms.base import inlier_share
 
 
 class Tracker:
-    """Finds the parameters Θ that explain an observation best, starting from the last one's.
+    """Finds the parameters Θ that maximise the posterior density of every observation.
+
+    Args:
+        model: the deformation model.
+        posterior: likelihood and priors.
+        optimizer: proposes candidates.
+        evaluations: maximum number of cost evaluations per frame.
+        limits: thresholds of the status.
 
     Attributes:
-        model: the deformation that is searched.
+        model: see above.
     """
 
     def __init__(
@@ -30,97 +42,83 @@ class Tracker:
         posterior: Posterior,
         optimizer: Optimizer,
         evaluations: int,
-        verdict: status.Settings,
+        limits: status.Settings,
     ):
         self.model = model
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
-        self._verdict = verdict
-        self._started = False
-        self._trusted = model.rest
-        self._own = np.broadcast_to(model.mesh.deviation**2, len(model.mesh.vertices))
-        self._knows_own = False
+        self._limits = limits
+        self._mesh_noise = MeshNoise(model)
+        self._is_warm = False
+        self._last_tracked = model.rest
 
     def track(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
-        """Searches while evaluations are left and `in_time` allows; widely, and as long as it takes, the first time."""
-        predicted = self._posterior.observe(observation)
-        if self._started:
+        """The estimate of one frame.
+
+        Args:
+            observation: the images of all sensors at one moment.
+            in_time: False when the time is up; the first frame is searched to the end.
+        """
+        frame = self._posterior.observe(observation)  # predicts Θ; renders the noise models per pixel
+        if self._is_warm:
             budget = Budget(self._evaluations, in_time)
-            found = self._optimizer.follow(self._posterior, predicted, budget)
-            if not self._knows_own:
-                self._own, self._knows_own = self._uncorrected(found.theta), True
+            outcome = self._minimize(frame, self._optimizer.follow(frame, frame.predicted, budget), budget)
+            self._mesh_noise.update(frame, outcome.theta)
         else:
             budget = Budget(self._evaluations, lambda: True)
-            found = self._optimizer.explore(self._posterior, predicted, budget)
-        self._started = True
-        self._posterior.settle(found.theta)
-        return self._estimate(observation, found, budget)
+            outcome = self._minimize(frame, self._optimizer.explore(frame, frame.predicted, budget), budget)
+        self._is_warm = True
+        self._posterior.motion.update(outcome.theta)
+        return self._estimate(observation, frame, outcome, budget)
 
     def relocate(self, points: NDArray[np.float64]) -> None:
-        """Takes points (k, 3) [m] for the object, which was lost: the next observation's search begins there."""
-        self._posterior.restart(laid_over(self.model, self._trusted, points))
-        self._started = False
+        """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
+        self._posterior.motion.restart(laid_over(self.model, self._last_tracked, points))
+        self._is_warm = False
 
-    def _covariances(
-        self, theta: NDArray[np.float64], surface: Surface
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Of theta (dim, dim) and of the vertices (n, 3, 3)."""
-        near = self._posterior.linearized_near(theta)
+    def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
+        """Analysis by synthesis: ask, deform, synthesise and score, tell, until the search returns."""
+        thetas = next(search)  # ask: candidates (population, dim)
+        while True:
+            surface = self.model.deform(thetas)  # eqs. 2–8
+            costs = frame.cost(thetas, surface)  # synthesised into every sensor (eqs. 10–12) and scored (eqs. 16–22)
+            budget.evaluations += len(thetas)
+            try:
+                thetas = search.send(costs)  # tell, and ask again
+            except StopIteration as ended:
+                return ended.value
+
+    def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, budget: Budget) -> Estimate:
+        """Posterior covariance, agreement of the sensors and status at the optimum."""
+        theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
+        near = frame.linearized_near(theta)
         covariance = sandwich(posterior_covariance(near.quadratic), near.sensed)
-        own = along_normals(surface, self._own)
-        return covariance, propagated(near.sparse_jacobian, covariance) + own
-
-    def _uncorrected(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance (n,) [m²] of the mesh's own noise along the normals that Θ does not correct.
-
-        Told once for a mesh, because it hardly changes with the deformation; not in the first frame, where nothing may
-        have moved and the priors let Θ correct nothing.
-        """
-        if not np.any(self.model.mesh.deviation):
-            return self._own
-        surface = self.model.deform(theta[None])
-        normals = surface.normals[0].T.astype(np.float64)
-        deviation = np.broadcast_to(self.model.mesh.deviation, len(normals))
-        inverse = posterior_covariance(self._posterior.linearize(theta))
-        response = -inverse @ self._posterior.answers(theta, normals * deviation[:, None])
-        return remaining(normals, deviation, self.model.jacobian(theta), response)
-
-    def _estimate(self, observation: Observation, found: Outcome, budget: Budget) -> Estimate:
-        surface = self.model.deform(found.theta[None])
-        covariance, vertex_covariance = self._covariances(found.theta, surface)
-        fits = self._posterior.fits(found.theta)
-        share = inlier_share(fits)
-        verdict, reasons = status.judge(share, _hidden_share(fits), observation.missing, self._verdict)
+        vertex_covariance = propagated(near.sparse_jacobian, covariance) + along_normals(
+            surface, self._mesh_noise.variance
+        )
+        fits = frame.fits(theta)
+        verdict, reasons = status.judge(fits, observation.missing, self._limits)
         if verdict == Status.TRACKING:
-            self._trusted = found.theta
+            self._last_tracked = theta
         return Estimate(
             seq=observation.seq,
             t_host_ns=observation.t_host_ns,
             status=verdict,
             reasons=reasons,
-            theta=found.theta,
+            theta=theta,
             covariance=covariance,
             vertices=np.ascontiguousarray(surface.vertices[0].T),
             vertex_covariance=vertex_covariance,
-            cost=found.cost,
-            deviation=found.deviation,
-            searcher=found.searcher,
-            stop=found.stop,
+            cost=outcome.cost,
+            deviation=outcome.deviation,
+            searcher=outcome.searcher,
+            stop=outcome.stop,
             generations=budget.generations,
             evaluations=budget.evaluations,
             budget=self._evaluations,
-            inlier_share=share,
+            inlier_share=inlier_share(fits),
             fits=fits,
             sources=observation.sources,
             missing=observation.missing,
         )
-
-
-def _hidden_share(fits: tuple[SensorFit, ...]) -> float:
-    """Share of the vertices that are hidden from the sensor that sees most of them; 0 without a sensor.
-
-    A light barrier, whose one sample is no vertex, has no say.
-    """
-    shares = [fit.hidden / (fit.hidden + fit.visible) for fit in fits if fit.hidden + fit.visible > 1]
-    return min(shares, default=0.0)

@@ -11,7 +11,8 @@ from abs_service.tracker.detection.elastica import heavy_elastica
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracking.session import Plan, Tracking
+from abs_service.tracking.plan import Plan
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.stiffness import (
     InclinationProfile,
     Stiffness,
@@ -91,7 +92,7 @@ def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan
     Raises:
         StiffnessError: no strip was ever tracked.
     """
-    tracking, observer = Tracking(rig, plan), Observer(rig)
+    tracking, observer = TrackingSession(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
     sets = 0
     for frames in synchroniser.group(item for item in recording.frames() if isinstance(item, Frame)):

@@ -13,7 +13,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.noise_monitor import NoiseMonitor
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 from drivers.contract.frame import FrameSet
@@ -113,7 +113,7 @@ class EstimatePublisher:
         self._identity = Identity(tracker, model, "", calib_id, 0)
         self._seq = 0
 
-    def publish(self, estimate: Estimate, tracking: Tracking, effort: Effort) -> None:
+    def publish(self, estimate: Estimate, tracking: TrackingSession, effort: Effort) -> None:
         """Publishes an estimate, after the topology of its mesh if that is new."""
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
             self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
@@ -141,7 +141,7 @@ class LiveTracker:
 
     def __init__(
         self,
-        tracking: Tracking,
+        tracking: TrackingSession,
         sets: FrameSetQueue,
         publisher: EstimatePublisher,
         health: Health,

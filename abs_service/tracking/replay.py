@@ -9,7 +9,7 @@ from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
@@ -44,7 +44,7 @@ class OfflineTracker:
     def __init__(
         self,
         name: str,
-        tracking: Tracking,
+        tracking: TrackingSession,
         synchroniser: Synchroniser,
         model: str,
         calib_id: str,

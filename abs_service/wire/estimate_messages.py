@@ -122,7 +122,7 @@ def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.S
             t_host_ns=source.t_host_ns,
             samples=fit.samples,
             visible=fit.visible,
-            hidden=fit.hidden,
+            occluded=fit.occluded,
             mean_log_likelihood=fit.mean_log_likelihood,
             normalized_residual=fit.normalized_residual,
             dropped=dropped.get(fit.sensor, 0),

@@ -32,7 +32,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis import sparse, undistorted, warped
 from abs_service.tracker.terms.photometric.appearance import dressed
-from abs_service.tracking.session import SynthesisSettings
+from abs_service.tracking.plan import SynthesisSettings
 from calib import jit, pose
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor

@@ -1,14 +1,11 @@
-"""Time of whole frames at the paper's full budgets and with `hybrid`, and the search's own share of it.
+"""What whole frames cost at the paper's full budgets and with `hybrid`, and which share of it is the search's own.
 
     NUMBA_NUM_THREADS=2 python -m evaluation.benchmarks.rates --frames 20 --rounds 3
 
 prints JSON. Frames are those of the simulated sheet, from frame set to estimate; the depth camera has 176 × 144 pixels,
-the colour camera 320 × 240. All cases are measured in turn, and the round with the fastest frame is reported. Where
-other programs run as well, only the CPU time of one thread is meaningful.
-
-The generations of `cma_es` and the cost of its candidates are one compiled loop, so they cannot be timed separately.
-Therefore the same number of candidates, distributed as at the start of the search, is evaluated again without a search;
-the difference is the search's own time.
+the colour camera 320 × 240. All cases are measured in turns, and the round with the quickest frame is told: machines,
+and minutes on one machine, differ. Where other programs run as well, only the processor time of one thread says
+something.
 """
 
 import argparse
@@ -17,19 +14,17 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import NOTHING, Step
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Problem
-from abs_service.tracker.posterior.curvature import Quadratic, search_metric
-from abs_service.tracking.session import ModelSettings, OptimizerSettings, Tracking
-from calib.jit import composed, kernel, prange
+from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Search
+from abs_service.tracker.posterior.curvature import Quadratic
+from abs_service.tracking.plan import ModelSettings, OptimizerSettings
+from abs_service.tracking.session import TrackingSession
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 
 Answer = TypeVar("Answer")
@@ -38,40 +33,25 @@ Answer = TypeVar("Answer")
 FIRST = 0
 
 
-#: A cost in whose place `composed` puts a problem's.
-judged: Callable[..., float] = NOTHING.kernel
-
-
-@kernel
-def _judge(thetas: NDArray[np.float64], times: int, arguments: tuple[Any, ...], costs: NDArray[np.float64]) -> None:
-    for _ in range(times):
-        for k in prange(len(thetas)):
-            costs[k] = judged(thetas[k : k + 1], *arguments)
-
-
 @dataclass
 class Clocked:
-    """A problem that adds up the time of its answers [s], except for costs evaluated in the search's compiled loop."""
+    """A problem, and the processor time of its answers [s]."""
 
     problem: Problem
     dimension: int
     spent_s: float = 0.0
 
-    @property
-    def judge(self) -> Step | None:
-        return self.problem.judge
-
-    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
-        return self._clocked(lambda: self.problem.cost(thetas))
-
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        """See `Problem`."""
         return self._clocked(lambda: self.problem.linearize(theta))
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
+        """See `Problem`."""
         return self._clocked(lambda: self.problem.prior(theta))
 
-    def unexplained(self, theta: NDArray[np.float64]) -> float:
-        return self._clocked(lambda: self.problem.unexplained(theta))
+    def outlier_share(self, theta: NDArray[np.float64]) -> float:
+        """See `Problem`."""
+        return self._clocked(lambda: self.problem.outlier_share(theta))
 
     def _clocked(self, ask: Callable[[], Answer]) -> Answer:
         begin = time.thread_time()
@@ -82,56 +62,53 @@ class Clocked:
 
 @dataclass
 class Watched:
-    """Settings of a search; of every frame its time without what others answered [s]; how to judge the last again."""
+    """Settings of a search, and the processor time of every frame's search without costs and derivatives [s]."""
 
     settings: OptimizerSettings
     took_s: list[float] = field(default_factory=list)
-    judge_again: Callable[[int], float] = lambda population: 0.0
 
     def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
+        """The search, watched."""
         return WatchedSearch(self.settings.build(dimension, generator), self)
 
 
 @dataclass
 class WatchedSearch:
-    """See `Watched`."""
+    """An `Optimizer` that measures the time between the costs that it receives and the candidates that it asks for."""
 
     search: Optimizer
     watched: Watched
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        clocked, begin = Clocked(problem, problem.dimension), time.thread_time()
-        found = self.search.follow(clocked, start, budget)
-        self.watched.took_s.append(time.thread_time() - begin - clocked.spent_s)
-        self.watched.judge_again = partial(judging_s, problem, found.theta, budget.generations)
-        return found
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """See `Optimizer`."""
+        clocked, own_s = Clocked(problem, problem.dimension), 0.0
+        begin = time.thread_time()
+        search = self.search.follow(clocked, start, budget)
+        thetas = next(search)
+        while True:
+            own_s += time.thread_time() - begin
+            costs = yield thetas
+            begin = time.thread_time()
+            try:
+                thetas = search.send(costs)
+            except StopIteration as ended:
+                self.watched.took_s.append(own_s + time.thread_time() - begin - clocked.spent_s)
+                return ended.value
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """See `Optimizer`."""
         return self.search.explore(problem, start, budget)
-
-
-def judging_s(problem: Problem, theta: NDArray[np.float64], generations: int, population: int) -> float:
-    """CPU time [s] to evaluate `generations` × `population` candidates around theta (dim,) without a search."""
-    z = np.random.default_rng(1).standard_normal((population, problem.dimension))
-    thetas = theta + z @ search_metric(problem.linearize(theta)).T
-    step = problem.judge
-    assert step is not None
-    judge = composed(_judge, judged=step.kernel)
-    begin = time.thread_time()
-    judge(thetas, generations, step.arguments, np.empty(population))
-    return time.thread_time() - begin
 
 
 @dataclass(frozen=True)
 class Case:
-    """One measured configuration: model, search, approximate number of vertices, sensors."""
+    """Something to measure: a model, a search, about how many vertices, which sensors."""
 
     part: str
     model: ModelSettings
     optimizer: OptimizerSettings
     vertices: int = 300
     sensors: tuple[str, ...] = ("tof",)
-    in_one_loop: int = 0  # candidates per generation that are judged in the search's own loop
 
 
 def cases(scale: float) -> Iterator[Case]:
@@ -140,7 +117,7 @@ def cases(scale: float) -> Iterator[Case]:
     for name, model, population, generations in (("FlexPad", pad, 16, 400), ("NURBS 4x4", sheet, 32, 1000)):
         budget = max(2, round(scale * generations))
         full = cma_es.Settings(population=population, generations=budget, tolerance=never)
-        yield Case(f"{name}, {budget} x {population}, 300 vertices, depth", model, full, in_one_loop=population)
+        yield Case(f"{name}, {budget} x {population}, 300 vertices, depth", model, full)
         tenth = max(2, budget // 10)
         beside = cma.Settings(population=population, generations=tenth, tolerance=never)
         yield Case(f"{name}, {tenth} x {population} by pycma, 300 vertices, depth", model, beside)
@@ -152,24 +129,22 @@ def cases(scale: float) -> Iterator[Case]:
 def measure(case: Case, frames: int) -> dict[str, float]:
     """Least milliseconds of a frame, by the clock and of its thread's processor time, and the search's share of these.
 
-    That is all but what the problem answered and judging takes, by the least of the frames, which do equal work.
+    The search's share is its time without costs and derivatives, by the minimum over frames, which do equal work.
     """
     simulation = simulate("simulated://sheet?seed=1")
     rig = rig_of(simulation)
     rig = replace(rig, sensors={name: rig.sensors[name] for name in case.sensors})
     watched = Watched(case.optimizer)
     plan = default_plan(model=case.model, optimizer=watched, vertices=case.vertices, evaluations=10**9)
-    tracking, took_s, worked_s, judged_s = Tracking(rig, plan), [], [], []
+    tracking, took_s, worked_s = TrackingSession(rig, plan), [], []
     for k in range(FIRST, FIRST + frames + 3):
         exposed = frame_set(simulation.expose(k)[0], k)
         began, begin = time.thread_time(), time.perf_counter()
         tracking.track(exposed, lambda: True)
         took_s.append(time.perf_counter() - begin)
         worked_s.append(time.thread_time() - began)
-        if k > FIRST:
-            judged_s.append(watched.judge_again(case.in_one_loop) if case.in_one_loop else 0.0)
     assert tracking.mesh is not None, case
-    own_s, least_s = min(watched.took_s[2:]) - min(judged_s[2:]), min(worked_s[3:])
+    own_s, least_s = min(watched.took_s[2:]), min(worked_s[3:])
     return {"ms": 1e3 * min(took_s[3:]), "cpu_ms": 1e3 * least_s, "search_share": own_s / least_s}
 
 

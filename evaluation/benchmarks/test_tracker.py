@@ -14,7 +14,7 @@ from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from tests.calib.noise.texels import render_texture
 from tests.tracker.differences import central_differences
 from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
@@ -73,7 +73,7 @@ def test_per_frame_search_metric(benchmark):
 @pytest.mark.parametrize("vertices", [300, 1000])
 def test_whole_frame(benchmark, vertices):
     """From a frame set to an estimate with the default plan: 4 × 4 control points, `hybrid`."""
-    tracking = Tracking(RIG, default_plan(vertices=vertices))
+    tracking = TrackingSession(RIG, default_plan(vertices=vertices))
     exposures = [frame_set(SIMULATION.expose(k)[0], k) for k in range(30, 50)]
     tracking.track(exposures[0], lambda: True)
     following = iter(exposures[1:])

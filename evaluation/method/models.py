@@ -15,7 +15,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import flexpad, gravity, nurbs, posed, rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma, hybrid
-from abs_service.tracking.session import ModelSettings, OptimizerSettings
+from abs_service.tracking.plan import ModelSettings, OptimizerSettings
 from evaluation.experiment import Context, Findings, at_least
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
 

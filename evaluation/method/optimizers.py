@@ -16,7 +16,8 @@ import numpy as np
 from abs_service.report.content import Cell, Column, Section, Table
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracking.session import OptimizerSettings, Tracking
+from abs_service.tracking.plan import OptimizerSettings
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors
 from drivers.simulated.simulation import Simulation
 from evaluation.experiment import Context, Findings, Goal, at_most
@@ -100,7 +101,7 @@ def run(settings: Settings, context: Context) -> Findings:
 
 def track(simulation: Simulation, indices: Sequence[int], settings: OptimizerSettings, budget_ms: float) -> Run:
     """Tracks exposures, each within a budget of wall-clock time."""
-    tracking = Tracking(demo_rig(simulation), demo_plan(optimizer=settings))
+    tracking = TrackingSession(demo_rig(simulation), demo_plan(optimizer=settings))
     evaluator = TruthEvaluator(tracking)
     estimates, errors, times = [], [], []
     for k in indices:

@@ -10,7 +10,7 @@ from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracking.session import ModelSettings, ObjectiveSettings
+from abs_service.tracking.plan import ModelSettings, ObjectiveSettings
 from calib.noise.tof_amplitude import TofAmplitude
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
 from evaluation.paper.wall_calibration import calibrated_noise

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from abs_service import config, wiring
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.truth import closest_points
 from calib.rig import Rig
 from drivers.simulated import address
@@ -34,7 +34,7 @@ def main() -> None:
     settings = config.load_default()
     simulation = address.parse(settings.devices["sim"].uri).build()
     rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
-    tracking = Tracking(rig, wiring.plan(settings, "sheet"))
+    tracking = TrackingSession(rig, wiring.plan(settings, "sheet"))
     synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 1)
     estimates = [
         tracking.track(frame_set, lambda: True)

@@ -7,8 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service import config, wiring
+from abs_service.pairing.observation import Observer
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracking.session import Plan, Tracking
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracking.plan import Plan, make_posterior
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors
 from calib.noise.color import GaussianColor
 from calib.rig import Rig
@@ -55,7 +59,7 @@ class Step:
 
 
 def drive(
-    tracking: Tracking,
+    tracking: TrackingSession,
     simulation: Simulation,
     exposures: Iterable[int],
     change: Callable[[int, list[Frame]], list[Frame]] = lambda k, frames: frames,
@@ -73,3 +77,9 @@ def mean_errors(steps: list[Step]) -> tuple[float, float]:
     """Mean vertex and surface error [mm] of the steps with a known error."""
     errors = [step.errors for step in steps if step.errors is not None]
     return float(np.mean([e.vertex_mm for e in errors])), float(np.mean([e.surface_mm for e in errors]))
+
+
+def posterior_of(model: DeformationModel, rig: Rig, frames: list[Frame]) -> Posterior:
+    """Likelihood and priors of a model that has observed the frames of one exposure."""
+    observation = Observer(rig).observe(frame_set(frames, 0))
+    return make_posterior(default_plan(), rig, model, observation)[0]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
+from abs_service.tracker.optimizers.base import Budget, Outcome, Search
 from abs_service.tracker.posterior.curvature import Quadratic
 
 #: Step of the central differences.
@@ -20,16 +20,14 @@ class Known:
     Attributes:
         dimension: number of parameters.
         residuals: (population, m) of parameters (population, dim); the cost is half their squares' sum.
-        unexplained_at: what `Problem.unexplained` answers for parameters (dim,).
+        outlier_share_at: `Problem.outlier_share` of parameters (dim,).
         deviation: of the prior, which `residuals` contains already.
-        judge: see `Problem`.
     """
 
     dimension: int
     residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]]
-    unexplained_at: Callable[[NDArray[np.float64]], float]
+    outlier_share_at: Callable[[NDArray[np.float64]], float]
     deviation: float = 1.0
-    judge: Step | None = None
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """See `Problem`."""
@@ -45,9 +43,20 @@ class Known:
         """See `Problem`."""
         return Quadratic(theta / self.deviation**2, np.eye(self.dimension) / self.deviation**2)
 
-    def unexplained(self, theta: NDArray[np.float64]) -> float:
+    def outlier_share(self, theta: NDArray[np.float64]) -> float:
         """See `Problem`."""
-        return self.unexplained_at(theta)
+        return self.outlier_share_at(theta)
+
+
+def minimize(problem: Known, search: Search, budget: Budget) -> Outcome:
+    """The outcome of a search, driven as the tracker does."""
+    thetas = next(search)
+    while True:
+        budget.evaluations += len(thetas)
+        try:
+            thetas = search.send(problem.cost(thetas))
+        except StopIteration as ended:
+            return ended.value
 
 
 def linear(target: NDArray[np.float64], scale: NDArray[np.float64]) -> Known:
@@ -65,14 +74,14 @@ def rosenbrock(dimension: int) -> Known:
 
 
 def two_wells(far: NDArray[np.float64], depth: float = 400.0) -> Known:
-    """A shallow well at 0 and one at `far` (dim,) that is deeper by `depth` nats; unexplained is half of all at 0."""
+    """A shallow well at 0 and one at `far` (dim,) that is deeper by `depth` nats; half of all are outliers at 0."""
 
     def residuals(x: NDArray[np.float64]) -> NDArray[np.float64]:
         near = np.column_stack([10 * x, np.full(len(x), np.sqrt(2 * depth))])
         deep = np.column_stack([10 * (x - far), np.zeros(len(x))])
         return np.where(np.sum(near**2, axis=1)[:, None] < np.sum(deep**2, axis=1)[:, None], near, deep)
 
-    def unexplained(theta: NDArray[np.float64]) -> float:
+    def outlier_share(theta: NDArray[np.float64]) -> float:
         return 0.02 if np.linalg.norm(theta - far) < np.linalg.norm(theta) else 0.5
 
-    return Known(len(far), residuals, unexplained)
+    return Known(len(far), residuals, outlier_share)

@@ -117,7 +117,7 @@ def test_it_is_one_sample_that_agrees_or_not_and_has_no_slope():
     for interrupted in (True, False):
         barrier.observe(BeamReading(interrupted), surface)
         fit = barrier.fit(surface)
-        assert (fit.visible, fit.hidden, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
+        assert (fit.visible, fit.occluded, fit.samples, fit.inliers) == (1, 0, 1, int(interrupted))
         assert fit.mean_log_likelihood == pytest.approx(-NOISE.cost(interrupted)[1])
         assert np.isnan(fit.normalized_residual)
     linear = barrier.linearize(surface, SparseJacobian.from_dense(np.zeros((30, 3, 6))))

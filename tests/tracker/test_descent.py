@@ -6,16 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Stop
-from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
+from abs_service.tracker.optimizers.base import Budget, Outcome, Stop
+from abs_service.tracker.optimizers.search import levenberg_marquardt
 from abs_service.tracker.posterior.curvature import Quadratic
-from tests.tracker.problems import Known, linear, rosenbrock
+from tests.tracker.problems import Known, linear, minimize, rosenbrock
 
 TARGET = np.array([0.3, -2.0, 1.0])
 
 
 def budget(limit: int = 10**6, in_time=lambda: True) -> Budget:
     return Budget(limit, in_time)
+
+
+def descend(problem: Known, start, steps: int, tolerance: float, budget: Budget) -> Outcome:
+    return minimize(problem, levenberg_marquardt.descend(problem, start, steps, tolerance, budget), budget)
 
 
 def counted(problem: Known) -> tuple[Known, list[NDArray[np.float64]]]:
@@ -27,7 +31,7 @@ def counted(problem: Known) -> tuple[Known, list[NDArray[np.float64]]]:
             asked.append(theta)
             return super().linearize(theta)
 
-    return Counted(problem.dimension, problem.residuals, problem.unexplained_at), asked
+    return Counted(problem.dimension, problem.residuals, problem.outlier_share_at), asked
 
 
 def test_one_step_solves_a_linear_problem_and_the_next_is_the_last():

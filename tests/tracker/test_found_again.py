@@ -4,7 +4,7 @@ import pytest
 
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import flexpad, nurbs, posed, rigid
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 
 
@@ -21,7 +21,7 @@ from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simu
 )
 def test_what_left_and_came_back_is_tracked_anew(scene, model, error_mm):
     simulation = simulate(f"simulated://{scene}?seed=2&leave=2,3")
-    tracking = Tracking(rig_of(simulation), default_plan(model=model))
+    tracking = TrackingSession(rig_of(simulation), default_plan(model=model))
     steps = list(drive(tracking, simulation, range(45, 185)))
     away, after = steps[25:40], steps[-40:]
     assert {step.estimate.status for step in away} == {Status.LOST}

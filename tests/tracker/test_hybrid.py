@@ -5,7 +5,7 @@ import pytest
 
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracker.optimizers.base import Budget, Outcome, Stop
-from tests.tracker.problems import Known, linear, two_wells
+from tests.tracker.problems import Known, linear, minimize, two_wells
 
 FAR = np.array([1.5, -1.5, 1.5, -1.5])
 NEAR = linear(np.full(4, 0.2), np.geomspace(1, 100, 4))
@@ -17,12 +17,12 @@ def search(seed: int = 1, **settings: object) -> hybrid.Hybrid:
 
 def follow(optimizer, problem: Known, limit: int = 10**6) -> tuple[Outcome, Budget]:
     budget = Budget(limit, lambda: True)
-    return optimizer.follow(problem, np.zeros(4), budget), budget
+    return minimize(problem, optimizer.follow(problem, np.zeros(4), budget), budget), budget
 
 
 def explore(optimizer, problem: Known) -> tuple[Outcome, Budget]:
     budget = Budget(10**6, lambda: True)
-    return optimizer.explore(problem, np.zeros(4), budget), budget
+    return minimize(problem, optimizer.explore(problem, np.zeros(4), budget), budget), budget
 
 
 def test_what_is_near_is_descended_to():
@@ -77,7 +77,11 @@ def test_the_budget_bounds_both():
 def test_exploring_finds_what_following_does_not(module):
     problem = two_wells(1.5 * FAR)
     optimizer = module.Settings().build(4, np.random.default_rng(3))
-    narrow = module.Settings(step=0.01).build(4, np.random.default_rng(3)) if module is not hybrid else search(far=0.9)
+    narrow = (
+        module.Settings(step=0.01).build(4, np.random.default_rng(3))
+        if module is not hybrid
+        else search(fallback_above=0.9)
+    )
     stayed, _ = follow(narrow, problem)
     assert np.linalg.norm(stayed.theta) < 0.5
     found, _ = explore(optimizer, problem)

@@ -207,8 +207,8 @@ def test_only_inliers_and_what_is_in_free_space_are_linearized():
     assert np.abs(linear.residual[:inliers]).max() < 0.2
     fit = term.fit(surface)
     assert fit.inliers == inliers
-    assert fit.visible + fit.hidden == len(mesh.vertices)
-    assert fit.hidden > 0.6 * np.count_nonzero(pixels[:, 0] < 320)  # the half without returns, but for its rim
+    assert fit.visible + fit.occluded == len(mesh.vertices)
+    assert fit.occluded > 0.6 * np.count_nonzero(pixels[:, 0] < 320)  # the half without returns, but for its rim
     assert fit.samples == np.count_nonzero(pixels[:, 0] >= 320)
     assert fit.normalized_residual < 0.2
 

@@ -22,7 +22,7 @@ from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
 from tests import reference
-from tests.tracker.driving import Tracking, default_plan, drive, mean_errors, rig_of, simulate
+from tests.tracker.driving import TrackingSession, default_plan, drive, mean_errors, rig_of, simulate
 from tests.tracker.scenes import CAMERA, as_surface, in_sight, sheet, sparse
 from tests.tracker.test_kernels import decided
 
@@ -131,6 +131,6 @@ def test_a_board_with_sharp_edges_does_not_slide():
     for px in (0.0, 0.2):
         board = simulate("simulated://board?seed=1")
         plan = default_plan(model=rigid.Settings(), objective=likelihood.Settings(misplacement_px=px))
-        errors.append(mean_errors(list(drive(Tracking(rig_of(board), plan), board, range(150))))[0])
+        errors.append(mean_errors(list(drive(TrackingSession(rig_of(board), plan), board, range(150))))[0])
     print(f"vertex error {errors[0]:.2f} mm without and {errors[1]:.2f} mm with misplacement")
     assert errors[1] < min(2, 0.9 * errors[0])

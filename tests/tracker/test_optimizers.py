@@ -3,29 +3,29 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.optimizers.cma import Cma
-from abs_service.tracker.optimizers.cma_es import FORGOTTEN, CmaEs
-from abs_service.tracker.optimizers.search.evolution import Strategy, usual_population
+from abs_service.tracker.optimizers.cma import PycmaSampler
+from abs_service.tracker.optimizers.cma_es import FORGOTTEN, CmaEsSampler
+from abs_service.tracker.optimizers.search.ask_and_tell import Sampler, default_population
 
 
-@pytest.fixture(params=[Cma, CmaEs], ids=["cma", "cma_es"])
+@pytest.fixture(params=[PycmaSampler, CmaEsSampler], ids=["cma", "cma_es"])
 def make(request):
     """A strategy from seed, dimension, least step, population and step."""
 
     def strategy(seed: int = 1, dimension: int = 6, least: float = 0.5, population: int = 0, step: float = 1.0):
-        population = population or usual_population(dimension)
+        population = population or default_population(dimension)
         return request.param(dimension, np.random.default_rng(seed), least, population, step)
 
     return strategy
 
 
-def begin(strategy: Strategy) -> None:
+def begin(strategy: Sampler) -> None:
     """A frame in which Θ is ξ."""
     dimension = len(strategy.mean)
     strategy.restart(np.zeros(dimension), np.eye(dimension))
 
 
-def minimize(strategy: Strategy, cost, generations: int) -> list[np.ndarray]:
+def minimize(strategy: Sampler, cost, generations: int) -> list[np.ndarray]:
     means = []
     for _ in range(generations):
         strategy.tell(cost(strategy.ask()))
@@ -78,7 +78,7 @@ def test_the_first_candidates_deviate_by_the_step(make):
     assert abs(candidates.mean()) < 0.02
 
 
-def spread(strategy: Strategy) -> np.ndarray:
+def spread(strategy: Sampler) -> np.ndarray:
     """Deviations of the candidates along the axes, in units of the step."""
     return np.std([row for _ in range(400) for row in strategy.ask()], axis=0) / strategy.deviation
 
@@ -91,13 +91,13 @@ def test_a_new_frame_begins_at_the_prediction_with_what_is_kept_of_the_covarianc
     assert learnt[0] / learnt[-1] > 10  # the ellipsoid's axes differ by a factor of 100
     strategy.restart(TARGET, np.eye(6))
     np.testing.assert_array_equal(strategy.mean, TARGET)
-    forgotten = FORGOTTEN if isinstance(strategy, CmaEs) else 0.0
+    forgotten = FORGOTTEN if isinstance(strategy, CmaEsSampler) else 0.0
     np.testing.assert_allclose(spread(strategy), np.sqrt((1 - forgotten) * learnt**2 + forgotten), rtol=0.15)
 
 
 def test_long_searches_leave_the_next_frame_free_to_move():
     """The cost of a frame is rough: what a long search learns of that must not keep the next one where it is."""
-    strategy = CmaEs(12, np.random.default_rng(1), 0.5, 16, 1.0)
+    strategy = CmaEsSampler(12, np.random.default_rng(1), 0.5, 16, 1.0)
     for seed in range(10):
         begin(strategy)
         rough = np.random.default_rng(seed).normal(0, 3, 12)

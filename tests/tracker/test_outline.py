@@ -147,7 +147,7 @@ def test_free_space_right_beside_the_outline_is_held_against_no_vertex(outline_p
     term.observe(depth_image(picture(by=-2e-3)), moved(MESH, 0.0))
     fit = term.fit(moved(MESH, 0.0))
     assert (fit.inliers == fit.visible) == (outline_px > 0)
-    assert fit.hidden == 0
+    assert fit.occluded == 0
 
 
 def test_the_likelihood_has_it_by_a_key():

@@ -4,8 +4,15 @@ import pytest
 
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.status import Settings, judge
+from abs_service.tracker.terms.base import SensorFit
 
 SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
+
+
+def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
+    """A sensor in which shares of 10 000 vertices are occluded, and of the others inliers."""
+    visible = round(10_000 * (1 - occluded))
+    return SensorFit("tof", visible, 10_000 - visible, visible, round(inliers * visible), 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -22,16 +29,16 @@ SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
     ],
 )
 def test_status_and_reasons(share, missing, status, reasons):
-    assert judge(share, 0.0, missing, SETTINGS) == (status, reasons)
+    assert judge([fit(share)], missing, SETTINGS) == (status, reasons)
 
 
 def test_a_lost_object_names_every_reason():
-    status, reasons = judge(0.1, 0.0, ("color",), SETTINGS)
+    status, reasons = judge([fit(0.1)], ("color",), SETTINGS)
     assert status == Status.LOST
     assert len(reasons) == 2
 
 
 def test_a_mostly_hidden_object_is_degraded_even_if_the_rest_agrees():
-    assert judge(1.0, 0.5, (), SETTINGS) == (Status.TRACKING, ())
-    reason = "62% of the vertices are hidden from the sensor that sees most of them"
-    assert judge(1.0, 0.62, (), SETTINGS) == (Status.DEGRADED, (reason,))
+    assert judge([fit(1.0, 0.5)], (), SETTINGS) == (Status.TRACKING, ())
+    reason = "62% of the vertices are occluded in the sensor that sees most of them"
+    assert judge([fit(1.0, 0.62), fit(1.0, 0.9)], (), SETTINGS) == (Status.DEGRADED, (reason,))

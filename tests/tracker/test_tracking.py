@@ -9,7 +9,7 @@ from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
-from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup import warm_up
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.view import View
@@ -21,8 +21,8 @@ RIG = rig_of(SHEET)
 MOVING = range(45, 55)
 
 
-def tracking(**changes: object) -> Tracking:
-    return Tracking(RIG, default_plan(**changes))
+def tracking(**changes: object) -> TrackingSession:
+    return TrackingSession(RIG, default_plan(**changes))
 
 
 def without_sheet(k: int, frames: list[Frame]) -> list[Frame]:
@@ -172,7 +172,7 @@ def test_the_search_stops_when_its_evaluations_are_used_up():
 
 def test_a_rigid_board_is_followed_by_a_rigid_model():
     board = simulate("simulated://board?seed=1")
-    steps = list(drive(Tracking(rig_of(board), default_plan(model=rigid.Settings())), board, range(25, 65)))
+    steps = list(drive(TrackingSession(rig_of(board), default_plan(model=rigid.Settings())), board, range(25, 65)))
     assert {step.estimate.status for step in steps} == {Status.TRACKING}
     assert steps[-1].estimate.theta.shape == (6,)
     assert np.abs(steps[-1].estimate.theta).max() > 5e-3  # it did move
@@ -194,7 +194,7 @@ def test_warming_up_leaves_nothing_to_compile_and_no_trace():
 def error_over_300_exposures(uri: str, **changes: object) -> float:
     simulation = simulate(uri)
     plan = default_plan(optimizer=cma_es.Settings(), **changes)
-    steps = list(drive(Tracking(rig_of(simulation), plan), simulation, range(300)))
+    steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, range(300)))
     vertex_mm, surface_mm = mean_errors(steps)
     objective = type(changes.get("objective", CONFIG.trackers["sheet"].objective)).__module__.rpartition(".")[2]
     print(f"{uri} {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")

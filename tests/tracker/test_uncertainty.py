@@ -5,16 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.posterior.covariance import propagated, remaining, sandwich
+from abs_service.tracker.posterior.covariance import propagated, sandwich, uncorrected_variance
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
 from evaluation.method.posterior import coverage
+from tests.tracker.driving import frame_set, posterior_of
 from tests.tracker.scenes import CAMERA, plane_distance, sheet
-from tests.tracker.test_tracking import MOVING, SHEET, drive, tracking
+from tests.tracker.test_tracking import MOVING, RIG, SHEET, drive, tracking
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -37,7 +39,7 @@ def test_what_remains_of_the_meshs_own_errors_is_that_of_the_definition(seed):
     jacobian, response = generator.standard_normal((7, 3, 6)), generator.standard_normal((6, 7))
     normals, deviation = generator.standard_normal((7, 3)), generator.uniform(0.1, 1, 7)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    found = remaining(normals, deviation, jacobian, response)
+    found = uncorrected_variance(normals, deviation, jacobian, response)
     for v in range(7):
         expected = 0.0
         for w in range(7):
@@ -54,7 +56,7 @@ def test_least_squares_corrects_the_projection_of_the_meshs_own_errors_and_leave
     jacobian = np.zeros((9, 3, 4))
     jacobian[:, 2] = heights
     response = -np.linalg.inv(heights.T @ heights) @ heights.T * 0.5
-    found = remaining(np.tile([0.0, 0.0, 1.0], (9, 1)), np.full(9, 0.5), jacobian, response)
+    found = uncorrected_variance(np.tile([0.0, 0.0, 1.0], (9, 1)), np.full(9, 0.5), jacobian, response)
     projection = heights @ np.linalg.pinv(heights)
     np.testing.assert_allclose(found, 0.25 * (1 - np.diag(projection)), rtol=1e-6, atol=1e-9)
 
@@ -88,18 +90,20 @@ def test_the_search_answers_each_vertex_s_own_error_as_it_answers_a_motion_of_it
     """JᵀJE by the derivatives of all residuals by all vertices, which would take a frame's time to make."""
     one = tracking(vertices=120)
     *_, step = drive(one, SHEET, [0, 1])
-    assert one._tracker is not None
-    posterior, model, theta = one._tracker._posterior, one._tracker.model, step.estimate.theta
+    assert one.model is not None
+    model, theta, exposed = one.model, step.estimate.theta, SHEET.expose(1)[0]
+    posterior = posterior_of(model, RIG, exposed)
+    frame = posterior.observe(Observer(RIG).observe(frame_set(exposed, 1)))
     offsets = np.random.default_rng(1).normal(0, 1e-3, step.estimate.vertices.shape)
     surface, n = model.deform(theta[None]), len(offsets)
-    alone = np.zeros((n, 3, n))
-    alone[np.arange(n), :, np.arange(n)] = offsets
+    single = np.zeros((n, 3, n))
+    single[np.arange(n), :, np.arange(n)] = offsets
     by_theta, by_offset = (
-        stack(posterior._objective.linearize(surface, sparse_jacobian), sparse_jacobian.dimension).jacobian
-        for sparse_jacobian in (model.sparse_jacobian(theta), SparseJacobian.from_dense(alone))
+        stack(posterior.objective.linearize(surface, jacobian), jacobian.dimension).jacobian
+        for jacobian in (model.sparse_jacobian(theta), SparseJacobian.from_dense(single))
     )
     expected = by_theta.T @ by_offset
-    np.testing.assert_allclose(posterior.answers(theta, offsets), expected, atol=1e-9 * np.abs(expected).max())
+    np.testing.assert_allclose(frame.cross_curvature(theta, offsets), expected, atol=1e-9 * np.abs(expected).max())
 
 
 def test_what_the_mesh_did_not_know_stays_with_its_vertices_when_they_are_sorted():

@@ -186,7 +186,7 @@ def test_behind_an_occluder_no_motion_pays():
     assert np.ptp(costs[0]) < 5
     assert np.ptp(costs[1]) > 20
     fit = term_before(covered).fit(slides[0])
-    assert fit.hidden > 0.6 * len(MESH.vertices)
+    assert fit.occluded > 0.6 * len(MESH.vertices)
     assert fit.inliers >= 0.9 * fit.visible
 
 
@@ -232,15 +232,15 @@ def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera(
     before, cost = term.fit(surface), term.cost(surface)[0]
     term.hide(points)
     after = term.fit(surface)
-    assert before.hidden == 0
+    assert before.occluded == 0
     low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)
     place = camera.project(MESH.vertices)
     inside = np.all((place > low + 0.5) & (place < high - 0.5), axis=1)
     near = np.all((place > low - 3) & (place < high + 3), axis=1)
     assert np.count_nonzero(inside) > 5
-    assert np.count_nonzero(inside) <= after.hidden <= np.count_nonzero(near)
+    assert np.count_nonzero(inside) <= after.occluded <= np.count_nonzero(near)
     assert term.cost(surface)[0] == pytest.approx(
-        cost - after.hidden * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
+        cost - after.occluded * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
     )
 
 

@@ -17,7 +17,7 @@ from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
 from abs_service.tracking.noise_monitor import NoiseMonitor
-from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.session import TrackingSession, streams
 from drivers.contract.frame import Kind
 from drivers.encoding import codec
 from tests.bus.loopback import LoopbackBus
@@ -39,7 +39,7 @@ class Bench:
         self.health = Health(self.bus, "track/sheet", self.headers)
         frames = FrameSubscriber(self.bus, MEMBERS)
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
-        self.tracking = Tracking(RIG, default_plan(optimizer=cma.Settings(generations=2)))
+        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2)))
         self.live = LiveTracker(
             self.tracking,
             self.sets,

@@ -7,7 +7,7 @@ import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.loss_monitor import LossMonitor, Settings
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind
 from tests.tracker.driving import default_plan, drive, rig_of, simulate
 from tests.tracker.scenes import sheet
@@ -75,7 +75,7 @@ def without_object(k: int, frames: list[Frame]) -> list[Frame]:
 
 def test_a_returning_object_is_reinitialized_with_a_new_mesh():
     plan = dataclasses.replace(default_plan(), reinitialization=Settings(after_s=0.3, every_s=0.1))
-    tracking = Tracking(rig_of(SHEET), plan)
+    tracking = TrackingSession(rig_of(SHEET), plan)
     # In between it has moved for three seconds, so that the last estimate is no good start.
     exposures = [*range(50), *range(140, 160)]
     steps = []
@@ -93,7 +93,7 @@ def test_a_returning_object_is_reinitialized_with_a_new_mesh():
 
 
 def test_reinitialize_makes_a_new_mesh_in_the_next_frame():
-    tracking = Tracking(rig_of(SHEET), default_plan())
+    tracking = TrackingSession(rig_of(SHEET), default_plan())
     versions = []
     for k, step in enumerate(drive(tracking, SHEET, range(6))):
         assert step.estimate.status == Status.TRACKING

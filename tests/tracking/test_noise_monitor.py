@@ -12,7 +12,7 @@ from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma
 from abs_service.tracker.terms.base import SensorFit
 from abs_service.tracking.noise_monitor import MINIMUM_INLIER_SHARE, MINIMUM_RESIDUALS, WINDOW_NS, NoiseMonitor
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from tests.bus.loopback import LoopbackBus
 from tests.tracker.driving import default_plan, drive, rig_of, simulate
 from tests.tracking.test_estimate_messages import ESTIMATE
@@ -122,7 +122,7 @@ def test_an_objective_without_noise_models_causes_no_warning():
 def watched(uri, **changes):
     """Health after one window of the demo rig, whose noise model is that of noise=1."""
     simulation = simulate(uri)
-    tracking = Tracking(rig_of(simulation), default_plan(optimizer=cma.Settings(generations=2), **changes))
+    tracking = TrackingSession(rig_of(simulation), default_plan(optimizer=cma.Settings(generations=2), **changes))
     bench = MonitorBench()
     for step in drive(tracking, simulation, range(32)):
         bench.monitor.add(step.estimate)

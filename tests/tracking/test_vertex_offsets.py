@@ -87,7 +87,7 @@ def test_without_random_walk_or_model_offsets_the_offsets_are_fixed():
 
 @pytest.mark.slow
 def test_filtered_offsets_reduce_the_surface_error_of_a_simulated_sheet():
-    from abs_service.tracking.session import Tracking
+    from abs_service.tracking.session import TrackingSession
     from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
 
     simulation = simulate("simulated://sheet?seed=1")
@@ -95,7 +95,9 @@ def test_filtered_offsets_reduce_the_surface_error_of_a_simulated_sheet():
         mean_errors(
             list(
                 drive(
-                    Tracking(rig_of(simulation), replace(default_plan(), vertex_offsets=offsets)), simulation, range(90)
+                    TrackingSession(rig_of(simulation), replace(default_plan(), vertex_offsets=offsets)),
+                    simulation,
+                    range(90),
                 )
             )[30:]
         )

@@ -78,7 +78,7 @@ def test_real_frames_need_no_kernel_that_the_warm_up_did_not_prepare(parts):
 def test_a_noise_map_that_is_smaller_than_the_nominal_image_does_no_harm(monkeypatch):
     statuses = []
 
-    class Recorded(warmup.Tracking):
+    class Recorded(warmup.TrackingSession):
         def track(self, frames, in_time):
             statuses.append((estimate := super().track(frames, in_time)).status)
             return estimate

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.rectangle_fit import find_sheet
 from abs_service.tracker.detection.sheet_mesh import Sheet
-from abs_service.tracker.fused_cost import Step, deforming
 from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
 from abs_service.tracker.models.parts import bends
 from abs_service.tracker.models.parts.bends import bend, roll, slopes
@@ -110,10 +109,6 @@ class FlexPad:
         vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
         self._deform(thetas, *self._arguments, vertices, normals)
         return Surface(vertices, normals)
-
-    def step(self) -> Step:
-        """The same for a chain."""
-        return deforming(self._deform, self._points.shape[1], self._arguments)
 
     @property
     def _arguments(self) -> tuple[Any, ...]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import binding, spline
@@ -119,10 +118,6 @@ class Nurbs:
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
         return self._patches.deform(thetas)
-
-    def step(self) -> Step:
-        """The same for a chain."""
-        return self._patches.step()
 
     def add_offsets(self, by: NDArray[np.float64]) -> None:
         """Adds lengths (n,) [m] to the offsets of the vertices along their normals, at rest and deformed."""

@@ -1,13 +1,13 @@
 """What an objective is: how badly a deformed mesh explains the measurements."""
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker.fused_cost import Step, available, step_of
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import SensorFit, Term
@@ -36,7 +36,7 @@ class Objective(Protocol):
 
         Args:
             surface: the deformed mesh.
-            sparse_jacobian: derivative of the vertices with respect to theta.
+            sparse_jacobian: how its vertices move with the parameters.
         """
         ...
 
@@ -65,17 +65,9 @@ class TermSum:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
-        total = np.zeros(len(surface.vertices))
-        for term in self._active:
-            total += term.cost(surface)
-        return total
-
-    def step(self) -> Step | None:
-        """The same for one candidate of a chain, if all terms can be parts of it; sensors come and go in it."""
-        steps = [(term in self._active, step) for term in self._terms if (step := step_of(term))]
-        if len(steps) < len(self._terms):
-            return None
-        return steps[0][1] if len(self._active) == len(steps) == 1 else available(steps)
+        if not self._active:
+            return np.zeros(len(surface.vertices))
+        return reduce(np.add, (term.cost(surface) for term in self._active))
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
         """All sensors' normalised residuals and their derivatives."""

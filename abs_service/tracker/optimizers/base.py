@@ -1,6 +1,10 @@
-"""What an optimiser is: a search for the minimum of a frame's cost, within a budget."""
+"""The optimiser interface: a search asks for the cost of candidates and returns the best theta within a budget.
 
-from collections.abc import Callable
+A search is a generator: it yields candidates (ask), is sent their costs (tell), and returns an `Outcome`. The tracker
+drives it (`abs_service.tracker.tracker`), so every optimiser has the same loop. `cma.py` is the one to copy.
+"""
+
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -8,12 +12,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.posterior.curvature import Quadratic
+
+#: Costs (population,) [nats] of candidates (population, dim).
+Costs = NDArray[np.float64]
 
 
 class Problem(Protocol):
-    """The cost of a frame over Θ: the negative logarithm of likelihood times priors.
+    """The cost of one frame near a theta: derivatives for the searches that use them.
 
     Attributes:
         dimension: number of parameters.
@@ -21,32 +27,23 @@ class Problem(Protocol):
 
     dimension: int
 
-    @property
-    def judge(self) -> Step | None:
-        """What one candidate costs, as a step that takes parameters (1, dim); None if only `cost` can tell."""
-        ...
-
-    def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Cost (population,) of every row of `thetas` (population, dim), in nats."""
-        ...
-
     def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
-        """The cost near theta (dim,)."""
+        """Gauss–Newton approximation of the cost near theta (dim,)."""
         ...
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
-        """The part of the cost near theta (dim,) that no measurement has a say in."""
+        """Gauss–Newton approximation of the priors alone near theta (dim,)."""
         ...
 
-    def unexplained(self, theta: NDArray[np.float64]) -> float:
-        """Share of the measurements that their noise does not explain at theta (dim,), 0…1."""
+    def outlier_share(self, theta: NDArray[np.float64]) -> float:
+        """Share of the visible vertices, 0…1, that do not agree with their measurement at theta (dim,)."""
         ...
 
 
 class Stop(StrEnum):
-    """Why a search ended."""
+    """Reason for the end of a search."""
 
-    NOTHING = "nothing"  # there was nothing to search for
+    NOTHING = "nothing"  # no search
     CONVERGED = "converged"
     GENERATIONS = "generations"
     EVALUATIONS = "evaluations"
@@ -54,15 +51,15 @@ class Stop(StrEnum):
 
 
 class Budget:
-    """What a frame may take, and what it has taken so far.
+    """Evaluations and time of one frame, and what was used of them.
 
     Args:
-        limit: how often the cost may be computed; a generation that has begun is completed.
-        in_time: whether there is time for more.
+        limit: maximum number of cost evaluations; a generation that has begun is completed.
+        in_time: False when the time is up.
 
     Attributes:
-        generations: of populations, and steps of descents.
-        evaluations: how often the cost was computed.
+        generations: of populations, and accepted steps of descents.
+        evaluations: number of cost evaluations.
     """
 
     def __init__(self, limit: int, in_time: Callable[[], bool]):
@@ -71,18 +68,8 @@ class Budget:
         self._limit = limit
         self._in_time = in_time
 
-    def spend(self, evaluations: int, generations: int = 0) -> None:
-        """Enters what was done."""
-        self.evaluations += evaluations
-        self.generations += generations
-
-    @property
-    def left(self) -> int:
-        """How often the cost may still be computed."""
-        return max(0, self._limit - self.evaluations)
-
     def exhausted(self) -> Stop | None:
-        """Why there must not be more; None if there may."""
+        """Reason to stop; None while there is budget."""
         if self.evaluations >= self._limit:
             return Stop.EVALUATIONS
         return None if self._in_time() else Stop.TIME
@@ -90,13 +77,13 @@ class Budget:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
-        theta: the parameters (dim,) of least cost.
-        cost: what they cost [nats].
-        searcher: what found them: "levenberg_marquardt", "cma", "cma_es".
-        stop: why it ended.
+        theta: the parameters (dim,) of minimum cost.
+        cost: their cost [nats].
+        searcher: "levenberg_marquardt", "cma" or "cma_es".
+        stop: reason for the end.
         deviation: step size at the end, in deviations of the posterior.
     """
 
@@ -107,17 +94,20 @@ class Outcome:
     deviation: float
 
 
-#: A search of a problem that begins at parameters (dim,).
-Search = Callable[[Problem, NDArray[np.float64], Budget], Outcome]
+#: Yields candidates (population, dim), receives their costs (population,), returns the outcome.
+Search = Generator[NDArray[np.float64], Costs, Outcome]
+
+#: Starts a search of a problem at parameters (dim,).
+StartSearch = Callable[[Problem, NDArray[np.float64], Budget], Search]
 
 
 class Optimizer(Protocol):
-    """A search that is asked frame after frame."""
+    """A search for every frame; what it learns in one frame starts the next."""
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        """Searches near start (dim,), where the last frames say that the object is."""
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """Warm start: searches near the predicted parameters (dim,)."""
         ...
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        """Searches wherever the priors allow around start (dim,), for an object that nothing is known of yet."""
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """Cold start: searches wherever the priors allow around start (dim,)."""
         ...

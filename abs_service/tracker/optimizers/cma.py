@@ -1,4 +1,7 @@
-"""CMA-ES by its authors' library, pycma: the reference search; too slow to be live in more than a few dimensions."""
+"""CMA-ES by its authors' library, pycma: the reference, and the optimiser to copy.
+
+Too slow for live tracking in more than a few dimensions.
+"""
 
 import warnings
 from dataclasses import dataclass
@@ -7,43 +10,41 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Problem
-from abs_service.tracker.optimizers.search.convergence import Course
-from abs_service.tracker.optimizers.search.evolution import (
-    Evolution,
-    EvolutionSettings,
+from abs_service.tracker.optimizers.base import Costs
+from abs_service.tracker.optimizers.search.ask_and_tell import (
+    AskAndTell,
+    AskAndTellSettings,
     Schedule,
-    advance_by_one,
-    usual_population,
+    default_population,
 )
 
 
 @dataclass(frozen=True)
-class Settings(EvolutionSettings):
+class Settings(AskAndTellSettings):
     """TOML keys of the search."""
 
-    def build(self, dimension: int, generator: np.random.Generator) -> Evolution:
+    def build(self, dimension: int, generator: np.random.Generator) -> AskAndTell:
         """A search in `dimension` dimensions that draws from `generator`."""
-        make = partial(Cma, dimension, generator, self.least_step)
-        population = self.population or usual_population(dimension)
-        return Evolution(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
+        make = partial(PycmaSampler, dimension, generator, self.least_step)
+        population = self.population or default_population(dimension)
+        return AskAndTell(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
 
 
-class Cma:
-    """Step size and covariance of one frame start the next; see `Strategy` for the interface.
+class PycmaSampler:
+    """A `Sampler`: pycma. Step size and covariance of one frame start the next.
 
     Args:
         dimension: of Θ.
         generator: source of all randomness.
-        least_step: the step size never starts a frame below this.
+        least_step: minimum step size at the start of a frame.
         population: candidates per generation.
-        step: standard deviation of the first candidates.
+        step: initial standard deviation of the candidates.
     """
 
     def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
-        with warnings.catch_warnings():  # pycma regrets that it cannot plot
+        with warnings.catch_warnings():  # pycma warns that it cannot plot
             warnings.simplefilter("ignore")
-            from cma import CMAEvolutionStrategy  # noqa: PLC0415  # imports a second's worth of statistics
+            from cma import CMAEvolutionStrategy  # noqa: PLC0415  # importing it takes a second
         self._steps = least_step, step
         options = {
             "randn": lambda *shape: generator.standard_normal(shape),
@@ -63,7 +64,7 @@ class Cma:
 
     @property
     def mean(self) -> NDArray[np.float64]:
-        """Centre (dim,) of the current distribution."""
+        """Mean (dim,) of the current distribution."""
         return self._origin + self._metric @ np.asarray(self._search.mean, np.float64)
 
     def restart(self, origin: NDArray[np.float64], metric: NDArray[np.float64]) -> None:
@@ -77,10 +78,6 @@ class Cma:
         self._asked = self._search.ask()
         return self._origin + np.asarray(self._asked) @ self._metric.T
 
-    def tell(self, costs: NDArray[np.float64]) -> None:
-        """Learns the costs (population,) of the candidates that `ask` returned."""
+    def tell(self, costs: Costs) -> None:
+        """Updates the distribution with the costs (population,) of the last candidates."""
         self._search.tell(self._asked, costs.tolist())
-
-    def advance(self, problem: Problem, course: Course, budget: Budget) -> None:
-        """One generation."""
-        advance_by_one(self, problem, course, budget)

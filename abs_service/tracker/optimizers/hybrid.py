@@ -1,4 +1,4 @@
-"""A descent where the last frame's solution is near, CMA-ES where the likelihood says that it is not."""
+"""Levenberg–Marquardt from the prediction; CMA-ES over the priors when too many measurements become outliers."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -8,23 +8,23 @@ import numpy as np
 from annotated_types import Ge, Gt, Interval
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Outcome, Problem
-from abs_service.tracker.optimizers.cma_es import CmaEs
-from abs_service.tracker.optimizers.search.evolution import (
+from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Search
+from abs_service.tracker.optimizers.cma_es import CmaEsSampler
+from abs_service.tracker.optimizers.search.ask_and_tell import (
     SIGNIFICANT,
-    Make,
+    MakeSampler,
     Schedule,
-    evolve,
+    default_population,
     explore,
-    usual_population,
+    sample,
 )
 from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
 
-#: Step size with which CMA-ES goes on in the next frame, at least, as a share of the first one.
+#: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
 LEAST_STEP = 0.5
 
-#: Weight of a frame in what is usual.
+#: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
 
 
@@ -33,16 +33,15 @@ class Settings:
     """TOML keys of the search.
 
     Attributes:
-        steps: of the descent per frame at most.
-        tolerance: the descent ends with a step that promises less than this per parameter [nats]; the noise of a frame
-            throws the estimate by ½.
-        population: candidates per generation of CMA-ES; 0 lets it choose 4 + 3 ln dim.
-        generations: generations per frame at most, where CMA-ES takes over.
-        step: standard deviation of its first candidates, in deviations of the priors.
-        far: CMA-ES takes over when the descent leaves so much more of the measurements unexplained, as a share of all,
-            than lately.
-        near: it hands back when the share is less than this above that of lately.
-        restarts: how often the population may double in the first frame, where the object is searched for widely.
+        steps: maximum number of steps of the descent per frame.
+        tolerance: the descent ends with a step whose predicted decrease per parameter is less than this [nats]; the
+            noise of a frame moves the estimate by ½.
+        population: candidates per generation of CMA-ES; 0: 4 + 3 ln dim, its default.
+        generations: maximum number of generations per frame of CMA-ES.
+        step: initial standard deviation of its candidates, in deviations of the priors.
+        fallback_above: CMA-ES starts when the outlier share after the descent exceeds its running mean by this.
+        fallback_until: CMA-ES continues in the next frames until the excess is below this.
+        restarts: maximum number of times that the population doubles in the first frame.
     """
 
     steps: Annotated[int, Ge(1)] = 12
@@ -50,69 +49,68 @@ class Settings:
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 25
     step: Annotated[float, Gt(0)] = 1.0
-    far: Annotated[float, Interval(gt=0, lt=1)] = 0.03
-    near: Annotated[float, Interval(gt=0, lt=1)] = 0.015
+    fallback_above: Annotated[float, Interval(gt=0, lt=1)] = 0.03
+    fallback_until: Annotated[float, Interval(gt=0, lt=1)] = 0.015
     restarts: Annotated[int, Ge(0)] = 3
 
     def build(self, dimension: int, generator: np.random.Generator) -> "Hybrid":
         """A search in `dimension` dimensions that draws from `generator`."""
-        # It samples so rarely that nobody should wait for the compiler because of that.
-        make = partial(CmaEs, dimension, generator, LEAST_STEP * self.step, at_once=1)
-        return Hybrid(self, make, self.population or usual_population(dimension))
+        make = partial(CmaEsSampler, dimension, generator, LEAST_STEP * self.step)
+        return Hybrid(self, make, self.population or default_population(dimension))
 
 
 class Hybrid:
-    """See `Optimizer` for the interface.
+    """An `Optimizer`: descent first, sampling as a fallback.
 
     Args:
         settings: its settings.
-        make: makes the strategies that sample.
+        make: makes samplers.
         population: candidates per generation.
     """
 
-    def __init__(self, settings: Settings, make: Make, population: int):
+    def __init__(self, settings: Settings, make: MakeSampler, population: int):
         self._settings = settings
         self._make = make
         self._population = population
-        self._strategy = make(population, settings.step)
+        self._sampler = make(population, settings.step)
         self._schedule = Schedule("cma_es", settings.generations, SIGNIFICANT)
-        self._usual = 1.0
-        self._searching = False
+        self._mean_outliers = 1.0
+        self._in_fallback = False
 
-    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        """Descends; where that explains less than lately, samples what the priors allow and descends from there."""
-        found = self._descend(problem, start, budget)
-        unexplained = problem.unexplained(found.theta)
-        limit = self._settings.near if self._searching else self._settings.far
-        if unexplained > self._usual + limit:
-            found = self._take_over(problem, start, found, budget)
-            unexplained = problem.unexplained(found.theta)
-        self._learn(unexplained)
+    def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """Descends; with too many outliers, samples the priors and descends from the result."""
+        found = yield from self._descend(problem, start, budget)
+        outliers = problem.outlier_share(found.theta)
+        limit = self._settings.fallback_until if self._in_fallback else self._settings.fallback_above
+        if outliers > self._mean_outliers + limit:
+            found = yield from self._fall_back(problem, start, found, budget)
+            outliers = problem.outlier_share(found.theta)
+        self._update_mean(outliers)
         return found
 
-    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
-        """Descends, and samples the priors with growing populations for something better."""
+    def explore(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
+        """Descends, then samples the priors with growing populations."""
         restarts = self._settings.restarts
-        found = explore(problem, start, self._descend, self._make, self._population, restarts, budget)
-        self._usual = problem.unexplained(found.theta)
+        found = yield from explore(problem, start, self._descend, self._make, self._population, restarts, budget)
+        self._mean_outliers = problem.outlier_share(found.theta)
         return found
 
-    def _descend(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Outcome:
+    def _descend(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         tolerance = self._settings.tolerance * problem.dimension
         return descend(problem, start, self._settings.steps, tolerance, budget)
 
-    def _take_over(self, problem: Problem, start: NDArray[np.float64], near: Outcome, budget: Budget) -> Outcome:
-        """The better of what the descent found and of what CMA-ES finds, with a descent from there."""
-        if not self._searching:
-            self._strategy = self._make(self._population, self._settings.step)
+    def _fall_back(self, problem: Problem, start: NDArray[np.float64], descended: Outcome, budget: Budget) -> Search:
+        """The better of the descent and of CMA-ES followed by a descent."""
+        if not self._in_fallback:
+            self._sampler = self._make(self._population, self._settings.step)
         metric = search_metric(problem.prior(start))
-        sampled = evolve(problem, start, np.inf, metric, self._strategy, self._schedule, budget)
-        polished = self._descend(problem, sampled.theta, budget)
-        if polished.cost < near.cost - SIGNIFICANT:
+        sampled = yield from sample(start, np.inf, metric, self._sampler, self._schedule, budget)
+        polished = yield from self._descend(problem, sampled.theta, budget)
+        if polished.cost < descended.cost - SIGNIFICANT:
             return replace(sampled, theta=polished.theta, cost=polished.cost)
-        return near
+        return descended
 
-    def _learn(self, unexplained: float) -> None:
-        """What is usual follows slowly; a worse state that lasts becomes usual, so that a search in vain ends."""
-        self._searching = unexplained > self._usual + self._settings.near
-        self._usual += MEMORY * (unexplained - self._usual)
+    def _update_mean(self, outliers: float) -> None:
+        """Updates the running mean; a higher share that lasts becomes the mean, which ends a fallback in vain."""
+        self._in_fallback = outliers > self._mean_outliers + self._settings.fallback_until
+        self._mean_outliers += MEMORY * (outliers - self._mean_outliers)

@@ -89,7 +89,7 @@ def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np
     return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
 
 
-def remaining(
+def uncorrected_variance(
     normals: NDArray[np.float64],
     deviation: NDArray[np.float64],
     jacobian: NDArray[np.float64],

@@ -5,7 +5,6 @@ from bisect import bisect_left
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from calib.jit import kernel, prange
 
 #: A run's length is a multiple of this, and the compiler knows it: two vectors of eight, so nothing is left over that
@@ -55,10 +54,6 @@ class EdgeRuns:
         _sum_squares(vertices, self.runs, self.singles, self._inverse_lengths, factor, out)
         return out
 
-    def step(self, factor: float) -> Step:
-        """The same for one candidate of a chain."""
-        return Step(_judge, (self.runs, self.singles, self._inverse_lengths, factor))
-
 
 def _blocks(edges: NDArray[np.int64], vertices: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Covers the edges (k, 2) of every offset by blocks of `_LANES` vertices, where enough are close together.
@@ -103,20 +98,6 @@ def _sum_squares(
     """What `_sum_of_squares` says of every member of a population, (population, 3, n) [m]."""
     for k in prange(vertices.shape[0]):
         out[k] = _sum_of_squares(vertices[k], runs, singles, inverse_lengths, factor)
-
-
-@kernel
-def _judge(
-    thetas: NDArray[np.float64],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    runs: NDArray[np.int64],
-    singles: NDArray[np.int32],
-    inverse_lengths: NDArray[np.float32],
-    factor: float,
-) -> float:
-    """See `EdgeRuns.step`."""
-    return _sum_of_squares(vertices[0], runs, singles, inverse_lengths, factor)
 
 
 @kernel

@@ -7,7 +7,6 @@ import numpy as np
 from annotated_types import Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
@@ -47,10 +46,6 @@ class ShapePrior:
         out = np.empty(len(thetas))
         _half_squares(thetas, self._rest, self._prior, out)
         return out
-
-    def step(self) -> Step:
-        """The same for one candidate of a chain."""
-        return Step(_judge_shape, (self._rest, self._prior))
 
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives, which are constant."""
@@ -101,10 +96,6 @@ class MotionPrior:
         _half_squares_of_each(thetas, self.predicted, self._inverse_deviation, out)
         return out
 
-    def step(self) -> Step:
-        """The same for one candidate of a chain."""
-        return Step(_judge_motion, (self.predicted, self._inverse_deviation))
-
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives."""
         return Linearization((theta - self.predicted) * self._inverse_deviation, np.diag(self._inverse_deviation))
@@ -112,30 +103,6 @@ class MotionPrior:
     def _told(self) -> NDArray[np.float64]:
         """Inverse deviation (dim,) of the parameters around the predicted ones."""
         return 1 / (self._scales * self._settings.speed * self._elapsed_s)
-
-
-@kernel
-def _judge_shape(
-    thetas: NDArray[np.float64],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    rest: NDArray[np.float64],
-    prior: NDArray[np.float64],
-) -> float:
-    """See `ShapePrior.step`."""
-    return _half_square(thetas[0], rest, prior)
-
-
-@kernel
-def _judge_motion(
-    thetas: NDArray[np.float64],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    predicted: NDArray[np.float64],
-    inverse_deviation: NDArray[np.float64],
-) -> float:
-    """See `MotionPrior.step`."""
-    return _half_square_of_each(thetas[0], predicted, inverse_deviation)
 
 
 @kernel

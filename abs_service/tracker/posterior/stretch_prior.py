@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.edge_runs import EdgeRuns
@@ -24,10 +23,6 @@ class StretchPrior:
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Negative log-density (population,) of the edge lengths, up to a constant."""
         return self._runs.sum_squares(surface.vertices, 0.5 * self._inverse_deviation**2)
-
-    def step(self) -> Step:
-        """The same for one candidate of a chain."""
-        return self._runs.step(0.5 * self._inverse_deviation**2)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linearization]:
         """The edges' normalised residuals of a population of one; those between groups of vertices in one part."""

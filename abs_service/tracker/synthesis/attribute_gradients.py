@@ -5,10 +5,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye, constant, first_order
+from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
@@ -74,10 +73,6 @@ class AttributeGradients(Protocol):
         """
         ...
 
-    def step(self, values: NDArray[np.float32]) -> Step:
-        """The same for one candidate of a chain, from its vertices and pixels."""
-        ...
-
 
 class Constant:
     """Around a vertex everything is taken to look like the vertex, for want of anything better."""
@@ -94,10 +89,6 @@ class Constant:
     ) -> NDArray[np.float32]:
         """The values themselves (1, n, channels)."""
         return values[None]
-
-    def step(self, values: NDArray[np.float32]) -> Step:
-        """The values themselves."""
-        return Step(constant, (values[None],))
 
 
 CONSTANT = Constant()
@@ -142,10 +133,6 @@ class FirstOrder:
         to_centers = at_centers_fisheye if self._is_fisheye else at_centers
         to_centers(surface.vertices, pixel, *self._optics, values, self._per_pixel, result)
         return result
-
-    def step(self, values: NDArray[np.float32]) -> Step:
-        """The same for one candidate of a chain, from its vertices and pixels."""
-        return Step(first_order, (self._is_fisheye, *self._optics, values, self._per_pixel))
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:

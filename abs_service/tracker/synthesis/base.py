@@ -1,13 +1,12 @@
 """What a synthesis is: samples of deformed meshes as a sensor would see them, and images that fit them."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.window import Window
@@ -32,18 +31,6 @@ class Synthesis:
     attributes: NDArray[np.float32]
 
 
-class Sight(NamedTuple):
-    """What a view sees of one candidate of a chain.
-
-    Attributes:
-        see: from vertices and normals to pixels and distances, as in `Synthesis`.
-        look: from vertices and pixels to attributes.
-    """
-
-    see: Step
-    look: Step
-
-
 class View(Protocol):
     """A mesh through one camera.
 
@@ -62,10 +49,6 @@ class View(Protocol):
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population of deformed meshes."""
-        ...
-
-    def sight(self) -> Sight | None:
-        """The same for one candidate of a chain; none unless the samples are the vertices."""
         ...
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:

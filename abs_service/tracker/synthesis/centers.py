@@ -9,35 +9,6 @@ from calib.jit import composed, kernel, prange
 
 
 @kernel
-def constant(
-    vertices: NDArray[np.float32], pixel: NDArray[np.int32], values: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """The values (1, n, channels)."""
-    return values
-
-
-@kernel
-def first_order(
-    vertices: NDArray[np.float32],
-    pixel: NDArray[np.int32],
-    is_fisheye: bool,
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    stride: int,
-    values: NDArray[np.float32],
-    slopes: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """What either of the following says, for a chain: with a choice of the lens, of which any may come."""
-    result = np.empty((pixel.shape[0], pixel.shape[1], values.shape[1]), np.float32)
-    if is_fisheye:
-        at_centers_fisheye(vertices, pixel, pose, matrix, lens, stride, values, slopes, result)
-    else:
-        at_centers(vertices, pixel, pose, matrix, lens, stride, values, slopes, result)
-    return result
-
-
-@kernel
 def at_centers(
     vertices: NDArray[np.float32],
     pixel: NDArray[np.int32],

@@ -39,31 +39,6 @@ def lens_kind(lens: LensModel) -> int:
 
 
 @kernel
-def see(
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    kind: int,
-    hidden: NDArray[np.bool_],
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    height: int,
-    width: int,
-) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Pixels and distances (population, n), for a chain: with a choice of the lens, of which any may come."""
-    pixel = np.empty((vertices.shape[0], vertices.shape[2]), np.int32)
-    distance = np.empty(pixel.shape, np.float32)
-    if kind == PINHOLE:
-        _sample_pinhole(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
-    elif kind == DISTORTED:
-        _sample(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
-    else:
-        _sample_fisheye(vertices, normals, hidden, pose, matrix, lens, limit, height, width, pixel, distance)
-    return pixel, distance
-
-
-@kernel
 def _sample(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.attribute_gradients import (
@@ -16,10 +15,10 @@ from abs_service.tracker.synthesis.attribute_gradients import (
     half_pixel,
     surroundings,
 )
-from abs_service.tracker.synthesis.base import Sight, Synthesis, View
+from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.sampling import lens_kind, sampler, see
+from abs_service.tracker.synthesis.sampling import sampler
 from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
 from calib.rig import Rig
@@ -122,11 +121,6 @@ class SparseView:
         distance = np.empty((population, n), np.float32)
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
         return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, surface, pixel))
-
-    def sight(self) -> Sight:
-        """What one candidate of a chain shows."""
-        seeing = Step(see, (lens_kind(self.camera.lens), self._hidden, *self._optics))
-        return Sight(seeing, self._gradients.step(self._attributes))
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """As where the surface was expected."""

@@ -38,7 +38,7 @@ class SensorFit:
     Attributes:
         sensor: its name.
         visible: vertices that face the sensor and lie inside its image, with nothing before them that is known of.
-        hidden: vertices behind the mesh's own surface, behind something else, or where the sensor has a hole.
+        occluded: vertices behind the mesh's own surface, behind something else, or where the sensor has a hole.
         samples: of these, how many met a measurement.
         inliers: of these, how many the measurement's own noise explains.
         mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if that is what the objective sums.
@@ -48,7 +48,7 @@ class SensorFit:
 
     sensor: str
     visible: int
-    hidden: int
+    occluded: int
     samples: int
     inliers: int
     mean_log_likelihood: float
@@ -58,7 +58,7 @@ class SensorFit:
 def summarize(
     sensor: str,
     visible: NDArray[np.bool_],
-    hidden: NDArray[np.bool_],
+    occluded: NDArray[np.bool_],
     measured: NDArray[np.bool_],
     residual: NDArray[np.float64],
     mean_log_likelihood: float,
@@ -70,8 +70,8 @@ def summarize(
 
     Args:
         sensor: its name.
-        visible, hidden, measured: whether a vertex is in sight, whether something hides it, and whether there is a
-            measurement of it.
+        visible, occluded, measured: masks of the vertices that are in sight, behind something, and have a
+            measurement.
         residual: size of each residual in its deviations, the root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
         channels: values that a measurement consists of.
@@ -82,7 +82,7 @@ def summarize(
     return SensorFit(
         sensor,
         visible=int(np.count_nonzero(visible)),
-        hidden=int(np.count_nonzero(hidden)),
+        occluded=int(np.count_nonzero(occluded)),
         samples=int(np.count_nonzero(measured)),
         inliers=int(np.count_nonzero(inlier)),
         mean_log_likelihood=mean_log_likelihood,
@@ -94,6 +94,15 @@ def inlier_share(fits: Sequence[SensorFit]) -> float:
     """Share of the vertices visible to any sensor that agree with their measurement; 0 if none is visible."""
     visible = sum(fit.visible for fit in fits)
     return sum(fit.inliers for fit in fits) / visible if visible else 0.0
+
+
+def occluded_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the vertices that are occluded in the sensor that sees most of them; 0 without a sensor.
+
+    A light barrier, whose single sample is no vertex, is ignored.
+    """
+    shares = [fit.occluded / (fit.occluded + fit.visible) for fit in fits if fit.occluded + fit.visible > 1]
+    return min(shares, default=0.0)
 
 
 class Term(Protocol):

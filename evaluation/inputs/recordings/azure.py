@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.models import nurbs
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib.camera import Camera
 from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
@@ -93,7 +93,7 @@ def findings(folder: Path) -> Findings:
     noises = {"depth": Constant(SIGMA_M), "color": GaussianColor(15.0)}
     rig = Rig("azure", {name: Sensor(name, exposure.cameras[name], noise) for name, noise in noises.items()})
     plan = demo_plan(nurbs.Settings((6, 6)), reference="depth", region=nearest.Settings(least_pixels=3000))
-    tracking = Tracking(rig, plan)
+    tracking = TrackingSession(rig, plan)
     estimate = [tracking.track(_again(exposure, k), lambda: True) for k in range(3)][-1]
     if tracking.mesh is None:
         raise RuntimeError(", ".join(estimate.reasons))

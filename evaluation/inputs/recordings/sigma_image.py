@@ -16,7 +16,7 @@ from abs_service.tracker.detection.depth_segments import connected_surfaces
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib.camera import Camera
 from calib.noise import constant, measured
 from calib.noise.base import DepthNoise
@@ -148,7 +148,7 @@ def _rendered(exposure: O3rExposure, noise: DepthNoise, label: int) -> NDArray[n
     """Radial distances (height, width) [m] of the mesh that the tracker makes of a surface; NaN beside it."""
     rig = Rig("o3r", {SENSOR: Sensor(SENSOR, exposure.camera, noise)})
     plan = demo_plan(MODEL, reference=SENSOR, region=_Surface(label), vertices=300, optimizer=SEARCH)
-    tracking, frames = Tracking(rig, plan), {frame.key: frame for frame in exposure.frames.values()}
+    tracking, frames = TrackingSession(rig, plan), {frame.key: frame for frame in exposure.frames.values()}
     estimate = tracking.track(FrameSet(0, exposure.frames[Kind.DEPTH].t_host_ns, frames), lambda: True)
     if tracking.mesh is None:
         raise RuntimeError(f"surface {label}: {', '.join(estimate.reasons)}")

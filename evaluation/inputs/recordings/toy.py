@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from abs_service import config, wiring
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.warmup import warm_up
 from calib.camera import Camera
 from drivers.contract.frame import FrameSet, Kind
@@ -89,9 +89,9 @@ class Toy:
         """Time limit of the live search for a frame set [ms]."""
         return self._settings.trackers[TRACKER].budget_ms
 
-    def tracking(self) -> Tracking:
+    def tracking(self) -> TrackingSession:
         """A new tracker."""
-        return Tracking(self._rig, wiring.plan(self._settings, TRACKER))
+        return TrackingSession(self._rig, wiring.plan(self._settings, TRACKER))
 
     def follow(
         self, clock: Callable[[], int], change: Change = lambda _, frames: frames, budget_ms: float = np.inf

@@ -9,7 +9,7 @@ from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior import priors
-from abs_service.tracking.session import Plan
+from abs_service.tracking.plan import Plan
 from calib.noise.base import DepthNoise
 from calib.noise.constant import Constant
 from calib.noise.tof_amplitude import TofAmplitude

@@ -22,7 +22,8 @@ from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior import priors
 from abs_service.tracker.synthesis import sparse
 from abs_service.tracking import loss_monitor
-from abs_service.tracking.session import OptimizerSettings, Plan, Tracking
+from abs_service.tracking.plan import OptimizerSettings, Plan
+from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.noise.constant import Constant
 from calib.rig import Rig, Sensor
@@ -56,7 +57,7 @@ class Setup:
 
 
 #: A search that never samples: what the descent alone is worth.
-DESCENT = hybrid.Settings(far=0.999, near=0.998)
+DESCENT = hybrid.Settings(fallback_above=0.999, fallback_until=0.998)
 
 #: What the rows are called. 5 × 4 control points of degree 3 can bend to ±120° along the long side without stretching
 #: (0.1 mm off), 4 × 4 of degree 2, the paper's, cannot (0.8 mm off, and 3 % stretched).
@@ -134,7 +135,7 @@ class OwnTracker:
             reinitialization=REINITIALIZATION,
             seed=seed,
         )
-        self._tracking = Tracking(Rig("peers", {"tof": Sensor("tof", CAMERA, Constant(sigma))}), plan)
+        self._tracking = TrackingSession(Rig("peers", {"tof": Sensor("tof", CAMERA, Constant(sigma))}), plan)
         self.estimate: Estimate
         self.track(first)
         mesh = template(first.state) if self._tracking.mesh is None else self._tracking.mesh

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.optimizers import cma_es
-from abs_service.tracking.session import OptimizerSettings
+from abs_service.tracking.plan import OptimizerSettings
 from calib.noise.tof_amplitude import TofAmplitude
 from drivers.contract.frame import Kind
 from evaluation.scenes.exposure import LabeledExposure

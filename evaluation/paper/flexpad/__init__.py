@@ -14,7 +14,7 @@ from abs_service.tracker.models import flexpad
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
-from abs_service.tracking.session import OptimizerSettings
+from abs_service.tracking.plan import OptimizerSettings
 from calib.camera import Camera
 from calib.lens import Lens
 from calib.noise.tof_amplitude import TofAmplitude

@@ -14,7 +14,8 @@ from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior import priors
 from abs_service.tracker.synthesis import sparse
 from abs_service.tracking import loss_monitor
-from abs_service.tracking.session import OptimizerSettings, Plan, Tracking
+from abs_service.tracking.plan import OptimizerSettings, Plan
+from abs_service.tracking.session import TrackingSession
 from calib.noise.base import DepthNoise
 from evaluation.paper.geometries import bound
 from evaluation.paper.geometries.bound import Bound, Priors
@@ -161,7 +162,7 @@ def _bounds(scene: PrintedSheet, job: Job, mean: float) -> dict[str, tuple[Bound
     return {name: tuple(each) for name, each in found.items()}
 
 
-def _tracking(job: Job, variant: Variant, mean: float) -> Tracking:
+def _tracking(job: Job, variant: Variant, mean: float) -> TrackingSession:
     """A tracker; as Euclidean fitness it weighs like the likelihood of one deviation everywhere."""
     weights = 0.5 / mean**2, 0.5 / GREY_DEVIATION**2
     squares = euclidean.Settings(
@@ -181,7 +182,7 @@ def _tracking(job: Job, variant: Variant, mean: float) -> Tracking:
         reinitialization=loss_monitor.Settings(),
         seed=job.seed,
     )
-    return Tracking(rig_of(job.noise), plan)
+    return TrackingSession(rig_of(job.noise), plan)
 
 
 def _errors_mm(control: Array, truth: Array) -> tuple[float, float]:

@@ -35,7 +35,7 @@ class DeformationState(_message.Message):
     STOP_EVALUATIONS: DeformationState.Stop
     STOP_TIME: DeformationState.Stop
     class Sensor(_message.Message):
-        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "hidden")
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "occluded")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
         SEQ_FIELD_NUMBER: _ClassVar[int]
         T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
@@ -45,7 +45,7 @@ class DeformationState(_message.Message):
         MISSING_FIELD_NUMBER: _ClassVar[int]
         DROPPED_FIELD_NUMBER: _ClassVar[int]
         VISIBLE_FIELD_NUMBER: _ClassVar[int]
-        HIDDEN_FIELD_NUMBER: _ClassVar[int]
+        OCCLUDED_FIELD_NUMBER: _ClassVar[int]
         sensor: str
         seq: int
         t_host_ns: int
@@ -55,8 +55,8 @@ class DeformationState(_message.Message):
         missing: bool
         dropped: int
         visible: int
-        hidden: int
-        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., hidden: _Optional[int] = ...) -> None: ...
+        occluded: int
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]

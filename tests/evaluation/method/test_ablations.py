@@ -8,7 +8,7 @@ from abs_service.tracker.optimizers.base import Budget, Optimizer
 from evaluation.experiment import Context
 from evaluation.method import ablations
 from evaluation.method.ablations.cold_start import Cold, Forgetful
-from tests.tracker.problems import linear
+from tests.tracker.problems import linear, minimize
 
 TARGET = np.array([1.0, -2.0])
 
@@ -16,10 +16,11 @@ TARGET = np.array([1.0, -2.0])
 def starts(optimizer: Optimizer) -> list[float]:
     """Evaluations that frames need which begin at the target."""
     problem, needed = linear(TARGET, np.ones(2)), []
-    optimizer.explore(problem, np.zeros(2), Budget(10**6, lambda: True))
+    budget = Budget(10**6, lambda: True)
+    minimize(problem, optimizer.explore(problem, np.zeros(2), budget), budget)
     for _ in range(2):
         budget = Budget(10**6, lambda: True)
-        found = optimizer.follow(problem, TARGET, budget)
+        found = minimize(problem, optimizer.follow(problem, TARGET, budget), budget)
         np.testing.assert_allclose(found.theta, TARGET, atol=1e-3)
         needed.append(budget.generations)
     return needed

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models.base import ModelError
@@ -15,14 +16,14 @@ from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad, Settings
 from abs_service.tracker.models.parts import bends
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib import pose
 from drivers.simulated.scene.motion import Placement
 from drivers.simulated.scene.surface import surface_points
 from drivers.simulated.shapes.rectangle import PlacedRectangle
 from drivers.simulated.simulation import Simulation
 from tests import reference
-from tests.tracker.driving import default_plan, drive, frame_set, mean_errors, rig_of, simulate
+from tests.tracker.driving import default_plan, drive, frame_set, mean_errors, posterior_of, rig_of, simulate
 
 A4 = (0.297, 0.210)
 RADIUS = 0.1
@@ -247,8 +248,8 @@ def standing(simulation: Simulation, **changes: float) -> Simulation:
     return dataclasses.replace(simulation, scene=dataclasses.replace(simulation.scene, surfaces=(Still(body),)))
 
 
-def tracking(simulation: Simulation, model: object = Settings(), **changes: object) -> Tracking:
-    return Tracking(rig_of(simulation), default_plan(model=model, **changes))
+def tracking(simulation: Simulation, model: object = Settings(), **changes: object) -> TrackingSession:
+    return TrackingSession(rig_of(simulation), default_plan(model=model, **changes))
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, 1.0])
@@ -257,15 +258,14 @@ def test_the_truth_is_likelier_than_a_collapsed_sheet(value, collapse):
     """Both explain what is seen of the surface; what they say of the edges' lengths decides."""
     simulation = simulate("simulated://sheet?seed=1")
     bent = standing(simulation, curvature=-value / (2 * RADIUS), direction=0.0, offset=0.0)
-    tracker = tracking(simulation)
-    for k, sequence in enumerate((simulation, bent)):
-        tracker.track(frame_set(sequence.expose(k)[0], k), lambda: True)
-    parts = tracker._tracker
-    assert parts is not None
+    tracker, rig = tracking(simulation), rig_of(simulation)
+    tracker.track(frame_set(flat := simulation.expose(0)[0], 0), lambda: True)
+    assert tracker.model is not None
+    posterior = posterior_of(tracker.model, rig, flat)
+    posterior.observe(Observer(rig).observe(frame_set(bent.expose(1)[0], 1)))
     truth = bend(e=value, w=value)
-    surface = parts.model.deform(np.stack([truth, truth + collapse * COLLAPSED]))
-    posterior = parts._posterior
-    costs = posterior._objective.cost(surface) + posterior._stretch.cost(surface)
+    surface = tracker.model.deform(np.stack([truth, truth + collapse * COLLAPSED]))
+    costs = posterior.objective.cost(surface) + posterior.stretch.cost(surface)
     assert costs[0] < costs[1] - 100
 
 
@@ -278,11 +278,9 @@ def test_a_moving_sheet_is_followed_and_does_not_collapse():
     assert vertex_mm < 2
     assert surface_mm <= vertex_mm
     assert steps[-1].estimate.theta.shape == (15,)
-    parts = tracker._tracker
-    assert parts is not None
-    assert isinstance(parts.model, FlexPad)
+    assert isinstance(tracker.model, FlexPad)
     for step in steps:
-        assert np.abs(stretches(step.estimate.theta, parts.model)).max() < 0.05
+        assert np.abs(stretches(step.estimate.theta, tracker.model)).max() < 0.05
 
 
 def test_a_sheet_that_is_bent_at_first_is_waited_for():

@@ -15,7 +15,7 @@ from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import gravity, posed
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.camera import Camera
 from drivers.simulated.shapes.strip import PlacedStrip
@@ -245,7 +245,7 @@ def test_with_a_fixed_gripper_only_the_bends_are_left():
 
 def test_a_strip_is_tracked_to_the_millimetre():
     simulation = simulate("simulated://strip?seed=2")
-    tracking = Tracking(rig_of(simulation), default_plan(model=gravity.Settings(length_m=0.3)))
+    tracking = TrackingSession(rig_of(simulation), default_plan(model=gravity.Settings(length_m=0.3)))
     steps = list(drive(tracking, simulation, range(25, 45)))
     assert {step.estimate.status for step in steps} == {Status.TRACKING}
     vertex_mm, surface_mm = mean_errors(steps)

@@ -25,7 +25,7 @@ from abs_service.tracker.posterior.priors import MotionPrior
 from abs_service.tracker.posterior.priors import Settings as PriorSettings
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization, stack
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib import pose
 from drivers.simulated.shapes.rectangle import Rectangle
 from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simulate
@@ -152,7 +152,7 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
 
 def test_the_motion_of_a_rigid_board_is_all_pose():
     simulation = simulate("simulated://board?seed=1")
-    tracker = Tracking(rig_of(simulation), default_plan(model=posed.Settings(nurbs.Settings())))
+    tracker = TrackingSession(rig_of(simulation), default_plan(model=posed.Settings(nurbs.Settings())))
     steps = list(drive(tracker, simulation, range(25, 75)))
     assert {step.estimate.status for step in steps} == {Status.TRACKING}
     (board,) = simulation.scene.surfaces
@@ -214,7 +214,7 @@ def test_mistakes_of_the_shape_are_told_with_their_full_key(model, mistake):
 def error_over_150_exposures(uri: str, **changes: object) -> float:
     simulation = simulate(uri)
     plan = default_plan(model=posed.Settings(nurbs.Settings()), optimizer=cma_es.Settings(), **changes)
-    steps = list(drive(Tracking(rig_of(simulation), plan), simulation, range(20, 170)))
+    steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, range(20, 170)))
     vertex_mm, surface_mm = mean_errors(steps)
     objective = "euclidean" if changes else "likelihood"
     print(f"{uri} posed nurbs {objective}: vertex {vertex_mm:.2f} mm, surface {surface_mm:.2f} mm")

@@ -17,7 +17,7 @@ from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Active, Passive
-from abs_service.tracking.session import Tracking
+from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -176,7 +176,7 @@ def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
 @ALL
 def test_a_bending_sheet_is_tracked_through_a_lens(kind):
     simulation = simulate("simulated://sheet?seed=4&lens=0.25")
-    tracking = Tracking(rig_of(simulation), dataclasses.replace(default_plan(), synthesis=kind))
+    tracking = TrackingSession(rig_of(simulation), dataclasses.replace(default_plan(), synthesis=kind))
     steps = list(drive(tracking, simulation, range(0, 64, 4)))
     assert {step.estimate.status for step in steps} == {Status.TRACKING}
     vertex_mm, surface_mm = mean_errors(steps)
@@ -190,7 +190,7 @@ def test_a_sheet_before_a_fisheye_is_tracked_as_well_as_before_a_pinhole(monkeyp
 
     def vertex_mm(uri: str) -> float:
         simulation = simulate(uri)
-        tracking = Tracking(rig_of(simulation), default_plan())
+        tracking = TrackingSession(rig_of(simulation), default_plan())
         steps = list(drive(tracking, simulation, range(0, 64, 4)))
         assert {step.estimate.status for step in steps} == {Status.TRACKING}
         return mean_errors(steps)[0]

@@ -121,7 +121,11 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
                 surface = moved(x + step[0], step[1], 0.3 * step[2])
                 np.testing.assert_array_equal(window.cost(surface), whole.cost(surface))
                 found, wanted = window.fit(surface), whole.fit(surface)
-                assert (found.visible, found.hidden, found.inliers) == (wanted.visible, wanted.hidden, wanted.inliers)
+                assert (found.visible, found.occluded, found.inliers) == (
+                    wanted.visible,
+                    wanted.occluded,
+                    wanted.inliers,
+                )
 
 
 def test_beyond_the_window_nothing_is_explained():

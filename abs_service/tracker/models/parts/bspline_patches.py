@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step, deforming
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.parts import spline
 from abs_service.tracker.models.parts.tile_buffer import LANES, TILE, write
@@ -56,10 +55,6 @@ class Patches:
         vertices, normals = np.empty(shape, np.float32), np.empty(shape, np.float32)
         self._deform(thetas, *self._arguments, vertices, normals)
         return Surface(vertices, normals)
-
-    def step(self) -> Step:
-        """The same for a chain."""
-        return deforming(self._deform, self._vertices.shape[1] - LANES, self._arguments)
 
     @property
     def _arguments(self) -> tuple[NDArray[np.generic], ...]:

@@ -1,4 +1,4 @@
-"""How CMA-ES draws a generation, and what that teaches: rank-one and rank-μ updates (Hansen's tutorial, 2016)."""
+"""Kernels of CMA-ES: sampling, rank-one and rank-μ updates (Hansen: The CMA evolution strategy, a tutorial, 2016)."""
 
 from functools import cache
 from statistics import NormalDist
@@ -10,7 +10,7 @@ from calib.jit import kernel
 
 
 class Constants:
-    """Weights and learning rates for a dimension and a population, in the tutorial's words and equations."""
+    """Weights and learning rates for a dimension and a population, with the equation numbers of the tutorial."""
 
     def __init__(self, dimension: int, population: int):
         n = dimension
@@ -29,21 +29,21 @@ class Constants:
         self.rates = np.array([c_c, c_sigma, c_1, c_mu, d_sigma, mu_eff, expected_length])
 
 
-#: Quantiles of the normal distribution that random bits are looked up among: a power of two.
+#: Number of tabulated quantiles of the normal distribution: a power of two.
 _QUANTILES = 4096
-#: Where the outermost quantiles end; with that, the numbers deviate by 1 to four digits.
+#: Outermost quantiles; with these the standard deviation of the numbers is 1 to four digits.
 _END = 4.0
 
 
 @cache
 def normal_quantiles() -> NDArray[np.float32]:
-    """What `propose` turns random bits into normal numbers with."""
+    """Table from random bits to normal numbers, see `sample_population`."""
     inner = [NormalDist().inv_cdf(i / _QUANTILES) for i in range(1, _QUANTILES)]
     return np.array([-_END, *inner, _END], np.float32)
 
 
 @kernel
-def propose(
+def sample_population(
     bits: NDArray[np.uint16],
     quantiles: NDArray[np.float32],
     axes: NDArray[np.float32],
@@ -52,10 +52,10 @@ def propose(
     z: NDArray[np.float32],
     thetas: NDArray[np.float64],
 ) -> None:
-    """Draws a population.
+    """Draws a population by a table of normal quantiles.
 
-    The library's normal numbers would take as long as all the rest of a generation. Between two quantiles, whose
-    probability is all that counts, there are 16 numbers that are equally likely; nobody needs to know one better.
+    NumPy's normal numbers would take as long as the rest of a generation. Between two quantiles there are 16 equally
+    likely numbers, which is fine enough for a search.
 
     Args:
         bits: random (population · dim,), or more.
@@ -76,7 +76,7 @@ def propose(
 
 
 @kernel
-def update(
+def update_distribution(
     z: NDArray[np.float32],
     axes: NDArray[np.float32],
     costs: NDArray[np.float64],
@@ -88,18 +88,18 @@ def update(
     paths: NDArray[np.float64],
     learnt: NDArray[np.float32],
 ) -> float:
-    """One generation of the tutorial's figure 6; changes mean, paths and what is learnt.
+    """One generation of the tutorial's figure 6; updates mean, paths and covariance in place.
 
     Args:
         z: standard normal numbers (population, dim).
-        axes: what leads from them to Θ, a row for each (dim, dim).
+        axes: maps them to Θ, one row for each (dim, dim).
         costs: of the candidates (population,).
         weights, rates: see `Constants`.
         generation: counts from one.
         sigma: step size.
         mean: (dim,).
         paths: of the step size and of the covariance, in the coordinates of z (2, dim).
-        learnt: the covariance in the coordinates of z (dim, dim).
+        learnt: covariance in the coordinates of z (dim, dim).
 
     Returns:
         The new step size.
@@ -146,7 +146,7 @@ def _learn(
     weighted, n = np.empty_like(steps), steps.shape[1]
     for rank in range(len(steps)):
         step, w = steps[rank], c_mu * weights[rank] if rank < weights.size else c_1
-        if w < 0:  # eq. 46: the longer a bad step, the less is learnt from its length
+        if w < 0:  # eq. 46: negative weights are scaled by the squared length of the step
             square = np.float32(0)
             for i in range(n):
                 square += step[i] * step[i]
@@ -160,16 +160,16 @@ def _learn(
 
 
 @kernel
-def absorb(
+def update_factor(
     learnt: NDArray[np.float32], factor: NDArray[np.float64], path: NDArray[np.float64], axes: NDArray[np.float32]
 ) -> None:
-    """Changes to the coordinates in which what was learnt is the identity.
+    """Changes to the coordinates in which the learnt covariance is the identity.
 
     Args:
-        learnt: the covariance in the old coordinates (dim, dim); then the identity.
-        factor: lower Cholesky factor (dim, dim) of the covariance of ξ when the old coordinates were made, then now.
+        learnt: covariance in the old coordinates (dim, dim); the identity on return.
+        factor: lower Cholesky factor (dim, dim) of the covariance of ξ when the old coordinates were made; updated.
         path: (dim,) in these coordinates.
-        axes: what leads from them to Θ, a row for each (dim, dim).
+        axes: maps them to Θ, one row for each (dim, dim).
     """
     n = path.size
     root, sound = np.zeros((n, n)), True

@@ -1,40 +1,39 @@
-"""The descent of Levenberg and Marquardt, as Nielsen damps it; no search by itself, because it only goes downhill."""
+"""Levenberg–Marquardt descent with Nielsen's damping; a local search."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Stop
+from abs_service.tracker.optimizers.base import Budget, Outcome, Problem, Search, Stop
 from abs_service.tracker.posterior.curvature import Quadratic, solved
 
 NAME = "levenberg_marquardt"
 
-#: Damping after the first step that failed, and its growth with each further one, as a share of the curvature.
+#: Damping after the first failed step, and its growth with each further one, as a share of the curvature.
 FIRST_DAMPING = 0.1
 GROWTH = 10.0
 
 
-def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Outcome:
-    """Goes downhill from start (dim,), one linearisation per step.
+def descend(problem: Problem, start: NDArray[np.float64], iterations: int, tolerance: float, budget: Budget) -> Search:
+    """Descends from start (dim,), one linearisation per accepted step.
 
     Args:
         problem: the cost.
-        start: where to begin (dim,).
-        iterations: steps at most.
-        tolerance: a step that promises a smaller decrease [nats] is the last: what would follow it is less by far.
-        budget: evaluations and time; one step is tried at least.
+        start: initial parameters (dim,).
+        iterations: maximum number of accepted steps.
+        tolerance: a step with a smaller predicted decrease [nats] is the last one.
+        budget: evaluations and time; at least one step is tried.
     """
-    theta, cost = start, float(problem.cost(start[None])[0])
-    budget.spend(1)
+    theta, cost = start, float((yield start[None])[0])
     stop, damping, steps = None, 0.0, 0
     quadratic = problem.linearize(theta)
     while stop is None and steps < iterations:
-        step, promise = _step(quadratic, damping)
-        moved = float(problem.cost((theta + step)[None])[0])
-        better = moved < cost
-        budget.spend(1, generations=int(better))
+        step, decrease = _step(quadratic, damping)
+        cost_after = float((yield (theta + step)[None])[0])
+        better = cost_after < cost
         if better:
-            theta, cost, damping, steps = theta + step, moved, damping / GROWTH, steps + 1
-        stop = Stop.CONVERGED if promise < tolerance else budget.exhausted()
+            theta, cost, damping, steps = theta + step, cost_after, damping / GROWTH, steps + 1
+            budget.generations += 1
+        stop = Stop.CONVERGED if decrease < tolerance else budget.exhausted()
         if not better:
             damping = max(damping * GROWTH, FIRST_DAMPING)
         elif stop is None and steps < iterations:
@@ -43,7 +42,7 @@ def descend(problem: Problem, start: NDArray[np.float64], iterations: int, toler
 
 
 def _step(quadratic: Quadratic, damping: float) -> tuple[NDArray[np.float64], float]:
-    """The damped step (dim,) and the decrease of cost that the quadratic promises for it [nats]."""
+    """Damped step (dim,) and the decrease of cost that the quadratic predicts for it [nats]."""
     damped = quadratic.curvature.copy()
     damped.flat[:: len(damped) + 1] *= 1 + damping
     step = -solved(damped, quadratic.gradient)

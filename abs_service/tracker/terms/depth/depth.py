@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage, Image
-from abs_service.tracker.fused_cost import Step, both
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
@@ -15,7 +14,6 @@ from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
     distances,
-    judge,
     normalize,
     usual_cost,
     write_constants,
@@ -26,7 +24,6 @@ from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
 from calib import pose
 from calib.camera import Camera
-from calib.jit import composed
 from calib.noise.base import DepthNoise, write_texture
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
@@ -124,14 +121,6 @@ class DepthTerm:
         out = np.empty(len(seen.pixel))
         depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
-
-    def step(self) -> Step | None:
-        """The same for one candidate of a chain."""
-        sight, bounds = self._view.sight(), (self._bounds.inlier, self._bounds.outlier)
-        if sight is None:
-            return None
-        measured = Step(composed(judge, see=sight.see.kernel), (self._texture, *bounds, *sight.see.arguments))
-        return both(measured, self._outline.step())
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
         """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""

@@ -1,12 +1,8 @@
 """What samples cost whose distance was measured; textures are as `calib.noise.base.write_texture` makes them."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis import sampling
 from calib.jit import kernel, prange
 from calib.noise.base import WINDOW_M
 
@@ -128,22 +124,3 @@ def _cost_of(
             part += bounded if pixel[v] >= 0 else none
         total += part
     return float(total)
-
-
-#: What `judge` looks through; `composed` puts another in its place.
-see: Callable[..., Any] = sampling.see
-
-
-@kernel
-def judge(
-    thetas: NDArray[np.float64],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    texture: NDArray[np.float32],
-    inlier: float,
-    outlier: float,
-    *seeing: Any,
-) -> float:
-    """What `depth_cost` says of one candidate of a chain, after `see` with the arguments that it takes."""
-    pixel, distance = see(vertices, normals, *seeing)
-    return _cost_of(pixel[0], distance[0], texture, inlier, outlier)

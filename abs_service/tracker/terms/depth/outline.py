@@ -10,12 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import NOTHING, Step
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
-from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, judge, locate
+from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, locate, outline_cost
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
@@ -52,10 +51,6 @@ class Outline(Protocol):
         """Cost (population,) of every deformed mesh."""
         ...
 
-    def step(self) -> Step:
-        """The same for one candidate of a chain."""
-        ...
-
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """Normalised residuals of a population of one and their derivatives, from how the vertices move."""
         ...
@@ -73,10 +68,6 @@ class Unknown:
     def cost(self, surface: Surface) -> float:
         """Nothing."""
         return 0.0
-
-    def step(self) -> Step:
-        """Nothing."""
-        return NOTHING
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """No rows."""
@@ -119,13 +110,9 @@ class RimOutline:
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
-        nothing, step = np.zeros((1, 0)), self.step()
-        each = zip(surface.vertices[:, None], surface.normals[:, None])
-        return np.array([step.kernel(nothing, *member, *step.arguments) for member in each])
-
-    def step(self) -> Step:
-        """The same for one candidate of a chain."""
-        return Step(judge, (self._deviation, *self._arguments))
+        out = np.empty(len(surface.vertices))
+        outline_cost(surface.vertices, self._deviation, *self._arguments, out)
+        return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """Residuals of what is near the outline, and their derivatives."""

@@ -135,10 +135,8 @@ def locate(
 
 
 @kernel
-def judge(
-    thetas: NDArray[np.float64],
+def outline_cost(
     vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
     deviation: float,
     outer: NDArray[np.intp],
     inner: NDArray[np.intp],
@@ -150,15 +148,23 @@ def judge(
     limit: float,
     corner: NDArray[np.float32],
     inwards: NDArray[np.float32],
-) -> float:
-    """Half the squared distances of one candidate's rim from the outline, in deviations [px], each bounded.
+    out: NDArray[np.float64],
+) -> None:
+    """Half the sum of squared, bounded distances of the rim from the outline in units of σ, for a population.
 
-    What comes after the deviation is as in `locate`.
+    Args:
+        vertices: (population, 3, n) [m].
+        deviation: σ [px].
+        outer, inner, beyond, is_fisheye, pose, matrix, lens, limit, corner, inwards: as in `locate`.
+        out: costs (population,) [nats].
     """
-    k, total = outer.size, 0.0
-    points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
+    k = outer.size
     camera = is_fisheye, pose, matrix, lens, limit
-    locate(vertices, outer, inner, beyond, *camera, corner, inwards, points, values, slopes)
-    for v in range(k):
-        total += min((values[v] / deviation) ** 2, FARTHEST**2)
-    return 0.5 * total
+    points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
+    for member in range(vertices.shape[0]):
+        own = vertices[member : member + 1]
+        locate(own, outer, inner, beyond, *camera, corner, inwards, points, values, slopes)
+        total = 0.0
+        for v in range(k):
+            total += min((values[v] / deviation) ** 2, FARTHEST**2)
+        out[member] = 0.5 * total

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ChannelImage, Image
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
@@ -24,7 +23,6 @@ from abs_service.tracker.terms.photometric.channel_cost import (
     fill,
 )
 from abs_service.tracker.terms.photometric.illumination import Illumination
-from abs_service.tracker.terms.photometric.photometric_kernel import judging
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import NO_WIDENING, NOT_AT_ALL, Misplacement
 from calib.noise.base import LOG_SQRT_2PI
@@ -109,11 +107,6 @@ class ChannelTerm:
         out = np.empty(len(seen.pixel))
         channel_cost(seen.pixel, seen.attributes, *self._measured, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
-
-    def step(self) -> Step | None:
-        """The same for one candidate of a chain."""
-        sight = self._view.sight()
-        return judging(sight, channel_cost, self._measured, self._illumination.step()) if sight else None
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:

@@ -4,14 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, Image
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
-from abs_service.tracker.terms.photometric.photometric_kernel import judging
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from abs_service.tracker.terms.photometric.texture_registration_noise import NOT_AT_ALL, Misplacement
 from calib.jit import kernel, prange
@@ -84,11 +82,6 @@ class ColorTerm:
         out = np.empty(len(seen.pixel))
         _color_cost(seen.pixel, seen.attributes, *self._measured, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
-
-    def step(self) -> Step | None:
-        """The same for one candidate of a chain."""
-        sight = self._view.sight()
-        return judging(sight, _color_cost, self._measured) if sight else None
 
     @property
     def _measured(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32], float, float]:

@@ -6,7 +6,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.fused_cost import Step
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.synthesis.base import Synthesis, View
 from calib.jit import kernel
@@ -19,10 +18,6 @@ class Illumination(Protocol):
         """The synthesis of a population with its attributes as they look in this light."""
         ...
 
-    def step(self) -> Step:
-        """From attributes, vertices and normals of one candidate of a chain to attributes."""
-        ...
-
 
 class Passive:
     """The light of the room: a vertex looks the same wherever it is."""
@@ -30,10 +25,6 @@ class Passive:
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis itself."""
         return seen
-
-    def step(self) -> Step:
-        """The attributes themselves."""
-        return AS_IT_IS
 
 
 class Active:
@@ -50,10 +41,6 @@ class Active:
         """The synthesis with reflectivities as bright as they look on each member of the population."""
         shade = lambert(surface, self._center)
         return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[..., None])
-
-    def step(self) -> Step:
-        """The same for one candidate of a chain, whose samples are its vertices."""
-        return Step(_shine, (self._center,))
 
 
 def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -76,31 +63,3 @@ def _lambert(
             square = a * a + b * b + c * c
             along = a * normals[k, 0, v] + b * normals[k, 1, v] + c * normals[k, 2, v]
             shade[k, v] = max(along, np.float32(0)) / (square * np.sqrt(square))
-
-
-@kernel
-def as_it_is(
-    attributes: NDArray[np.float32], vertices: NDArray[np.float32], normals: NDArray[np.float32]
-) -> NDArray[np.float32]:
-    """The attributes themselves."""
-    return attributes
-
-
-#: The step of a light in which everything looks as it is.
-AS_IT_IS = Step(as_it_is)
-
-
-@kernel
-def _shine(
-    attributes: NDArray[np.float32],
-    vertices: NDArray[np.float32],
-    normals: NDArray[np.float32],
-    center: NDArray[np.float32],
-) -> NDArray[np.float32]:
-    """Attributes (1, n, channels) times Lambert's law."""
-    shade, lit = np.empty((1, attributes.shape[1]), np.float32), np.empty(attributes.shape, np.float32)
-    _lambert(vertices, normals, center, shade)
-    for v in range(attributes.shape[1]):
-        for channel in range(attributes.shape[2]):
-            lit[0, v, channel] = attributes[0, v, channel] * shade[0, v]
-    return lit

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import mannwhitneyu
 
-from abs_service.tracker.optimizers.cma import Cma
-from abs_service.tracker.optimizers.cma_es import CmaEs
-from abs_service.tracker.optimizers.search.evolution import Strategy, usual_population
+from abs_service.tracker.optimizers.cma import PycmaSampler
+from abs_service.tracker.optimizers.cma_es import CmaEsSampler
+from abs_service.tracker.optimizers.search.ask_and_tell import Sampler, default_population
 
 DIMENSION = 8
 RUNS = 24
@@ -27,12 +27,12 @@ FUNCTIONS: dict[str, tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]],
 TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(DIMENSION, DIMENSION)))[0]
 
 
-def logarithms(make: Callable[..., Strategy], function: str) -> NDArray[np.float64]:
+def logarithms(make: Callable[..., Sampler], function: str) -> NDArray[np.float64]:
     """Logarithms of the mean's cost and of the step size (runs, 2 · moments) along the way."""
     cost, moments = FUNCTIONS[function]
     found = np.zeros((RUNS, 2 * len(moments)))
     for run in range(RUNS):
-        strategy = make(DIMENSION, np.random.default_rng([run, 7]), 0.5, usual_population(DIMENSION), 0.5)
+        strategy = make(DIMENSION, np.random.default_rng([run, 7]), 0.5, default_population(DIMENSION), 0.5)
         column = 0
         for generation in range(1, moments[-1] + 1):
             strategy.tell(cost(strategy.ask()))
@@ -45,7 +45,7 @@ def logarithms(make: Callable[..., Strategy], function: str) -> NDArray[np.float
 @pytest.mark.slow
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_costs_and_step_sizes_are_distributed_as_pycma_s(function):
-    ours, theirs = logarithms(CmaEs, function), logarithms(Cma, function)
+    ours, theirs = logarithms(CmaEsSampler, function), logarithms(PycmaSampler, function)
     p = [mannwhitneyu(a, b).pvalue for a, b in zip(ours.T, theirs.T)]
     print(
         function, "medians", np.median(ours, axis=0).round(2), np.median(theirs, axis=0).round(2), "p", np.round(p, 3)

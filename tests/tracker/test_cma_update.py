@@ -5,17 +5,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from abs_service.tracker.optimizers.search.cma_update import Constants, absorb, normal_quantiles, propose, update
+from abs_service.tracker.optimizers.search.cma_update import (
+    Constants,
+    normal_quantiles,
+    sample_population,
+    update_distribution,
+    update_factor,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 few = settings(max_examples=25, deadline=None)
 
 
 def drawn(seed: int, population: int, dimension: int) -> np.ndarray:
-    """Normal numbers as `propose` draws them."""
+    """Normal numbers as `sample_population` draws them."""
     bits = np.random.default_rng(seed).bit_generator.random_raw((population * dimension + 3) // 4).view(np.uint16)
     z, thetas = np.zeros((population, dimension), np.float32), np.empty((population, dimension))
-    propose(bits, normal_quantiles(), np.eye(dimension, dtype=np.float32), 1.0, np.zeros(dimension), z, thetas)
+    sample_population(
+        bits, normal_quantiles(), np.eye(dimension, dtype=np.float32), 1.0, np.zeros(dimension), z, thetas
+    )
     return z[:population, :dimension]
 
 
@@ -36,7 +44,7 @@ def test_candidates_are_the_mean_and_steps_along_the_axes(seed):
     axes, mean, sigma = generator.normal(size=(n, n)).astype(np.float32), generator.normal(size=n), generator.random()
     bits = generator.integers(0, 2**16, population * n, dtype=np.uint16)
     rows, thetas = np.zeros((population, n), np.float32), np.empty((population, n))
-    propose(bits, normal_quantiles(), axes, sigma, mean, rows, thetas)
+    sample_population(bits, normal_quantiles(), axes, sigma, mean, rows, thetas)
     z = rows[:population, :n]
     place = (bits + 0.5) / 2**16 * (len(normal_quantiles()) - 1)
     expected = np.interp(place, np.arange(len(normal_quantiles())), normal_quantiles()).reshape(population, n)
@@ -67,7 +75,7 @@ def test_a_generation_teaches_what_the_tutorial_says(seed):
     wanted = kept * learnt + c_1 * np.outer(p_c, p_c) + c_mu * (ranked.T * shares) @ ranked
     mean_wanted = mean + 0.3 * best @ axes
     taught = learnt.copy()
-    sigma = update(z, axes, costs, w, constants.rates, g, 0.3, mean, paths, taught)
+    sigma = update_distribution(z, axes, costs, w, constants.rates, g, 0.3, mean, paths, taught)
     np.testing.assert_allclose(mean, mean_wanted, atol=1e-5)
     np.testing.assert_allclose(paths, [p_sigma, p_c], atol=1e-5)
     np.testing.assert_allclose(taught, wanted, atol=1e-4)
@@ -85,7 +93,7 @@ def test_new_coordinates_describe_the_same_covariance_path_and_axes(seed):
     path, axes = generator.normal(size=n), (metric @ factor).T.astype(np.float32)
     covariance, place = factor @ learnt @ factor.T, factor @ path
     rest = learnt.astype(np.float32)
-    absorb(rest, factor, path, axes)
+    update_factor(rest, factor, path, axes)
     np.testing.assert_array_equal(rest, np.eye(n))
     np.testing.assert_allclose(factor @ factor.T, covariance, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(np.triu(factor, 1), 0, atol=1e-12)
@@ -96,6 +104,6 @@ def test_new_coordinates_describe_the_same_covariance_path_and_axes(seed):
 def test_what_rounding_made_indefinite_keeps_the_deviations_of_the_axes():
     learnt = np.array([[4.0, 3.0], [3.0, 1.0]], np.float32)
     factor, path, axes = np.eye(2), np.ones(2), np.eye(2, dtype=np.float32)
-    absorb(learnt, factor, path, axes)
+    update_factor(learnt, factor, path, axes)
     np.testing.assert_allclose(factor, np.diag([2, 1]))
     np.testing.assert_allclose(path, [0.5, 1])

@@ -1,0 +1,52 @@
+"""Noise of the mesh itself: its vertices were placed by one noisy image."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.posterior.covariance import uncorrected_variance
+from abs_service.tracker.posterior.curvature import Quadratic, posterior_covariance
+
+
+class Linearizable(Protocol):
+    """The cost of a frame, as far as `MeshNoise` needs it; see `FramePosterior`."""
+
+    def linearize(self, theta: NDArray[np.float64]) -> Quadratic:
+        """Gauss–Newton approximation of the cost near theta (dim,)."""
+        ...
+
+    def cross_curvature(self, theta: NDArray[np.float64], offsets: NDArray[np.float64]) -> NDArray[np.float64]:
+        """JᵀJE (dim, n)."""
+        ...
+
+
+class MeshNoise:
+    """The part of the vertices' initial errors along their normals that theta does not correct.
+
+    Computed once per mesh, because it hardly changes with the deformation; on the second frame, because in the first
+    nothing may have moved and the priors keep theta from correcting anything.
+
+    Args:
+        model: the deformation model; its mesh has a deviation per vertex.
+
+    Attributes:
+        variance: along the normals (n,) [m²]; before `update`, that of the mesh.
+    """
+
+    def __init__(self, model: DeformationModel):
+        self.variance = np.broadcast_to(model.mesh.deviation**2, len(model.mesh.vertices))
+        self._model = model
+        self._updated = not np.any(model.mesh.deviation)
+
+    def update(self, frame: Linearizable, theta: NDArray[np.float64]) -> None:
+        """Computes the variance at theta (dim,) of the second frame; later calls change nothing."""
+        if self._updated:
+            return
+        self._updated = True
+        normals = self._model.deform(theta[None]).normals[0].T.astype(np.float64)
+        deviation = np.broadcast_to(self._model.mesh.deviation, len(normals))
+        inverse = posterior_covariance(frame.linearize(theta))
+        response = -inverse @ frame.cross_curvature(theta, normals * deviation[:, None])
+        self.variance = uncorrected_variance(normals, deviation, self._model.jacobian(theta), response)

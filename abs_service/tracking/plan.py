@@ -1,0 +1,128 @@
+"""The parts of one tracker, and a tracker made of them from the first observation of its object."""
+
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from abs_service.pairing.observation import Observation
+from abs_service.tracker import status
+from abs_service.tracker.detection.initial_detection import InitialDetection
+from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.objectives.base import Objective
+from abs_service.tracker.optimizers.base import Optimizer
+from abs_service.tracker.posterior import priors
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracker.posterior.priors import MotionPrior, ShapePrior
+from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.synthesis.base import Synthesizer
+from abs_service.tracker.terms.photometric.appearance import dressed
+from abs_service.tracker.tracker import Tracker
+from abs_service.tracking import loss_monitor
+from abs_service.tracking.vertex_offsets import Settings as VertexOffsetSettings
+from calib.rig import Rig
+
+
+class ModelSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.models`."""
+
+    @property
+    def board(self) -> tuple[float, float]:
+        """Width and height [m] of a flat board from which `build` makes a model; used by the warm-up."""
+        ...
+
+    def build(self, detection: InitialDetection) -> DeformationModel:
+        """The model of a detected object."""
+        ...
+
+
+class ObjectiveSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.objectives`."""
+
+    def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> Objective:
+        """The objective of a mesh in a rig."""
+        ...
+
+
+class SynthesisSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.synthesis`."""
+
+    def build(self, rig: Rig, mesh: Mesh) -> Synthesizer:
+        """The synthesis of a mesh for the sensors of a rig."""
+        ...
+
+
+class OptimizerSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.optimizers`."""
+
+    def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
+        """A search that draws from `generator`."""
+        ...
+
+
+class RegionSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.detection.regions`."""
+
+    def build(self) -> Region:
+        """The region."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The settings of all parts of a tracker.
+
+    Attributes:
+        reference: sensor whose depth image gives the initial mesh.
+        model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
+        evaluations: maximum number of cost evaluations per frame.
+        vertices: approximate number of vertices of the mesh.
+        priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
+        seed: of the search; equal seeds and frame sets give equal estimates.
+    """
+
+    reference: str
+    model: ModelSettings
+    region: RegionSettings
+    synthesis: SynthesisSettings
+    objective: ObjectiveSettings
+    optimizer: OptimizerSettings
+    evaluations: int
+    vertices: int
+    priors: priors.Settings
+    status: status.Settings
+    reinitialization: loss_monitor.Settings
+    vertex_offsets: VertexOffsetSettings = field(default_factory=VertexOffsetSettings)
+    seed: int = 0
+
+
+def make_posterior(plan: Plan, rig: Rig, model: DeformationModel, observation: Observation) -> tuple[Posterior, Mesh]:
+    """Likelihood and priors of a model, and its mesh with the appearance that the observation shows."""
+    synthesizer = plan.synthesis.build(rig, model.mesh)
+    mesh = replace(
+        dressed(model.mesh, observation.images, rig),
+        appearance=dressed(synthesizer.canvas, observation.images, rig).appearance,
+    )
+    posterior = Posterior(
+        model,
+        plan.objective.build(rig, mesh, synthesizer),
+        StretchPrior(mesh, plan.priors.stretch),
+        ShapePrior(model.rest, model.prior),
+        MotionPrior(model.rest, model.scales, plan.priors),
+    )
+    return posterior, mesh
+
+
+def make_tracker(plan: Plan, rig: Rig, detection: InitialDetection, observation: Observation) -> tuple[Tracker, Mesh]:
+    """A tracker of the detected object, and its mesh.
+
+    Raises:
+        DetectionError: the model finds no object of its kind.
+        ModelError: the model cannot be made of the object.
+    """
+    model = plan.model.build(detection)
+    posterior, mesh = make_posterior(plan, rig, model, observation)
+    optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
+    return Tracker(model, posterior, optimizer, plan.evaluations, plan.status), mesh
