@@ -4,6 +4,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable
 from concurrent.futures import Future
+from importlib.metadata import entry_points
 from pathlib import Path
 from threading import Thread
 from types import ModuleType
@@ -30,8 +31,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         DeviceError: the driver cannot open the device now.
     """
     scheme = urlsplit(uri).scheme
-    modules = {module.name for module in pkgutil.iter_modules(drivers.__path__)}
-    driver = _driver(scheme) if scheme in modules else None
+    driver = _driver(scheme) if scheme in _modules() else None
     if driver is None:
         raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
     return driver.open_device(uri, clock)
@@ -48,7 +48,7 @@ def open_recording(program: str, path: Path) -> ForeignRecording:
 
 def available() -> list[str]:
     """Schemes of all drivers; imports every module of this package, which by contract imports no device SDK."""
-    return [module.name for module in pkgutil.iter_modules(drivers.__path__) if _driver(module.name)]
+    return [scheme for scheme in _modules() if _driver(scheme)]
 
 
 def discover(timeout_s: float) -> list[Found]:
@@ -67,7 +67,7 @@ def _search(scheme: str, timeout_s: float) -> Future[list[Found]]:
 
     def run() -> None:
         try:
-            result.set_result(importlib.import_module(f"drivers.{scheme}").discover(timeout_s))
+            result.set_result(importlib.import_module(_modules()[scheme]).discover(timeout_s))
         except Exception as error:
             result.set_exception(error)
 
@@ -85,6 +85,12 @@ def _result(scheme: str, search: Future[list[Found]], timeout_s: float) -> list[
     return [Found(DeviceInfo(f"{scheme}://", scheme, ""), Availability.FAULTY, reason, "please report this")]
 
 
+def _modules() -> dict[str, str]:
+    """Modules by scheme: of this package, and of installed distributions (entry points of the group `drivers`)."""
+    own = {module.name: f"{drivers.__name__}.{module.name}" for module in pkgutil.iter_modules(drivers.__path__)}
+    return own | {point.name: point.value for point in entry_points(group=drivers.__name__)}
+
+
 def _driver(scheme: str) -> ModuleType | None:
-    module = importlib.import_module(f"drivers.{scheme}")
+    module = importlib.import_module(_modules()[scheme])
     return module if hasattr(module, "open_device") and module.__name__ != __name__ else None

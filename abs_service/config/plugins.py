@@ -1,9 +1,14 @@
-"""Exchangeable parts: `type = "nurbs"` names the module whose dataclass `Settings` takes the rest of the table."""
+"""Exchangeable parts: `type = "nurbs"` names the module whose dataclass `Settings` takes the rest of the table.
+
+The modules are those of a package such as `abs_service.tracker.models`, and those that installed distributions declare
+as entry points of the group of that name (docs/extending.md).
+"""
 
 import json
 import pkgutil
 from dataclasses import fields, replace
 from importlib import import_module
+from importlib.metadata import distributions, entry_points
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +18,8 @@ from abs_service.config.problems import Problem, ProblemsError, allowed_instead,
 
 
 def available(package: str) -> list[str]:
-    """The values of `type` that name a module with `Settings` in a package; imports all of its modules."""
-    return sorted(name for name in _modules(package) if _is_part(package, name))
+    """The values of `type` that name a module with `Settings`; imports all modules of the package."""
+    return sorted({name for name in _modules(package) if _is_part(package, name)} | set(_installed(package)))
 
 
 def load(package: str, table: Any, base: Path) -> Any:
@@ -34,9 +39,11 @@ def load(package: str, table: Any, base: Path) -> Any:
             [Problem((), f"must be a table such as {example}; types: {', '.join(available(package))}", table)]
         )
     name = table["type"]
-    if name not in _modules(package) or not _is_part(package, name):
+    own = name in _modules(package) and _is_part(package, name)
+    module = f"{package}.{name}" if own else _installed(package).get(name)
+    if module is None:
         raise ProblemsError([Problem(("type",), f"no such type, {allowed_instead(name, available(package))}", name)])
-    return settings(f"{package}.{name}", {key: value for key, value in table.items() if key != "type"}, base)
+    return settings(module, {key: value for key, value in table.items() if key != "type"}, base)
 
 
 def settings(module: str, table: Any, base: Path) -> Any:
@@ -84,9 +91,17 @@ def _is_part(package: str, name: str) -> bool:
     return hasattr(import_module(f"{package}.{name}"), "Settings")
 
 
+def _installed(package: str) -> dict[str, str]:
+    """Modules by name that installed distributions declare for a package."""
+    return {point.name: point.value for point in entry_points(group=package)}
+
+
 def table(made: Any) -> dict[str, Any]:
     """The TOML table that `load` makes the same settings from."""
-    return {"type": type(made).__module__.rpartition(".")[2], **plain(made)}
+    module = type(made).__module__
+    installed = () if module.startswith(("abs_service.", "calib.")) else distributions()
+    names = (point.name for one in installed for point in one.entry_points if point.value == module)
+    return {"type": next(names, module.rpartition(".")[2]), **plain(made)}
 
 
 def plain(made: Any) -> dict[str, Any]:
