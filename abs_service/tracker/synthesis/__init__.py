@@ -1,1 +1,1 @@
-"""How deformed meshes are made comparable with images, one way per file; a rig file names them with `type`."""
+"""Synthesis methods: deformed meshes projected or rendered into images, one per file; a rig file selects by `type`."""

@@ -1,4 +1,4 @@
-"""What the surface looks like around its vertices, to first order, so that it can be compared at centres of pixels."""
+"""First-order expansion of the attributes around the vertices, evaluated at pixel centres."""
 
 from typing import Protocol
 
@@ -16,11 +16,11 @@ from calib.rig import ImageNoise, Rig
 
 
 def surroundings(mesh: Mesh, step_m: float) -> Mesh:
-    """The vertices, and beside each four points of its tangential plane: at ±step along two directions.
+    """The vertices, and four points in the tangent plane of each: at ±step along two directions.
 
     Args:
         mesh: with n vertices.
-        step_m: from a vertex to its four points [m].
+        step_m: distance from a vertex to its four points [m].
 
     Returns:
         A mesh with 5 n vertices: all vertices, then all points at +step along the first direction, at −step, and
@@ -38,7 +38,7 @@ def surroundings(mesh: Mesh, step_m: float) -> Mesh:
 
 
 def half_pixel(rig: Rig, mesh: Mesh) -> float:
-    """Half a pixel of the sensor that shows the mesh in the finest picture [m]; a millimetre if there is none."""
+    """Half a pixel's footprint on the mesh in the image sensor of the finest resolution [m]; 1 mm without one."""
     sizes = [
         np.median((mesh.vertices - sensor.camera.center) @ sensor.camera.T_rs[:3, 2]) / sensor.camera.fx
         for sensor in rig.sensors.values()
@@ -48,23 +48,23 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
 
 
 class AttributeGradients(Protocol):
-    """How the appearance changes around the vertices in one camera's image."""
+    """Gradients of the attributes at the vertices in one camera's image."""
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """To the right and down (n, channels, 2), for values (n, channels); NaN where it is not known."""
+        """Derivatives to the right and down [1/px] (n, channels, 2), for values (n, channels); NaN where unknown."""
         ...
 
     def look(self, predicted: Surface) -> None:
-        """Takes where the surface, a population of one, is expected in this frame."""
+        """Updates the gradients for the predicted surface, a population of one, of this frame."""
         ...
 
     def at_centers(
         self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
     ) -> NDArray[np.float32]:
-        """What a population looks like at the centres of the pixels (population, n) that its vertices meet.
+        """Attributes of a population at the centres of the pixels (population, n) into which its vertices project.
 
         Args:
-            values: what the vertices look like (n, channels).
+            values: attributes of the vertices (n, channels).
             surface: the population.
             pixel: as in `Synthesis`.
 
@@ -75,14 +75,14 @@ class AttributeGradients(Protocol):
 
 
 class Constant:
-    """Around a vertex everything is taken to look like the vertex, for want of anything better."""
+    """Attributes that are constant around a vertex, where the gradients are unknown."""
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """NaN (n, channels, 2): what is not known is not said to be level."""
+        """NaN (n, channels, 2): an unknown gradient is not a gradient of zero."""
         return np.full((*values.shape, 2), np.nan, np.float32)
 
     def look(self, predicted: Surface) -> None:
-        """Nothing depends on where the surface is."""
+        """No effect: the values do not depend on the pose of the surface."""
 
     def at_centers(
         self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
@@ -95,14 +95,14 @@ CONSTANT = Constant()
 
 
 class FirstOrder:
-    """The first order of what the surroundings of the vertices look like.
+    """First-order expansion of the attributes around the vertices.
 
-    A measurement belongs to the centre of a pixel, up to half a pixel away from the vertex (eq. 20). In a texture with
-    details of the size of a pixel that would be the largest error there is.
+    A measurement belongs to the centre of a pixel, up to half a pixel away from the vertex (eq. 20). For a texture with
+    details of the size of a pixel, this rounding would be the largest error.
     """
 
     def __init__(self, camera: Camera, mesh: Mesh, beside: NDArray[np.float32], step_m: float):
-        """`beside` are the attributes of the last four fifths of the `surroundings` (4 n, channels)."""
+        """Takes in `beside` the attributes of the last four fifths of the `surroundings` (4 n, channels)."""
         steps = beside.reshape(4, len(mesh.vertices), -1).astype(np.float64)
         change = np.stack([steps[0] - steps[1], steps[2] - steps[3]], axis=-1)
         self._per_metre = np.nan_to_num(change / (2 * step_m))
@@ -114,13 +114,13 @@ class FirstOrder:
         self._is_fisheye = isinstance(camera.lens, KannalaBrandt)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """As last looked; 0 at vertices whose surroundings were not seen."""
+        """Gradients of the last call of `look`; 0 at vertices whose surroundings were not visible."""
         return self._per_pixel
 
     def look(self, predicted: Surface) -> None:
-        """Finds how the appearance changes in the image where the surface, a population of one, is expected.
+        """Computes the gradients in the image for the predicted surface, a population of one.
 
-        The deformation takes tangents along, so the edges around a vertex tell where they point in the image.
+        Tangents deform with the surface, so their directions in the image follow from the edges around a vertex.
         """
         flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
         self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
@@ -128,7 +128,7 @@ class FirstOrder:
     def at_centers(
         self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
     ) -> NDArray[np.float32]:
-        """Value + slope · (centre of the pixel − projection of the vertex) (population, n, channels)."""
+        """Value + gradient · (centre of the pixel − projection of the vertex) (population, n, channels)."""
         result = np.empty((*pixel.shape, values.shape[1]), np.float32)
         to_centers = at_centers_fisheye if self._is_fisheye else at_centers
         to_centers(surface.vertices, pixel, *self._optics, values, self._per_pixel, result)
@@ -136,7 +136,7 @@ class FirstOrder:
 
 
 def _tangents(mesh: Mesh) -> NDArray[np.float64]:
-    """Two unit vectors (n, 2, 3) that are orthogonal to each vertex's normal and to each other; first × second = it."""
+    """Orthonormal tangents (n, 2, 3) at each vertex; first × second = normal."""
     normals = mesh.normals
     least = np.argmin(np.abs(normals), axis=1)
     axis = np.eye(3)[least] - normals * normals[np.arange(len(normals)), least][:, None]
@@ -145,7 +145,7 @@ def _tangents(mesh: Mesh) -> NDArray[np.float64]:
 
 
 def _along(mesh: Mesh, edges: NDArray[np.int32]) -> NDArray[np.float64]:
-    """Every edge in the tangential planes of both its ends (2, k, 2) [m]."""
+    """Components of every edge in the tangent planes of both its ends (2, k, 2) [m]."""
     tangents, (first, second) = _tangents(mesh), edges.T
     edge = mesh.vertices[second] - mesh.vertices[first]
     return np.stack([np.einsum("kij,kj->ki", tangents[end], edge) for end in (first, second)])

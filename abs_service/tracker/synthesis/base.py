@@ -1,4 +1,4 @@
-"""What a synthesis is: samples of deformed meshes as a sensor would see them, and images that fit them."""
+"""Interfaces of synthesis: samples of deformed meshes in a sensor's image, and images in the same geometry."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -15,15 +15,15 @@ from calib.camera import Camera
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Synthesis:
-    """What a sensor would see of a population: m samples of every member.
+    """Synthetic measurements of a population in one sensor: m samples per candidate.
 
     Attributes:
         pixel: index (population, m) into the sensor's flattened texture with a border of one pixel; 0, in the border,
             where the sensor cannot see the sample (outside the image, behind the camera, or facing away); −1 where
-            there is no sample, which costs nothing.
-        distance: radial distance from the camera centre (population, m) [m], eq. 11: of where the line of sight of the
-            pixel's centre, which is what was measured, meets the tangential plane; of the sample itself in the border.
-        attributes: what the surface carries there, such as its colour, (population or 1, m, channels).
+            there is no sample, which contributes zero cost.
+        distance: radial distance from the camera centre (population, m) [m], eq. 11, to the intersection of the line of
+            sight through the pixel's centre (which was measured) with the tangent plane; in the border, to the sample.
+        attributes: attributes of the surface there, such as colour, (population or 1, m, channels).
     """
 
     pixel: NDArray[np.int32]
@@ -32,18 +32,18 @@ class Synthesis:
 
 
 class View(Protocol):
-    """A mesh through one camera.
+    """Projection of a mesh into one camera.
 
     Attributes:
-        camera: the camera into whose image it is synthesised.
+        camera: the camera into whose image the mesh is synthesised.
     """
 
     camera: Camera
 
     def look(self, predicted: Surface) -> None:
-        """Decides from the predicted mesh, a population of one, what is hidden from the sensor in this frame.
+        """Determines from the predicted mesh, a population of one, which parts are occluded in this frame.
 
-        That is the same for every candidate, so hiding is neither rewarded nor punished.
+        The occlusion is the same for every candidate, so it favours none.
         """
         ...
 
@@ -52,71 +52,70 @@ class View(Protocol):
         ...
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
-        """How the attributes of a population of one change around its samples in the image (m, channels, 2).
+        """Gradients of the attributes at the samples of a population of one (m, channels, 2) [1/px], right and down.
 
-        To the right and down, per pixel; NaN where only the samples' own attributes are known.
+        NaN where only the samples' own attributes are known.
         """
         ...
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values (n, …) of the vertices at the samples (m, …) of a population of one."""
+        """Interpolates values (n, …) of the vertices at the samples (m, …) of a population of one."""
         ...
 
     def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """How the samples of a population of one move, from how its vertices do."""
+        """Jacobian of the samples of a population of one with respect to theta, from that of its vertices."""
         ...
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Values (population, n) of the vertices at the samples (population, m)."""
+        """Interpolates values (population, n) of the vertices at the samples (population, m)."""
         ...
 
     def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """Costs (population,), made comparable between members that have more samples and such that have fewer.
+        """Costs (population,), normalised so that candidates with different numbers of samples are comparable.
 
         Args:
             costs: sums over the samples (population,).
             surface: the population.
-            unseen: what a sample costs that the sensor does not see.
+            unseen: cost of a sample that the sensor does not see.
         """
         ...
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
         ...
 
 
 class Synthesizer(Protocol):
-    """Views of all sensors of a rig, and their images as these views need them.
+    """Views of all sensors of a rig, and their images in the geometry of these views.
 
     Attributes:
-        canvas: the mesh on whose vertices the views want to be given the appearance: the deformed mesh itself, or a
-            finer one.
+        canvas: the mesh on whose vertices the appearance is sampled for the views: the deformed mesh or a finer one.
     """
 
     canvas: Mesh
 
     def observe(self, observation: Observation) -> None:
-        """Takes the images that the following calls refer to."""
+        """Sets the images to which the following calls refer."""
         ...
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The mesh with attributes of the canvas (vertices, channels) through one sensor's camera."""
+        """View of the mesh with attributes of the canvas (vertices, channels) in one sensor's camera."""
         ...
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
-        """The part of a sensor's image that a surface can be in, the same in that of its view's camera.
+        """Window of a sensor's image, and of its view's camera, that can contain the surface.
 
         Args:
             sensor: its name.
-            predicted: where the surface is expected, a population of one.
-            reach_m: how far it may be from there [m].
+            predicted: predicted surface, a population of one.
+            reach_m: largest distance of the surface from the prediction [m].
         """
         ...
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """A rendered noise model (height + 2, width + 2, 8) of a depth sensor's frame in its view's camera."""
+        """The noise texture (height + 2, width + 2, 8) of a depth sensor's frame, in its view's camera."""
         ...
 
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An image (height, width, channels) of a sensor in its view's camera; NaN where nothing is known."""
+        """An image (height, width, channels) of a sensor, in its view's camera; NaN where unknown."""
         ...

@@ -1,4 +1,4 @@
-"""What a surface looks like at the centres of the pixels that its vertices meet."""
+"""Attributes of a surface at the centres of the pixels into which its vertices project."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ def at_centers(
     slopes: NDArray[np.float32],
     result: NDArray[np.float32],
 ) -> None:
-    """Value + slope · (centre of the pixel − projection of the vertex), eq. 10; the value itself in the border."""
+    """Value + gradient · (centre of the pixel − projection of the vertex), eq. 10; the value itself in the border."""
     one, width, per_stride = np.float32(1), np.int32(stride), 1 / stride
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     for k in prange(pixel.shape[0]):
@@ -44,5 +44,5 @@ def at_centers(
                 looks[v] = own[v] + slope[v, 0] * rights[v] + slope[v, 1] * downs[v]
 
 
-#: The same with the four coefficients of a fisheye.
+#: `at_centers` with the four coefficients of a fisheye lens.
 at_centers_fisheye = composed(at_centers, distort=distort_fisheye, coefficients=fisheye_coefficients)

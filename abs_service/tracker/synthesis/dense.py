@@ -25,8 +25,8 @@ class Settings:
     """TOML keys of the dense synthesis.
 
     Attributes:
-        step: every how many pixels, in rows and columns, one is compared.
-        detail: the appearance is so many times finer than the mesh.
+        step: spacing of the compared pixels in rows and columns [px].
+        detail: subdivisions of every mesh edge at which the appearance is sampled.
     """
 
     step: Annotated[int, Interval(ge=1, le=16)] = 1
@@ -37,10 +37,10 @@ class Settings:
         return Dense(rig, mesh, self.step, self.detail)
 
 
-#: At least so much of the predicted mesh is taken to be in sight when its pixels are counted.
+#: Lower bound of the share of the predicted mesh in the image by which its number of pixels is divided.
 LEAST_SHARE = 0.1
 
-#: What nothing covers.
+#: Samples of an empty population.
 _NONE = Samples(
     np.zeros((0, 0), np.int32),
     np.zeros((0, 0), np.float32),
@@ -51,10 +51,10 @@ _NONE = Samples(
 
 
 class Dense:
-    """Renders into the sensors' own images, which stay as they are.
+    """Renders into the sensors' own images, which are not resampled.
 
     Attributes:
-        canvas: the points of the lattice that the appearance is given on.
+        canvas: lattice points at which the appearance is sampled.
     """
 
     def __init__(self, rig: Rig, mesh: Mesh, step: int, detail: int):
@@ -66,15 +66,15 @@ class Dense:
         self._detail = detail
 
     def observe(self, observation: Observation) -> None:
-        """Nothing depends on the images."""
+        """No effect: the views do not depend on the images."""
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The mesh with attributes of the lattice (k, channels) through one sensor's camera."""
+        """View of the mesh with attributes of the lattice (k, channels) in one sensor's camera."""
         camera = self._rig.sensors[sensor].camera
         return DenseView(camera, self._mesh.faces, attributes, self._step, self._detail)
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
-        """What is around the surface."""
+        """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -108,20 +108,20 @@ class DenseView:
         self._last: tuple[Surface | None, Samples, NDArray[np.float64]] = (None, _NONE, np.zeros(0))
 
     def look(self, predicted: Surface) -> None:
-        """Counts pixels; the z-buffer tells for every candidate anew what it hides of itself."""
+        """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
         samples, share = self._render(predicted)
         self._expected = float(samples.count[0]) / max(float(share[0]), LEAST_SHARE)
 
     def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population; members that cover fewer pixels than others have samples of pixel −1 at the end."""
+        """Synthesises a population; samples beyond a candidate's number of covered pixels have pixel −1."""
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
     def sight(self) -> None:
-        """None: which samples there are depends on the candidate."""
+        """None: the set of samples depends on the candidate."""
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
-        """NaN: the image tells better than the lattice how they change."""
+        """NaN: gradients of the image are more accurate than those of the lattice."""
         samples, _ = self._render(surface)
         return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)
 
@@ -131,7 +131,7 @@ class DenseView:
         return np.einsum("mi,mi...->m...", samples.weights[0], values[self._faces[samples.face[0]]])
 
     def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """As the vertices, interpolated."""
+        """Jacobian of the samples, interpolated from that of the vertices."""
         return SparseJacobian.from_dense(self.spread(surface, sparse_jacobian.dense))
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -139,23 +139,24 @@ class DenseView:
         return interpolate(values[..., None], self._faces, self._render(surface)[0])[..., 0]
 
     def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """The mean over a member's pixels, times the predicted mesh's pixels, for the share of it that is in sight.
+        """Mean cost of a candidate's pixels times the predicted number of pixels, for the share of it in the image.
 
-        The mesh ends where it was found to, not where the object ends, and a member that covers more of the object's
-        pixels explains no more of it. So covering is neither rewarded nor punished, but leaving the image is.
+        The rim of the mesh comes from the initial detection and need not be the rim of the object, so a candidate that
+        covers more pixels is not a better fit. The covered area does not change the cost; leaving the image increases
+        it.
         """
         samples, share = self._render(surface)
         mean = np.where(samples.count > 0, costs / np.maximum(samples.count, 1), unseen)
         return self._expected * (share * mean + (1 - share) * unseen)
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it."""
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh."""
         return self._raster.render(surface.vertices[0])
 
     def _render(self, surface: Surface) -> tuple[Samples, NDArray[np.float64]]:
-        """The covered pixels of a population, and the share (population,) of its vertices that is in sight.
+        """The covered pixels of a population, and the share (population,) of its vertices that lie in the image.
 
-        Asked again for the last population, it answers at once.
+        The result for the last population is cached.
         """
         last, samples, share = self._last
         if last is not surface:

@@ -1,4 +1,4 @@
-"""Where points are in one camera's image, and how they move there, in double precision."""
+"""Projection of points into one camera's image, and its derivatives, in double precision."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,21 +7,22 @@ from calib.camera import Camera
 from calib.jit import kernel
 from calib.lens import Lens
 
-#: Edges that appear shorter than this [px], of a surface seen from aside, tell little of what is where in the image.
+#: Edges shorter than this in the image [px], of a surface seen at grazing incidence, are down-weighted.
 SHORT_EDGE_PX = 0.5
 
 
 def project_with_slopes(
     camera: Camera, points: NDArray[np.floating]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What `Camera.project` and `Camera.projection_jacobian` say, in one pass for the usual lenses.
+    """`Camera.project` and `Camera.projection_jacobian` in one pass, compiled for the common lenses.
 
     Args:
         camera: the camera.
         points: (n, 3) in the rig's frame [m].
 
     Returns:
-        Pixel coordinates (n, 2), NaN at or behind the camera plane, and their derivatives (n, 2, 3) [px/m].
+        Pixel coordinates (n, 2), NaN at or behind the camera plane, and their Jacobian with respect to the points
+        (n, 2, 3) [px/m].
     """
     if not isinstance(camera.lens, Lens):
         return camera.project(points), camera.projection_jacobian(points)
@@ -35,13 +36,13 @@ def project_with_slopes(
 def metres_per_pixel(
     camera: Camera, vertices: NDArray[np.floating], edges: NDArray[np.int32], lengths: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """How far along two directions on the surface a pixel to the right, or down, is (n, 2, 2), around every vertex.
+    """Derivative of the tangential coordinates with respect to the pixel (n, 2, 2) [m/px], at every vertex.
 
     Args:
         camera: the camera.
         vertices: (n, 3) [m].
-        edges: (k, 2); those around a vertex tell where the directions point in the image.
-        lengths: every edge along the directions at both its ends (2, k, 2) [m].
+        edges: (k, 2); the edges around a vertex give the directions of its tangents in the image.
+        lengths: components of every edge along the tangents at both its ends (2, k, 2) [m].
     """
     places, _ = project_with_slopes(camera, vertices)
     result = np.empty((len(places), 2, 2))
@@ -86,7 +87,7 @@ def _project(
 def _regress(
     place: NDArray[np.float64], edges: NDArray[np.int32], lengths: NDArray[np.float64], result: NDArray[np.float64]
 ) -> None:
-    """See `metres_per_pixel`; places (n, 2) are NaN where unknown, edges as long as `SHORT_EDGE_PX` draw to zero."""
+    """See `metres_per_pixel`; places (n, 2) are NaN where unknown. `SHORT_EDGE_PX` regularises towards zero."""
     sums = np.zeros((place.shape[0], 7))
     for e in range(edges.shape[0]):
         u = place[edges[e, 1], 0] - place[edges[e, 0], 0]

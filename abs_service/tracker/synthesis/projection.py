@@ -1,4 +1,4 @@
-"""Where the vertices of a population are in one camera's image."""
+"""Projection of the vertices of a population into one camera's image, in single precision."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from calib.jit import composed, kernel
 
 
 def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """What kernels need of a camera: its pose T_sr (3, 4), fx, fy, cx and cy (4,), and the lens's coefficients."""
+    """Camera parameters for kernels: pose T_sr (3, 4), fx, fy, cx and cy (4,), and the coefficients of the lens."""
     pose = np.ascontiguousarray(camera.T_sr[:3], np.float32)
     matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
     return pose, matrix, camera.lens.coefficients.astype(np.float32)
@@ -21,7 +21,7 @@ class Projection:
     """Eq. 10 for populations, in single precision.
 
     Attributes:
-        arguments: what `project` takes between the vertices and the results.
+        arguments: camera arguments of `project`, between the vertices and the results.
     """
 
     def __init__(self, camera: Camera):
@@ -30,7 +30,7 @@ class Projection:
     def project(self, vertices: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Pixel coordinates (population, n, 2) and 1/z (population, n) of vertices (population, 3, n) [m].
 
-        What the camera cannot see, beside its field of view or behind it, has the coordinates 0 and the 1/z NaN.
+        Vertices outside the field of view or behind the camera have coordinates 0 and 1/z NaN.
         """
         population, _, n = vertices.shape
         place, inverse_z = np.empty((population, n, 2), np.float32), np.empty((population, n), np.float32)
@@ -39,7 +39,7 @@ class Projection:
 
 
 def in_sight(place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Share (population,) of projected vertices that are within an image of a shape (height, width)."""
+    """Share (population,) of projected vertices inside an image of a shape (height, width)."""
     count = np.zeros(len(place), np.int64)
     _count_inside(place, inverse_z, shape[0], shape[1], count)
     return count / place.shape[1]
@@ -49,7 +49,7 @@ def in_sight(place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: 
 def _count_inside(
     place: NDArray[np.float32], inverse_z: NDArray[np.float32], height: int, width: int, count: NDArray[np.int64]
 ) -> None:
-    """Vertices of every member that the camera can see and that fall into its image."""
+    """Number of vertices of every candidate that the camera can see and that lie inside its image."""
     half = np.float32(0.5)
     right, bottom = np.float32(width) - half, np.float32(height) - half
     for k in range(place.shape[0]):
@@ -70,7 +70,7 @@ def project(
     place: NDArray[np.float32],
     inverse_z: NDArray[np.float32],
 ) -> None:
-    """Eq. 10 with the lens that there is; pose (3, 4) = T_sr, limit of r², results as `Projection.project` tells."""
+    """Eq. 10 with the kernel of the given lens; pose (3, 4) = T_sr, limit of r², results as in `Projection.project`."""
     if is_fisheye:
         _project_fisheye(vertices, pose, matrix, lens, limit, place, inverse_z)
     else:
@@ -105,5 +105,5 @@ def _project(
             inverse_z[k, v] = inverse if seen else np.float32(np.nan)
 
 
-#: The same with the four coefficients of a fisheye.
+#: `_project` with the four coefficients of a fisheye lens.
 _project_fisheye = composed(_project, distort=distort_fisheye, coefficients=fisheye_coefficients)

@@ -1,4 +1,4 @@
-"""The pixel and the distance of every vertex of a population, one kernel for each kind of lens."""
+"""Pixel and distance of every vertex of a population, one kernel per lens model."""
 
 from collections.abc import Callable
 
@@ -18,16 +18,16 @@ from calib.forward import (
 from calib.jit import composed, kernel, prange
 from calib.lens import LensModel
 
-#: Flattest angle (cosine) at which a surface's slope is followed to a pixel's centre.
+#: Smallest cosine of incidence at which the distance is extrapolated along the tangent plane to the pixel's centre.
 LEAST_COSINE = 0.2
 
 
 def sampler(lens: LensModel) -> Callable[..., None]:
-    """The kernel for cameras with a lens; all take the same arguments."""
+    """Kernel for a lens model; all kernels take the same arguments."""
     return (_sample_pinhole, _sample, _sample_fisheye)[lens_kind(lens)]
 
 
-#: Which of the kernels a lens needs.
+#: Kernel that a lens requires.
 PINHOLE, DISTORTED, FISHEYE = range(3)
 
 
@@ -54,7 +54,7 @@ def _sample(
 ) -> None:
     """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r².
 
-    A pixel's line of sight d, beside the vertex's by Δ, meets the tangential plane at z (1 − n · Δ / (n · d)).
+    A pixel's line of sight d, which differs from the vertex's by Δ, meets the tangent plane at z (1 − n · Δ / (n · d)).
     """
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
@@ -91,7 +91,7 @@ def _sample(
             distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
 
 
-#: What `_sample` is without distortion, and with the four coefficients of a fisheye, which bends even small steps.
+#: `_sample` without distortion, and with the four coefficients of a fisheye, which distorts small steps noticeably.
 _sample_pinhole: Callable[..., None] = composed(_sample, distort=without_distortion)
 _sample_fisheye: Callable[..., None] = composed(
     _sample, distort=distort_fisheye, coefficients=fisheye_coefficients, undistort_step=undistort_step_fisheye

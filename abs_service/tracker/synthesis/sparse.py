@@ -23,7 +23,7 @@ from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
 from calib.rig import Rig
 
-#: A vertex is hidden behind the mesh's own surface if that is nearer to the camera by more than this [m].
+#: Self-occlusion: a vertex is occluded if the rendered mesh is nearer to the camera by more than this [m].
 HIDING_M = 0.01
 
 
@@ -37,7 +37,7 @@ class Settings:
 
 
 class Sparse:
-    """Projects the vertices into the sensors' own images, which stay as they are.
+    """Projects the vertices into the sensors' own images, which are not resampled.
 
     Attributes:
         canvas: the vertices and their surroundings.
@@ -51,12 +51,12 @@ class Sparse:
         self._mesh = mesh
 
     def observe(self, observation: Observation) -> None:
-        """Nothing depends on the images."""
+        """No effect: the views do not depend on the images."""
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The vertices with attributes of the canvas through one sensor's camera.
+        """View of the vertices with attributes of the canvas in one sensor's camera.
 
-        Attributes of the vertices alone (n, channels) are taken for the same all around.
+        Attributes of the vertices alone (n, channels) are taken as constant around each vertex.
         """
         camera, n = self._rig.sensors[sensor].camera, len(self._mesh.vertices)
         if len(attributes) != len(self.canvas.vertices):
@@ -66,7 +66,7 @@ class Sparse:
         )
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
-        """What is around the surface."""
+        """The window around the surface, see `window.around`."""
         return around(self._rig.sensors[sensor].camera, self._projections[sensor], predicted, reach_m)
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -79,7 +79,7 @@ class Sparse:
 
 
 class SparseView:
-    """The vertices of a mesh through one camera.
+    """Projection of the vertices of a mesh into one camera.
 
     Attributes:
         camera: the camera.
@@ -102,7 +102,7 @@ class SparseView:
         self._sample = sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:
-        """Hides the vertices that face away, or are behind the mesh's own surface, in the predicted mesh."""
+        """Marks the vertices that face away or are self-occluded in the predicted mesh."""
         self._hidden = np.zeros(predicted.vertices.shape[2], np.bool_)
         self._gradients.look(predicted)
         seen = self.synthesize(predicted)
@@ -115,7 +115,7 @@ class SparseView:
         self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
 
     def synthesize(self, surface: Surface) -> Synthesis:
-        """Synthesises a population of deformed meshes; hidden vertices are no samples."""
+        """Synthesises a population of deformed meshes; occluded vertices are ignored."""
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
@@ -123,7 +123,7 @@ class SparseView:
         return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, surface, pixel))
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
-        """As where the surface was expected."""
+        """Gradients for the predicted surface, see `look`."""
         return self._gradients.per_pixel(self._attributes)
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -131,21 +131,21 @@ class SparseView:
         return values
 
     def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """As the vertices."""
+        """The Jacobian itself: the samples are the vertices."""
         return sparse_jacobian
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The values themselves."""
+        """The values themselves: the samples are the vertices."""
         return values
 
     def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """The costs themselves: every member has as many samples as the mesh has vertices."""
+        """The costs themselves: every candidate has one sample per vertex."""
         return costs
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the camera's image, infinite beside it.
+        """Radial distances (height, width) [m] of a population of one in the camera's image; infinite off the mesh.
 
-        Asked again for the last one, it answers at once.
+        The result for the last surface is cached.
         """
         last, image = self._rendered
         if last is not surface:

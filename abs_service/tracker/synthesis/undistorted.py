@@ -1,4 +1,4 @@
-"""Sparse synthesis on backward-undistorted input: images are resampled once, vertices are projected without lens."""
+"""Sparse synthesis on backward-undistorted input: images are resampled once, vertices use a pinhole projection."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Settings:
 
 
 class Undistorted:
-    """Resamples images by tables made once, each pixel to its nearest, so that no measurement is mixed with another.
+    """Resamples images by precomputed nearest-neighbour tables, so that no two measurements are mixed.
 
     Attributes:
         canvas: the mesh.
@@ -38,21 +38,21 @@ class Undistorted:
         self._tables = {name: resampling(self._pinholes[name], sensor.camera) for name, sensor in rig.sensors.items()}
 
     def observe(self, observation: Observation) -> None:
-        """Nothing depends on the images: the tables are those of the lenses."""
+        """No effect: the tables depend on the lenses only."""
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The vertices with attributes (n, channels) through one sensor's camera without its distortion."""
+        """View of the vertices with attributes (n, channels) in one sensor's camera without distortion."""
         return SparseView(self._pinholes[sensor], self.canvas.faces, attributes)
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
-        """All: the images are resampled as a whole."""
+        """The whole image: images are resampled completely."""
         return WHOLE
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """A rendered noise model (height + 2, width + 2, 8), resampled; its distances stay, since the centre does."""
+        """The noise texture (height + 2, width + 2, 8), resampled; radial distances stay, as the centre is the same."""
         return texture.reshape(-1, 8)[self._tables[sensor]]
 
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An image (height, width, channels), resampled; NaN where the sensor sees nothing."""
+        """An image (height, width, channels), resampled; NaN outside the sensor's field of view."""
         bordered = np.pad(image, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
         return bordered.reshape(-1, image.shape[2])[self._tables[sensor][1:-1, 1:-1]]

@@ -27,8 +27,8 @@ class Settings:
     """TOML keys of the warping.
 
     Attributes:
-        sensor: depth sensor into whose view, without its distortion, everything is warped; its distances also tell
-            where the pixels of cameras without distances belong. "" is the tracker's first depth sensor.
+        sensor: depth sensor into whose view, without distortion, all images are warped; images of cameras without
+            distances are warped by its distances. "" is the tracker's first depth sensor.
     """
 
     sensor: str = ""
@@ -48,7 +48,7 @@ class Settings:
 
 
 class Warped:
-    """One projection serves all sensors.
+    """One common projection for all sensors.
 
     Attributes:
         canvas: the mesh.
@@ -69,7 +69,7 @@ class Warped:
         self._distance = np.full((self._camera.height, self._camera.width), np.nan, np.float32)
 
     def observe(self, observation: Observation) -> None:
-        """Takes the common view's distances from the reference sensor."""
+        """Warps the distances of the reference sensor into the common view."""
         image, sensor = observation.images.get(self._reference), self._rig.sensors[self._reference]
         self._distance = np.full_like(self._distance, np.nan)
         if isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise):
@@ -79,18 +79,18 @@ class Warped:
                 self._distance = warped.distance
 
     def view(self, sensor: str, attributes: NDArray[np.float32]) -> View:
-        """The vertices with attributes (n, channels) through the common camera."""
+        """View of the vertices with attributes (n, channels) in the common camera."""
         return _SharedView(self._projection, attributes)
 
     def window(self, sensor: str, predicted: Surface, reach_m: float) -> Window:
-        """All: the images are resampled as a whole."""
+        """The whole image: images are resampled completely."""
         return WHOLE
 
     def texture(self, sensor: str, texture: NDArray[np.float32]) -> NDArray[np.float32]:
-        """A rendered noise model (height + 2, width + 2, 8) in the common view.
+        """The noise texture (height + 2, width + 2, 8) in the common view.
 
-        Distances are those from the common camera; the deviations along the old line of sight are taken for those along
-        the new one, which is right to the cosine of the angle between them.
+        Distances are measured from the common camera; σ along the original line of sight is used for the new one, which
+        is exact up to the cosine of the angle between them.
         """
         inner = texture[1:-1, 1:-1]
         result = np.zeros((self._camera.height + 2, self._camera.width + 2, texture.shape[2]), np.float32)
@@ -101,14 +101,14 @@ class Warped:
         return result
 
     def image(self, sensor: str, image: NDArray[np.float32]) -> NDArray[np.float32]:
-        """An image (height, width, channels) in the common view; NaN where no distance tells what it shows."""
+        """An image (height, width, channels) in the common view; NaN where the distance is unknown."""
         try:
             return self._pictures[sensor].look(self._distance).nearest(image)
-        except WarpError:  # nothing is known of what it shows, and that costs what an unseen object costs
+        except WarpError:  # the image is unknown: the cost is that of an unseen object
             return np.full((*self._distance.shape, image.shape[2]), np.nan, np.float32)
 
     def _warp(self, sensor: str, distance: NDArray[np.floating]) -> WarpedDepth | None:
-        """A depth sensor's distances in the common view; None if none of them is in it, as when the object is away."""
+        """A depth sensor's distances in the common view; None if all lie outside it, for example without an object."""
         try:
             return self._warps[sensor].warp(distance)
         except WarpError:
@@ -116,14 +116,14 @@ class Warped:
 
 
 class _Projection:
-    """The common view's synthesis of the last population, which all sensors of a frame ask for in turn."""
+    """Cached synthesis of the last population in the common view, shared by all sensors."""
 
     def __init__(self, camera: Camera, mesh: Mesh):
         self.view = SparseView(camera, mesh.faces, np.zeros((len(mesh.vertices), 0), np.float32))
         self._asked: tuple[Surface | None, Synthesis | None] = (None, None)
 
     def look(self, predicted: Surface) -> None:
-        """Decides what is hidden in this frame."""
+        """Determines the occluded vertices of this frame."""
         self.view.look(predicted)
         self._asked = (None, None)
 
@@ -145,7 +145,7 @@ class _SharedView:
         self._attributes = np.ascontiguousarray(attributes, np.float32)[None]
 
     def look(self, predicted: Surface) -> None:
-        """Decides what is hidden in this frame, alike for all sensors."""
+        """Determines the occluded vertices of this frame, the same for all sensors."""
         self._projection.look(predicted)
 
     def synthesize(self, surface: Surface) -> Synthesis:
@@ -154,7 +154,7 @@ class _SharedView:
         return Synthesis(common.pixel, common.distance, self._attributes)
 
     def sight(self) -> None:
-        """None: one synthesis serves all sensors, and in a chain each would make its own."""
+        """None: all sensors share one synthesis, whereas a fused kernel would compute one per sensor."""
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
@@ -165,17 +165,17 @@ class _SharedView:
         return values
 
     def follow(self, surface: Surface, sparse_jacobian: SparseJacobian) -> SparseJacobian:
-        """As the vertices."""
+        """The Jacobian itself: the samples are the vertices."""
         return sparse_jacobian
 
     def carry(self, surface: Surface, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The values themselves."""
+        """The values themselves: the samples are the vertices."""
         return values
 
     def balance(self, costs: NDArray[np.float64], surface: Surface, unseen: float) -> NDArray[np.float64]:
-        """The costs themselves: every member has as many samples as the mesh has vertices."""
+        """The costs themselves: every candidate has one sample per vertex."""
         return costs
 
     def render(self, surface: Surface) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a population of one in the common view, infinite beside it."""
+        """Radial distances (height, width) [m] of a population of one in the common view; infinite off the mesh."""
         return self._projection.view.render(surface)

@@ -1,4 +1,4 @@
-"""Which part of a camera's image the object can be in: nothing beside it needs to be prepared for a frame."""
+"""Window of a camera's image that can contain the object; only its pixels are prepared for a frame."""
 
 from typing import TypeVar
 
@@ -18,18 +18,18 @@ Window = tuple[slice, slice]
 
 WHOLE: Window = (slice(None), slice(None))
 
-#: A value that no picture holds: beside the window, where it stands, everything deviates from what is measured.
+#: Value that no image contains; pixels outside the window are set to it, so that every candidate is an outlier there.
 NOTHING_HAS = 1e6
 
 
 def around(camera: Camera, projection: Projection, predicted: Surface, reach_m: float) -> Window:
-    """The rows and columns that a surface can be in.
+    """Rows and columns that can contain a surface.
 
     Args:
-        camera: that looks.
+        camera: the camera.
         projection: of the same camera.
-        predicted: where the surface is expected, a population of one.
-        reach_m: how far it may be from there [m]; infinite: anywhere.
+        predicted: predicted surface, a population of one.
+        reach_m: largest distance of the surface from the prediction [m]; infinite: the whole image.
     """
     place, inverse_z = projection.project(predicted.vertices)
     nearest = inverse_z.max(initial=0.0)
@@ -50,7 +50,7 @@ def corner(window: Window) -> tuple[int, int]:
 
 
 def limits(window: Window, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """First row, the one after the last, and likewise the columns of a window in an image of a shape."""
+    """First row, end row (exclusive), first column and end column of a window in an image of a shape."""
     (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
     return top, bottom, left, right
 
@@ -61,16 +61,16 @@ def within(image: NDArray[Number], window: Window) -> NDArray[Number]:
 
 
 class Bordered:
-    """An image with a border of one pixel that is filled within a window; its memory serves frame after frame.
+    """An image with a border of one pixel that is filled within a window; its memory is reused between frames.
 
-    New memory takes as long as filling it.
+    Allocating memory takes as long as filling it.
 
     Attributes:
-        window: that of the last frame.
+        window: window of the last frame.
 
     Args:
-        border: what the border holds (channels,).
-        beyond: what the image holds beside the window (channels,).
+        border: value of the border (channels,).
+        beyond: value of the image outside the window (channels,).
     """
 
     def __init__(self, border: NDArray[np.float32], beyond: NDArray[np.float32]):
@@ -85,7 +85,7 @@ class Bordered:
         return within(self._image, self.window)
 
     def begin(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
-        """The image (height + 2, width + 2, channels) of a shape (height, width), with `border` in the window too."""
+        """The image (height + 2, width + 2, channels) of a shape (height, width), its window filled with `border`."""
         height, width = shape
         if self._image.shape[:2] != (height + 2, width + 2):
             self._image = np.empty((height + 2, width + 2, len(self._border)), np.float32)
@@ -98,7 +98,7 @@ class Bordered:
 
 
 def placed(window: Window, values: NDArray[Number], height: int, width: int) -> NDArray[Number]:
-    """Values of the pixels of a window in an image (height + 2, width + 2) with a border; zeros elsewhere."""
+    """Image (height + 2, width + 2) with a border that contains a window's values; zeros elsewhere."""
     image = np.zeros((height + 2, width + 2), values.dtype)
     within(image, window)[:] = values
     return image
@@ -106,7 +106,7 @@ def placed(window: Window, values: NDArray[Number], height: int, width: int) -> 
 
 @kernel
 def _fill(image: NDArray[np.float32], top: int, bottom: int, left: int, right: int, value: NDArray[np.float32]) -> None:
-    """Writes a value (channels,) into rows and columns of an image with a border, which do not count it."""
+    """Writes a value (channels,) into rows and columns of an image; their indices exclude its border."""
     for row in range(top + 1, bottom + 1):
         for column in range(left + 1, right + 1):
             for channel in range(value.size):

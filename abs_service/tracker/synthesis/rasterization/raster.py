@@ -15,7 +15,7 @@ from calib.jit import kernel
 class Raster:
     """Renders meshes with the same faces into one camera, forward distortion included.
 
-    Between its corners, which are exact, a triangle is flat in the distorted image.
+    Corners are projected exactly; between them a triangle is flat in the distorted image.
     """
 
     def __init__(self, camera: Camera, faces: NDArray[np.int32]):
@@ -24,7 +24,7 @@ class Raster:
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
 
     def render(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite where it is not."""
+        """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite off the mesh."""
         place, inverse_z = self._projection.project(np.ascontiguousarray(vertices[None], np.float32))
         nearness = np.zeros(self._ray_length.shape, np.float32)
         _nearest(place[0], inverse_z[0], self._faces, nearness)
@@ -43,8 +43,7 @@ def _nearest(
 
     Args:
         place: pixel coordinates (n, 2) of the vertices.
-        inverse_z: their 1/z (n,), NaN where the camera cannot see them; it is linear in the image (exactly, for a
-            pinhole).
+        inverse_z: their 1/z (n,), NaN where the camera cannot see them; linear in the image (exactly for a pinhole).
         faces: vertex indices (m, 3).
         nearness: result, zeros at the start.
     """

@@ -1,4 +1,4 @@
-"""Appearance that is finer than the mesh: on every face a lattice of points, between which it is interpolated."""
+"""Appearance at a finer resolution than the mesh: sampled on a lattice in every face, interpolated in between."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from calib.jit import kernel
 
 
 def lattice(mesh: Mesh, detail: int) -> Mesh:
-    """The points that the appearance is given on, as a mesh of their own.
+    """Lattice of points at which the appearance is sampled, as a mesh.
 
     Args:
         mesh: with m faces.
@@ -31,15 +31,15 @@ def lattice(mesh: Mesh, detail: int) -> Mesh:
 
 
 def paint(values: NDArray[np.float32], detail: int, samples: Samples) -> NDArray[np.float32]:
-    """What the samples look like.
+    """Attributes of the samples.
 
     Args:
-        values: on the points of the lattice (k, channels).
+        values: attributes at the lattice points (k, channels).
         detail: parts of every edge.
         samples: of a population.
 
     Returns:
-        (population, m, channels), linear within the small faces between the points.
+        (population, m, channels), linear within the sub-triangles between the lattice points.
     """
     result = np.empty((*samples.pixel.shape, values.shape[1]), np.float32)
     _paint(values, detail, samples.face, samples.weights, result)
@@ -47,13 +47,13 @@ def paint(values: NDArray[np.float32], detail: int, samples: Samples) -> NDArray
 
 
 def _places(detail: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """I and j of all points of a face."""
+    """Indices i and j of all lattice points of a face."""
     i, j = np.meshgrid(np.arange(detail + 1), np.arange(detail + 1))
     return i[i + j <= detail], j[i + j <= detail]
 
 
 def _small_faces(detail: int) -> NDArray[np.int64]:
-    """Triangles (detail², 3) between the points of one face, with its orientation."""
+    """Sub-triangles (detail², 3) between the lattice points of one face, with its orientation."""
     i, j = _places(detail)
     number = {place: n for n, place in enumerate(zip(i.tolist(), j.tolist()))}
     lower = [[(p, q), (p + 1, q), (p, q + 1)] for p, q in number if p + q < detail]
@@ -69,7 +69,7 @@ def _paint(
     weights: NDArray[np.float32],
     result: NDArray[np.float32],
 ) -> None:
-    """Linear interpolation within the small face that each sample lies in."""
+    """Linear interpolation within the sub-triangle that contains each sample."""
     one = np.float32(1)
     points = (detail + 1) * (detail + 2) // 2
     for k in range(face.shape[0]):

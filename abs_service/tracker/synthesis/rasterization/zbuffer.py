@@ -1,4 +1,4 @@
-"""A z-buffer for a population of meshes: which face every pixel shows, how far away, and where on the face."""
+"""A z-buffer for a population of meshes: visible face, distance and barycentric coordinates of every pixel."""
 
 from dataclasses import dataclass
 
@@ -10,14 +10,14 @@ from calib.jit import kernel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """The pixels that every member of a population covers; those that cover fewer than others have −1 at the end.
+    """Pixels that every candidate of a population covers, padded with −1 to a common number m.
 
     Attributes:
-        pixel: index (population, m) into the flattened image with a border of one pixel; 0 where a face shows its back;
-            −1 where there is no sample.
+        pixel: index (population, m) into the flattened image with a border of one pixel; 0 for back faces; −1 where
+            there is no sample.
         distance: radial distance (population, m) [m].
         face: index (population, m) of the face.
-        weights: of the face's three corners (population, m, 3), right in perspective.
+        weights: perspective-correct barycentric weights of the face's corners (population, m, 3).
         count: number of samples (population,).
     """
 
@@ -42,7 +42,7 @@ def render(
         inverse_z: their 1/z (population, n), NaN where the camera cannot see them.
         faces: vertex indices (m, 3), anticlockwise around the normal.
         ray_length: radial distance per z of every pixel (height, width).
-        step: only every so many rows and columns.
+        step: spacing of the sampled rows and columns [px].
     """
     population = len(place)
     top, left, rows, columns = _box(place, inverse_z, ray_length.shape, step)
@@ -77,7 +77,7 @@ def render(
 
 
 def interpolate(values: NDArray[np.float32], faces: NDArray[np.int32], samples: Samples) -> NDArray[np.float32]:
-    """Values (population or 1, n, channels) of the vertices at the samples (population, m, channels)."""
+    """Interpolates values (population or 1, n, channels) of the vertices at the samples (population, m, channels)."""
     result = np.empty((*samples.pixel.shape, values.shape[2]), np.float32)
     _interpolate(values, faces, samples.face, samples.weights, result)
     return result
@@ -86,7 +86,7 @@ def interpolate(values: NDArray[np.float32], faces: NDArray[np.int32], samples: 
 def _box(
     place: NDArray[np.float32], inverse_z: NDArray[np.float32], shape: tuple[int, ...], step: int
 ) -> tuple[int, int, int, int]:
-    """First row and column, and number of both, in steps, of what a population covers of an image."""
+    """Bounding box of a population in an image: first row and column, and number of both, in steps."""
     low, high = np.full(2, np.inf), np.full(2, -np.inf)
     extent(place, inverse_z, low, high)
     if high[0] < low[0]:
@@ -101,7 +101,7 @@ def _box(
 def extent(
     place: NDArray[np.float32], inverse_z: NDArray[np.float32], low: NDArray[np.float64], high: NDArray[np.float64]
 ) -> None:
-    """Least and greatest (row, column) of all vertices that the camera can see."""
+    """Minimum and maximum (row, column) of all vertices that the camera can see."""
     for k in range(place.shape[0]):
         for v in range(place.shape[1]):
             if not np.isnan(inverse_z[k, v]):
@@ -122,7 +122,7 @@ def _rasterize(
     face: NDArray[np.int32],
     count: NDArray[np.int64],
 ) -> None:
-    """Nearest face, −1 if none, and its 1/z at every `step`-th pixel from (top, left) · step on; counts the faces."""
+    """Nearest face (−1 if none) and its 1/z at every `step`-th pixel from (top, left) · step; counts the samples."""
     height, width = nearness.shape[1:]
     one = np.float32(1)
     for k in range(nearness.shape[0]):
@@ -189,7 +189,7 @@ def _collect(
                 area = bx * cy - by * cx
                 at_b, at_c = (right * cy - down * cx) / area, (bx * down - by * right) / area
                 z = 1 / nearness[k, row, column]
-                # The image's y axis points down: faces that turn clockwise in it show their front.
+                # The image's y axis points down: faces that are clockwise in it are front faces.
                 pixel[k, i] = (y + 1) * stride + x + 1 if area < 0 else 0
                 distance[k, i] = ray_length[y, x] * z
                 index[k, i] = f
