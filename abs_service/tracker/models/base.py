@@ -1,4 +1,4 @@
-"""What a deformation model is."""
+"""Interface of deformation models, and the surfaces and Jacobians that they compute."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 
-#: Width and height [m] of a flat board, for models that any board would do for.
+#: Width and height [m] of a flat board, for models that can be built from a board of any size.
 BOARD = (0.3, 0.2)
 
 
@@ -56,7 +56,7 @@ class SparseJacobian:
 
 
 class ModelError(ValueError):
-    """A model that cannot be made from these settings and this mesh."""
+    """A model cannot be built from these settings and this mesh."""
 
 
 class DeformationModel(Protocol):
@@ -65,9 +65,9 @@ class DeformationModel(Protocol):
     Attributes:
         mesh: the mesh it deforms, vertices in the order of `deform`'s output.
         rest: parameters Θ⁰ (dim,) that leave the mesh undeformed.
-        scales: size (dim,) of each parameter that moves the surface by about one metre.
-        prior: what is known of Θ before any measurement: a matrix (k, dim) whose product with Θ − Θ⁰ is standard
-            normal; k is 0 where nothing is known.
+        scales: change (dim,) of each parameter that moves the surface by about one metre.
+        prior: square root (k, dim) of the precision matrix of a Gaussian prior: its product with Θ − Θ⁰ is standard
+            normal; k is 0 without a prior.
     """
 
     mesh: Mesh

@@ -1,4 +1,4 @@
-"""FlexPad: a sheet that bends in four directions through its centre, each side on its own (Steimle, Jordt, Maes)."""
+"""FlexPad: a sheet that bends along four directions through its centre, each side separately (Steimle, Jordt, Maes)."""
 
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -22,13 +22,13 @@ from calib.jit import composed, kernel, prange
 BENDS, HEIGHT, ROTATION, TRANSLATION = slice(0, 8), 8, slice(9, 12), slice(12, 15)
 DIMENSION = 15
 
-#: Largest parameter of the height map. Heights up to half the sheet's long side stay in order with it.
+#: Largest parameter of the height map; up to it, the map is monotonic for heights up to half the sheet's long side.
 FULL_HEIGHT = 0.5
 
 #: Standard deviation of the height map's parameter before any measurement.
 HEIGHT_DEVIATION = 0.2
 
-#: Share of x and of y in the directions between them, √½.
+#: Components of the diagonal directions along x and y, √½.
 _ROOT = np.float32(np.sqrt(0.5))
 
 
@@ -37,11 +37,11 @@ class Settings:
     """TOML keys of the model.
 
     Attributes:
-        width_m, height_m: long and short side of the sheet [m]; 0 takes what is detected.
-        size_tolerance: relative difference between a given and the detected side up to which it is the sheet.
+        width_m, height_m: long and short side of the sheet [m]; 0 uses the detected size.
+        size_tolerance: largest relative difference between a given and the detected side.
         least_radius_m: radius [m] of the sheet when a bend is 2, its largest value.
-        bend_deviation: standard deviation of a bend before any measurement. Opposite bends of neighbouring directions
-            nearly cancel, and measurements alone do not say how large both are.
+        bend_deviation: prior standard deviation of a bend. Opposite bends of neighbouring directions nearly cancel, so
+            measurements alone do not determine their common magnitude.
     """
 
     width_m: Annotated[float, Interval(ge=0, le=10)] = 0.0
@@ -56,14 +56,14 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board that the model can be built from: the sheet."""
+        """Width and height [m] of a flat board from which the model can be built: the sheet."""
         return (self.width_m, self.height_m) if self.width_m else BOARD
 
     def build(self, detection: InitialDetection) -> "FlexPad":
         """The model of a flat sheet.
 
         Raises:
-            DetectionError: what is seen is no flat rectangle, or not of the given size.
+            DetectionError: the object is not a flat rectangle, or not of the given size.
             ModelError: the sheet is too large for the least radius.
         """
         sheet = find_sheet(detection)
@@ -76,14 +76,14 @@ class FlexPad:
     """Θ = 8 bends in [−2, 2], height map in [−½, ½], rotation vector [rad] about the sheet's centre, translation [m].
 
     The bends come in pairs, one for either side of the directions 0°, 45°, 90° and 135° from the sheet's long side;
-    positive ones bend towards the sensor. Displacements of the sides add up, then heights z (towards the sensor) become
-    z + g z²/c with c half the long side, then the pose is applied. Bends and g beyond their range count as its end.
+    positive ones bend towards the sensor. Displacements of the sides are summed, then heights z (towards the sensor)
+    become z + g z²/c with c half the long side, then the pose is applied. Bends and g outside their range are clamped.
 
     Attributes:
         mesh: a grid on the flat sheet.
         rest: zeros (15,).
         scales: (15,).
-        prior: bends and height map are normal around zero (9, 15).
+        prior: (9, 15), Gaussian with zero mean for bends and height map.
     """
 
     def __init__(self, sheet: Sheet, vertices: int, least_radius: float, bend_deviation: float):
@@ -116,7 +116,7 @@ class FlexPad:
         return self._pose, self._per_bend, self._half, self._padded, series.coefficients, series.scale
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, 15) of the vertices at theta (15,), by bends and g beyond their range none."""
+        """Jacobian (n, 3, 15) of the vertices with respect to theta, at theta (15,); zero for clamped parameters."""
         turn = pose.from_rotation_vector(theta[ROTATION], (0, 0, 0))[:3, :3]
         turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
         result = np.empty((len(turned), 3, DIMENSION))
@@ -127,12 +127,12 @@ class FlexPad:
         return result
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """As `jacobian`: every parameter moves every vertex."""
+        """The dense Jacobian as one group: every parameter moves every vertex."""
         return SparseJacobian.from_dense(self.jacobian(theta))
 
 
 def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> NDArray[np.float64]:
-    """Size (15,) of each parameter that moves the farthest vertex by about a metre when the sheet is bent by 1."""
+    """Change (15,) of each parameter that moves the farthest vertex by about one metre when the sheet is bent by 1."""
     reach = np.max(bends.SIDES @ points.T, axis=1)
     kappa = 1 / (bends.FULL * least_radius)
     rise = (1 - np.cos(kappa * reach)) / kappa
@@ -152,7 +152,7 @@ def _deform(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
-    """Sums the bends, maps the heights and applies the pose, for a population.
+    """Vertices and normals of a population: sums the bends, maps the heights and applies the pose.
 
     Args:
         thetas: parameters (population, 15).
@@ -173,7 +173,7 @@ def _deform(
         for first in range(0, n, TILE):
             count, xs, ys = min(TILE, n - first), points[0, first:], points[1, first:]
             lanes = np.uintp((count + LANES - 1) // LANES * LANES)
-            # Two loops: in one, too few vertices would be under way at once for all units of the processor.
+            # Two loops: a single one would leave too few vertices in flight for the processor's execution units.
             for v in range(lanes):
                 x, y = xs[v], ys[v]
                 shift_0, z_0, shrink_0, g_0 = roll(x, e, series, scale)
@@ -188,11 +188,11 @@ def _deform(
                 x, y, z, across, along, shear = w[0, v], w[1, v], w[2, v], w[5, v], w[6, v], w[7, v]
                 steep = one + two * height * z
                 z, g, h = z + height * z * z, w[3, v] * steep, w[4, v] * steep
-                # The cross product of the tangents by x and y, each the sum of the sides' derivatives.
+                # Cross product of the tangents ∂/∂x and ∂/∂y, each the sum of the sides' derivatives.
                 a, b, d = along * g - shear * h, across * h - shear * g, across * along - shear * shear
                 inverse = -one / np.sqrt(a * a + b * b + d * d + np.float32(1e-20))
                 a, b, d = a * inverse, b * inverse, d * inverse
-                # Written out, since with a loop over the coordinates the compiler would not vectorise the one around.
+                # Unrolled, because the compiler does not vectorise the enclosing loop around a loop over coordinates.
                 w[0, v] = of_x[0] * x + of_x[1] * y - of_x[2] * z + of_x[3]
                 w[1, v] = of_y[0] * x + of_y[1] * y - of_y[2] * z + of_y[3]
                 w[2, v] = of_z[0] * x + of_z[1] * y - of_z[2] * z + of_z[3]

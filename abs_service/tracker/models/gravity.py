@@ -1,4 +1,4 @@
-"""A strip that a gripper holds and that bends under gravity: segments of constant curvature (eq. 9; Fugl et al.)."""
+"""A strip held by a gripper that bends under gravity: segments of constant curvature (eq. 9; Fugl et al.)."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
@@ -16,10 +16,10 @@ from calib import pose
 from calib.jit import kernel, prange
 from calib.pose import Pose
 
-#: Columns of vertices that every segment has at least; with fewer its curvature could not be told from its direction.
+#: Minimum number of vertex columns per segment; with fewer, curvature and direction cannot be separated.
 COLUMNS_PER_SEGMENT = 3
 
-#: Width and height of a board that hangs down, as narrow as a strip is typically.
+#: Width and height [m] of a hanging board, as narrow as a typical strip.
 BOARD = (0.06, 0.3)
 
 
@@ -28,11 +28,11 @@ class Settings:
     """TOML keys of the model.
 
     Attributes:
-        segments: parts of equal length, each of constant curvature.
-        gripper: `free` if the held end moves, so that its pose is in Θ; `fixed` if it stays where it was found.
+        segments: number of segments of equal length, each of constant curvature.
+        gripper: `free` if the held end moves, so that Θ contains its pose; `fixed` if it stays at its detected pose.
         gravity: direction of gravity in the rig; the default fits a level reference camera.
         towards_gripper: direction in the rig from the free end to the held one; zeros: against gravity.
-        length_m: free length of the strip [m]; 0 takes what is detected.
+        length_m: free length of the strip [m]; 0 uses the detected length.
     """
 
     segments: Annotated[int, Interval(ge=1, le=16)] = 8
@@ -47,7 +47,7 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board that the model can be built from: one that hangs down."""
+        """Width and height [m] of a flat board from which the model can be built: a hanging one."""
         return (self.length_m / 5, self.length_m) if self.length_m else BOARD
 
     @property
@@ -56,10 +56,10 @@ class Settings:
         return np.array(self.gravity) / np.linalg.norm(self.gravity)
 
     def build(self, detection: InitialDetection) -> "Gravity":
-        """The model of a strip that hangs as it is seen.
+        """The model of a strip in its detected shape.
 
         Raises:
-            DetectionError: too little is seen, or no strip.
+            DetectionError: too little is visible, or the object is not a strip.
         """
         held = np.array(self.towards_gripper) if any(self.towards_gripper) else -self.down
         strip = find_strip(detection, self.down, held, self.length_m)
@@ -67,17 +67,17 @@ class Settings:
 
 
 class Gravity:
-    """Θ = angles by which the segments bend, from the gripper on [rad]; if the gripper is free, then its motion.
+    """Θ = bending angles of the segments, starting at the gripper [rad]; then the motion of a free gripper.
 
     Positive angles bend towards the side that faced the sensor. The motion is a rotation vector [rad] about the middle
-    of the gripper line and a translation [m], both since the strip was found. The strip keeps its length and width.
+    of the gripper line and a translation [m], both relative to the detection. The strip keeps its length and width.
 
     Attributes:
-        mesh: a grid on the strip as it hung when it was found, rows along it.
-        rest: the angles of that moment, no motion.
+        mesh: a grid on the strip in its detected shape, rows along it.
+        rest: the detected angles, no motion.
         scales: (dim,).
-        prior: nothing is known (0, dim).
-        strip: what was found.
+        prior: none (0, dim).
+        strip: the detected strip.
         segments: number of segments.
     """
 
@@ -105,7 +105,7 @@ class Gravity:
         return Surface(vertices, normals)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
+        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
         gripper = self._gripper(theta[None])[0]
         slopes = self._slopes(theta[: self.segments])
         in_plane = np.stack([slopes.real, slopes.imag], axis=-1) @ gripper[:, [0, 2]].T
@@ -117,13 +117,13 @@ class Gravity:
         return np.concatenate([by_bends, turning, np.broadcast_to(np.eye(3), turning.shape)], axis=2)
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """As `jacobian`: every parameter moves every vertex."""
+        """The dense Jacobian as one group: every parameter moves every vertex."""
         return SparseJacobian.from_dense(self.jacobian(theta))
 
     def _slopes(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Derivatives (segments, columns) of the columns' places along (real) and across (imaginary) the gripper's x.
+        """Derivatives (segments, columns) of the columns' coordinates along the gripper's x (real) and z (imaginary).
 
-        A bend changes its own segment's arc, and turns what comes after.
+        A bend changes the arc of its own segment and rotates the following ones.
         """
         shares = np.clip(self._along / self._step - np.arange(self.segments)[:, None], 0, 1)
         starts = self._step * np.exp(1j * (np.cumsum(bends) - bends))[:, None] * shares
@@ -132,9 +132,9 @@ class Gravity:
         return starts * shares * slope + 1j * (passed[-1] - passed)
 
     def inclination(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Angle between the strip and the horizontal, downwards, (segments + 1,) [rad] at the ends of the segments.
+        """Downward inclination of the strip from the horizontal at the ends of the segments, (segments + 1,) [rad].
 
-        It is that in the plane of bending, whatever else the gripper does.
+        Measured in the plane of bending, independent of the other motion of the gripper.
         """
         down = self.T_rg(theta)[:3, :3].T @ self._down
         start = np.arctan2(down[0], abs(down[2]))
@@ -148,11 +148,11 @@ class Gravity:
         return (points - T_rg[:3, 3]) @ axes
 
     def T_rg(self, theta: NDArray[np.float64]) -> Pose:
-        """Pose of the gripper line: x along the strip as it leaves it, y along the line."""
+        """Pose of the gripper line: x along the strip's tangent at the gripper, y along the line."""
         return np.vstack([self._gripper(theta[None])[0], [0.0, 0.0, 0.0, 1.0]])
 
     def _gripper(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rotation and position (population, 3, 4) of the gripper line in the rig."""
+        """Poses (population, 3, 4) of the gripper line in the rig."""
         motion = thetas[:, self.segments :]
         if not motion.shape[1]:
             return np.tile(self._T_rg[:3], (len(thetas), 1, 1))
@@ -170,23 +170,23 @@ def _deform(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
-    """Eq. 9 for a population: arcs that go on from each other, then extended sideways.
+    """Eq. 9 for a population: concatenated arcs, extruded sideways.
 
-    The chord of an arc of length s that bends by a is s · sin(a/2)/(a/2) long and turned by a/2: eq. 9 without its
-    radius, which would be infinite for a straight segment.
+    The chord of an arc of length s and angle a has length s · sin(a/2)/(a/2) and is rotated by a/2: eq. 9 without its
+    radius, which is infinite for a straight segment.
 
     Args:
-        bends: of the segments (population, k) [rad].
+        bends: angles of the segments (population, k) [rad].
         step: length of a segment [m].
-        gripper: rotation and position of the gripper line in the rig (population, 3, 4).
+        gripper: poses of the gripper line in the rig (population, 3, 4).
         along: arc length of the mesh's columns (columns,) [m], ascending.
-        across: place of its rows on the gripper line (rows,) [m].
+        across: coordinate of its rows along the gripper line (rows,) [m].
         vertices, normals: results (population, 3, rows · columns).
     """
     columns, last = along.size, bends.shape[1] - 1
     for k in prange(bends.shape[0]):
         line = np.empty((6, columns), np.float32)
-        x, z, phi, segment = 0.0, 0.0, 0.0, 0  # where the segment begins
+        x, z, phi, segment = 0.0, 0.0, 0.0, 0  # start of the segment
         for c in range(columns):
             while segment < last and along[c] > (segment + 1) * step:
                 half = 0.5 * bends[k, segment]

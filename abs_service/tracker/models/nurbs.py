@@ -1,4 +1,4 @@
-"""NURBS deformation: every vertex follows a spline surface whose control points are the parameters (eqs. 2–8)."""
+"""NURBS deformation: vertices bound to a spline surface whose control points are the parameters (eqs. 2–8)."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -23,13 +23,13 @@ class Settings:
     """TOML keys of the model.
 
     Attributes:
-        control_points: control points along the object's long and short side; Θ has three numbers for each.
+        control_points: numbers of control points along the object's long and short side; Θ has three values for each.
         degree: polynomial degree of the splines.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
-        weights: weight of every control point, a table of as many rows and columns; the surface comes closer to a point
-            of more weight than its neighbours. Empty: all 1, a plain B-spline surface.
-        smoothing: weight of the bending of the rest surface against the squared distance to the vertices when
-            it is fitted; it decides only where the object has no vertices.
+        weights: weight of every control point, a table of as many rows and columns; a larger weight than that of the
+            neighbours pulls the surface towards the point. Empty: all 1, a plain B-spline surface.
+        smoothing: weight of the bending of the rest surface relative to the squared distances to the vertices in its
+            fit; it has an effect only where the object has no vertices.
     """
 
     control_points: tuple[ControlPoints, ControlPoints] = (4, 4)
@@ -49,14 +49,14 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board that the model can be built from: any."""
+        """Width and height [m] of a flat board from which the model can be built: any."""
         return BOARD
 
     def build(self, detection: InitialDetection) -> "Nurbs":
         """The surface of an object of any smooth shape.
 
         Raises:
-            ModelError, DetectionError: the object is too small, or no such surface can carry it.
+            ModelError, DetectionError: the object is too small, or cannot be bound to such a surface.
         """
         return self.of_mesh(grid_mesh(detection))
 
@@ -64,7 +64,7 @@ class Settings:
         """Fits the rest surface to the mesh by least squares and binds every vertex to it.
 
         Raises:
-            ModelError: too few control points for the degree, or a mesh that no such surface can carry.
+            ModelError: too few control points for the degree, or the mesh cannot be bound to such a surface.
         """
         if min(self.control_points) <= self.degree:
             raise ModelError(
@@ -84,8 +84,8 @@ class Nurbs:
     Attributes:
         mesh: the mesh, its vertices sorted by knot span; a vertex at the surface's edge is moved onto its normal there.
         rest: control points Θ⁰ (dim,) of the rest surface [m].
-        scales: ones (dim,), since every parameter is a length.
-        prior: nothing is known (0, dim).
+        scales: ones (dim,), because every parameter is a length.
+        prior: none (0, dim).
     """
 
     def __init__(
@@ -120,16 +120,16 @@ class Nurbs:
         return self._patches.deform(thetas)
 
     def add_offsets(self, by: NDArray[np.float64]) -> None:
-        """Adds lengths (n,) [m] to the offsets of the vertices along their normals, at rest and deformed."""
+        """Adds lengths (n,) [m] to the vertex offsets along the normals, at rest and deformed."""
         self._offset += by.astype(np.float32)
         self._patches.add_offsets(by)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the vertices at theta (dim,)."""
+        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
         return self.sparse_jacobian(theta).dense
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The same: the control points of its knot span move a vertex."""
+        """The Jacobian grouped by knot span: a vertex depends on the control points of its span only."""
         local = np.empty((len(self._offset), 3, self._span_parameters.shape[1]))
         _moves(theta.reshape(-1, 3), self._span_start, self._span_control, self._basis, self._offset, local)
         return SparseJacobian(local, self._span, self._span_parameters, len(theta))
@@ -144,11 +144,11 @@ def _moves(
     offset: NDArray[np.float32],
     result: NDArray[np.float64],
 ) -> None:
-    """Derivatives of eq. 8 by the control points: ∂D(v)/∂p = R_p I − o ∇R_p N̂ᵀ.
+    """Jacobian of eq. 8 with respect to the control points: ∂D(v)/∂p = R_p I − o ∇R_p N̂ᵀ.
 
-    Where a motion along the normal rises, N̂ turns back by as much: its derivative is −∇R_p N̂ᵀ, with the gradient
-    ∇R_p = ∂R_p/∂u a + ∂R_p/∂w b on the surface. Of its tangents U and W with N = U × W, the dual ones are
-    a = W × N̂/‖N‖ and b = N̂ × U/‖N‖.
+    The derivative of the unit normal N̂ with respect to p is −∇R_p N̂ᵀ, with the surface gradient
+    ∇R_p = ∂R_p/∂u a + ∂R_p/∂w b. The dual basis of the tangents U and W with N = U × W is a = W × N̂/‖N‖ and
+    b = N̂ × U/‖N‖.
 
     Args:
         control: (control points, 3).
@@ -156,7 +156,7 @@ def _moves(
         span_control: control points of every span (spans, q).
         basis: R, ∂R/∂u, ∂R/∂w of every vertex for its span's control points (3, q, n).
         offset: o of eq. 7 (n,).
-        result: derivatives (n, 3, 3 · q) by the control points of each vertex's span.
+        result: derivatives (n, 3, 3 · q) with respect to the control points of each vertex's span.
     """
     for s in range(span_control.shape[0]):
         for v in range(span_start[s], span_start[s + 1]):

@@ -1,4 +1,4 @@
-"""A pose on top of another model's shape: the object moves as a whole, and deforms."""
+"""A rigid pose combined with another deformation model: the object moves as a whole and deforms."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,10 +12,10 @@ from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Su
 from calib import pose
 from calib.jit import kernel, prange
 
-#: Standard deviation of the rigid motion that is left to the shape [m].
+#: Prior standard deviation of the rigid motion within the shape's own parameters [m].
 GAUGE_M = 1e-4
 
-#: A shape can do a rigid motion by itself if the cosine between it and the shape's nearest motion is larger.
+#: A shape contains a rigid motion if the cosine between the motion and the span of the shape's Jacobian is larger.
 CONTAINED = 0.999
 
 
@@ -31,11 +31,11 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board that the shape can be built from."""
+        """Width and height [m] of a flat board from which the shape can be built."""
         return self.shape.board
 
     def build(self, detection: InitialDetection) -> "Posed":
-        """The shape of an object with a pose.
+        """The model of an object: its shape with a pose.
 
         Raises:
             ModelError, DetectionError: the shape cannot be built.
@@ -47,15 +47,15 @@ class Posed:
     """Θ = rotation vector [rad] about the centroid of the mesh at rest, translation [m], then the shape's parameters.
 
     The shape deforms first. If it can move rigidly by itself (all control points of a NURBS together), one surface has
-    many Θ. Which of them is meant is said by the prior: to first order, the rigid part of the shape's motion, in the
-    sense of least squares over the vertices, is normal around zero with a deviation of `GAUGE_M`. No measurement speaks
-    against it, so the pose is the object's pose, and the shape is what remains.
+    many Θ. The prior fixes this gauge freedom: to first order, the rigid part of the shape's motion (least squares over
+    the vertices) is Gaussian with zero mean and a deviation of `GAUGE_M`. It contradicts no measurement, so the pose
+    parameters are the pose of the object, and the shape parameters its deformation.
 
     Attributes:
         mesh: the shape's mesh.
         rest: no motion, the shape at rest.
         scales: the rotation [rad] that moves the farthest vertex by one metre, one metre, the shape's own.
-        prior: the shape's own, then one row per rigid motion that the shape can do by itself.
+        prior: the shape's own, then one row per rigid motion that the shape contains.
     """
 
     def __init__(self, shape: DeformationModel):
@@ -77,11 +77,11 @@ class Posed:
         return surface
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, dim) of the vertices at theta (dim,): those of the pose, then the shape's, turned."""
+        """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,): pose, then the rotated shape."""
         return self.sparse_jacobian(theta).dense
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """The same: the pose moves every vertex, and what moves it in the shape."""
+        """The Jacobian in the shape's groups: a vertex depends on the pose and on the shape parameters of its group."""
         R = pose.from_rotation_vector(theta[:3], (0, 0, 0))[:3, :3]
         turned = (self._shape.deform(theta[None, 6:]).vertices[0].T - self._centroid) @ R.T
         shape = self._shape.sparse_jacobian(theta[6:])
@@ -94,9 +94,9 @@ class Posed:
 
 
 def _gauge(shape: DeformationModel) -> NDArray[np.float64]:
-    """Rows (k, dim of the shape) of the prior, one for each of k ≤ 6 rigid motions that the shape can do by itself."""
+    """Rows (k, dim of the shape) of the prior, one for each of k ≤ 6 rigid motions that the shape contains."""
     count = len(shape.mesh.vertices)
-    # Columns: how the vertices move, component by component, when a parameter moves the surface by a metre.
+    # Columns: the scaled Jacobian, the displacement of all vertex components when a parameter changes by its scale.
     motions = shape.jacobian(shape.rest).transpose(1, 0, 2).reshape(3 * count, -1) * shape.scales
     arms = shape.mesh.vertices - shape.mesh.vertices.mean(axis=0)
     turns = [np.cross(axis, arms).T.ravel() for axis in np.eye(3)]
@@ -114,7 +114,7 @@ def _move(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
-    """Rotates vertices and normals (population, 3, n) about `center` (3,) and puts it where `motion` (…, 3, 4) says."""
+    """Transforms vertices and normals (population, 3, n) by `motion` (…, 3, 4) about `center` (3,), in place."""
     n = vertices.shape[2]
     for k in prange(vertices.shape[0]):
         old = np.empty((2, 3, n), np.float32)

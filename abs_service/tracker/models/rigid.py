@@ -1,4 +1,4 @@
-"""Rigid motion: the simplest deformation, six parameters."""
+"""Rigid motion: the simplest model, with six parameters."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ class Settings:
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board that the model can be built from: any."""
+        """Width and height [m] of a flat board from which the model can be built: any."""
         return BOARD
 
     def build(self, detection: InitialDetection) -> "Rigid":
@@ -38,7 +38,7 @@ class Rigid:
         mesh: the mesh.
         rest: zeros (6,).
         scales: (6,): the rotation [rad] that moves the farthest vertex by one metre, and one metre.
-        prior: nothing is known (0, 6).
+        prior: none (0, 6).
     """
 
     def __init__(self, mesh: Mesh):
@@ -61,11 +61,11 @@ class Rigid:
         return Surface(vertices.reshape(shape), normals.reshape(shape))
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives (n, 3, 6) of the vertices at theta (6,)."""
+        """Jacobian (n, 3, 6) of the vertices with respect to theta, at theta (6,)."""
         turned = pose.transform(pose.from_rotation_vector(theta[:3], (0, 0, 0)), self._arms)
         shifts = np.broadcast_to(np.eye(3), (len(turned), 3, 3))
         return np.concatenate([pose.rotated_points_jacobian(theta[:3], turned), shifts], axis=2)
 
     def sparse_jacobian(self, theta: NDArray[np.float64]) -> SparseJacobian:
-        """As `jacobian`: every parameter moves every vertex."""
+        """The dense Jacobian as one group: every parameter moves every vertex."""
         return SparseJacobian.from_dense(self.jacobian(theta))

@@ -1,1 +1,1 @@
-"""Kernels and bases that several deformation models share."""
+"""Kernels and basis functions shared by several deformation models."""

@@ -1,6 +1,6 @@
-"""Arcs of constant curvature in the complex plane: they begin at 0 along the real axis and bend towards the imaginary.
+"""Arcs of constant curvature in the complex plane: they start at 0 along the real axis, bend towards the imaginary one.
 
-exp(iα) times an arc is one that begins in the direction α, so that arcs which go on from each other are sums.
+exp(iα) times an arc starts in the direction α, so concatenated arcs are sums.
 """
 
 import numpy as np
@@ -8,12 +8,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from calib.jit import kernel
 
-#: Bend [rad] below which series are closer than quotients of rounded differences; either errs by less than 1e-9.
+#: Bend [rad] below which the series is more accurate than the closed form; the error of either is below 1e-9.
 SMALL = 1e-3
 
 
 def arc(bend: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """End of an arc of length one, ∫ exp(i bend t) dt from 0 to 1, and its derivative by the bend (…) [rad]."""
+    """End point of an arc of unit length, ∫ exp(i bend t) dt from 0 to 1, and its derivative with respect to the bend.
+
+    Both have the shape (…) of the bend [rad].
+    """
     bends = np.asarray(bend, np.float64)
     end, slope = np.empty(bends.shape, np.complex128), np.empty(bends.shape, np.complex128)
     _ends(bends.reshape(-1), end.reshape(-1), slope.reshape(-1))
@@ -28,7 +31,7 @@ def _ends(bends: NDArray[np.float64], ends: NDArray[np.complex128], slopes: NDAr
 
 @kernel
 def end_of(bend: float) -> tuple[complex, complex]:
-    """What `arc` tells, for one bend."""
+    """Same as `arc`, for one bend."""
     if abs(bend) < SMALL:
         return 1 - bend * bend / 6 + 0.5j * bend, -bend / 3 + 1j * (0.5 - 0.125 * bend * bend)
     turn = np.cos(bend) + 1j * np.sin(bend)

@@ -1,4 +1,4 @@
-"""FlexPad's bends: a sheet rolled up on one side of a line through its centre, in four directions."""
+"""Bends of the FlexPad model: circular arcs on each side of a line through the sheet's centre, in four directions."""
 
 from dataclasses import dataclass
 
@@ -10,10 +10,10 @@ from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.models.parts.arc import end_of
 from calib.jit import kernel
 
-#: Angles [rad] of the directions a along which the sheet bends, from its x axis towards its y axis.
+#: Angles [rad] of the directions along which the sheet bends, from its x axis towards its y axis.
 ANGLES = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 
-#: In-plane unit vectors (8, 2) that point away from the centre: both sides of every direction, the side of a first.
+#: In-plane unit vectors (8, 2) that point away from the centre: both sides of every direction, the positive one first.
 SIDES = (
     np.stack([[np.cos(ANGLES), np.sin(ANGLES)], [-np.cos(ANGLES), -np.sin(ANGLES)]]).transpose(2, 0, 1).reshape(8, 2)
 )
@@ -21,19 +21,19 @@ SIDES = (
 #: Largest parameter of a bend: full bend towards (+) or away from (−) the sensor.
 FULL = 2.0
 
-#: Turns by which a sheet rolls up at most, and degree of the polynomials that follow it so far with an error below
-#: 1e-7 of the distance from the centre. Few, because each degree is machine code of its own, which takes seconds to
-#: compile when a sheet of that size is first seen. Beyond the last, single precision would lose too many digits.
+#: Maximum number of turns of a rolled-up sheet, and degree of the polynomials that approximate it with an error below
+#: 1e-7 of the distance from the centre. Few, because each degree is compiled separately, which takes seconds when a
+#: sheet of that size is first detected. Beyond the last, single precision loses too many digits.
 DEGREES = {1 / 3: 4, 2 / 3: 6, 4 / 3: 10, 3.0: 16}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """sin t / t and (1 − cos t)/t², which are even and so polynomials of t², of u = scale · t² − 1 from −1 to 1.
+    """Polynomials for sin t / t and (1 − cos t)/t², even functions, in the variable u = scale · t² − 1 from −1 to 1.
 
     Attributes:
-        coefficients: of both (2, degree + 1), of the highest power first.
-        scale: of t².
+        coefficients: of both (2, degree + 1), in descending powers.
+        scale: factor of t².
     """
 
     coefficients: NDArray[np.float32]
@@ -41,14 +41,14 @@ class Series:
 
 
 def fit(reach: float, least_radius: float) -> Series:
-    """Polynomials that interpolate both functions as far as a sheet can be bent.
+    """Polynomials that interpolate both functions over the range of possible bends.
 
     Args:
         reach: largest distance of a vertex from the centre [m].
         least_radius: radius at a parameter of `FULL` [m].
 
     Raises:
-        ModelError: the sheet would roll up too often.
+        ModelError: the sheet would roll up by too many turns.
     """
     turns = reach / least_radius / (2 * np.pi)
     limit = next((limit for limit in DEGREES if turns <= limit), None)
@@ -68,26 +68,26 @@ def fit(reach: float, least_radius: float) -> Series:
 
 
 def _above(reach: float, turns: float) -> float:
-    """Least radius [m] that is allowed, rounded up to 1 mm."""
+    """Smallest allowed radius [m], rounded up to 1 mm."""
     return np.ceil(1e3 * reach / (2 * np.pi * turns)) / 1e3
 
 
 def _sine(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The sine of t, by t; numpy.sinc(x) is sin(πx)/πx."""
+    """Sin t / t; numpy.sinc(x) is sin(πx)/πx."""
     return np.sinc(t / np.pi)
 
 
 def _versine(t: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The versine of t, 1 − cos t, by t²."""
+    """Versine over t², (1 − cos t)/t²."""
     return 0.5 * np.sinc(t / (2 * np.pi)) ** 2
 
 
 @kernel
 def bend(theta: NDArray[np.float64], direction: int, per_bend: float) -> tuple[np.float32, np.float32]:
-    """Mean of the curvatures ahead and behind in a direction, and half their difference [1/m].
+    """Mean of the curvatures on both sides of a direction, and half their difference [1/m].
 
-    With p the distance along it, mean · p + difference · |p| is κp on either side. The compiler would turn a choice of
-    one or the other into a choice in double precision for every vertex.
+    With p the signed distance along the direction, mean · p + difference · |p| is κp on either side. A branch would be
+    compiled into a selection in double precision for every vertex.
 
     Args:
         theta: parameters (15,).
@@ -99,7 +99,7 @@ def bend(theta: NDArray[np.float64], direction: int, per_bend: float) -> tuple[n
     return np.float32(ahead + behind), np.float32(ahead - behind)
 
 
-#: Coefficients of a polynomial; a constant, so that the compiler unrolls what runs over them.
+#: Number of polynomial coefficients; a compile-time constant, so that loops over them are unrolled.
 ORDERS = 5
 
 
@@ -110,17 +110,17 @@ def roll(
     series: NDArray[np.float32],
     scale: float,
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """What the bends of a direction do to a vertex: with t = κp, it moves to sin(t)/κ and rises by (1 − cos t)/κ.
+    """Displacement of a vertex by the bends of a direction: with t = κp, to sin(t)/κ along it, (1 − cos t)/κ in height.
 
-    A vertex lies on one side only, and what the side's own direction is cancels.
+    A vertex lies on one side only; the sign of the side cancels.
 
     Args:
         p: signed distance from the centre along the direction [m].
-        kappa: as `bend` tells them.
+        kappa: mean and half difference of the curvatures, see `bend`.
         series, scale: as in `Series`.
 
     Returns:
-        Shift along the direction [m], rise [m], and the derivatives of both by p.
+        Shift along the direction [m], height [m], and the derivatives of both with respect to p.
     """
     t = kappa[0] * p + kappa[1] * abs(p)
     square = t * t
@@ -144,19 +144,19 @@ def slopes(
     half: float,
     result: NDArray[np.float64],
 ) -> None:
-    """Derivatives of places on a sheet by the bends of its sides and by its height map, none beyond their range.
+    """Jacobian of the vertices with respect to the bends and the height map; zero for clamped parameters.
 
-    At a distance q from the centre, an arc of curvature κ rises by q (1 − cos κq)/κq and reaches q sin κq/κq.
+    At arc length q from the centre, an arc of curvature κ has height q (1 − cos κq)/κq and extent q sin κq/κq.
 
     Args:
-        parameters: of the bends (8,).
-        height, full_height: parameter of the height map g, and the end of its range; heights z become z + g z²/half.
+        parameters: parameters of the bends (8,).
+        height, full_height: parameter g of the height map, and its largest value; heights z become z + g z²/half.
         sides: see `SIDES`.
         points: vertices on the flat sheet (2, n) [m].
-        rotation: from the sheet, z pointing away, to where the derivatives are wanted (3, 3).
+        rotation: (3, 3) from the sheet's frame, z pointing away from the sensor, to the frame of the derivatives.
         per_bend: curvature at a parameter of 1 [1/m].
         half: half the sheet's long side [m].
-        result: the first nine columns (n, 3, 9…) are written.
+        result: Jacobian (n, 3, 9…), whose first nine columns are written.
     """
     g, moves = min(max(height, -full_height), full_height), np.empty((3, 9))
     for v in range(points.shape[1]):

@@ -1,4 +1,4 @@
-"""Binds a mesh to a NURBS surface: the rest surface is fitted to it, every vertex finds its place on it (eqs. 6, 7)."""
+"""Binding of a mesh to a NURBS surface: fit of the rest surface, closest points and offsets of the vertices."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ BINDING_TOLERANCE_M = 1e-2
 
 
 def chart_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Surface parameters (n,) of the vertices: u along the chart's first axis; N̂ points as the mesh's normals do."""
+    """Surface parameters (n,) of the vertices: u along the chart's first axis; N̂ is oriented like their normals."""
     low, size = mesh.chart.min(axis=0), np.ptp(mesh.chart, axis=0)
     u, w = ((mesh.chart - low) / size * (1 - 2 * margin) + margin).T
     chart = mesh.chart[mesh.faces]
@@ -29,7 +29,7 @@ def fit_control_points(
     degree: int,
     smoothing: float,
 ) -> NDArray[np.float64]:
-    """Control points (rows, columns, 3) that minimise the squared distances plus a little bending.
+    """Control points (rows, columns, 3) that minimise the squared distances plus a bending penalty.
 
     Args:
         vertices: positions (n, 3) [m].

@@ -1,4 +1,4 @@
-"""Spline surfaces as one polynomial per knot span: half the work of summing base splines at every vertex."""
+"""Spline surfaces as one polynomial per knot span, at half the cost of summing basis functions at every vertex."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,11 @@ from calib.jit import composed, kernel, prange
 
 
 class Patches:
-    """Vertices beside a rational spline surface, sorted by knot span.
+    """Vertices bound to a rational spline surface, sorted by knot span.
 
-    Within a span, numerator and denominator of eq. 2 are polynomials of degree d in each of two coordinates that run
-    from −½ to ½ there. The numerator's (d + 1)² coefficients are linear in the span's control points, and all vertices
-    of the span share them; the denominator belongs to the vertices alone.
+    Within a span, numerator and denominator of eq. 2 are polynomials of degree d in each of two local coordinates from
+    −½ to ½. The numerator's (d + 1)² coefficients are linear in the span's control points and shared by all vertices of
+    the span; the denominator depends on the vertices only and is computed once.
     """
 
     def __init__(
@@ -25,13 +25,13 @@ class Patches:
         weights: NDArray[np.float64],
         degree: int,
     ):
-        """Takes surface parameters (n,), sorted by span, offsets (n,) [m] and the control points' weights.
+        """Precomputes the polynomials of the vertices.
 
         Args:
             u, w: surface parameters (n,) in [0, 1], in ascending order of the spans that `spline.support` numbers.
             offset: o of eq. 7 (n,) [m].
-            weights: of the control points (rows, columns).
-            degree: of the surface.
+            weights: weights of the control points (rows, columns).
+            degree: degree of the surface.
         """
         span, control = spline.support(u, w, weights.shape, degree)
         spans = np.subtract(weights.shape, degree)
@@ -61,14 +61,14 @@ class Patches:
         return self._control, self._powers, self._start, self._vertices
 
     def add_offsets(self, by: NDArray[np.float64]) -> None:
-        """Adds lengths (n,) [m] to the offsets."""
+        """Adds lengths (n,) [m] to the vertex offsets."""
         self._vertices[2, : len(by)] += by.astype(np.float32)
 
 
 def _polynomials(
     coefficients: NDArray[np.float64], u: NDArray[np.float64], w: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Values of n polynomials (n, d + 1, d + 1) at u and w (n,), and their derivatives by u and by w."""
+    """Values of n polynomials (n, d + 1, d + 1) at u and w (n,), and their derivatives with respect to u and w."""
     powers = np.arange(coefficients.shape[1])
     (of_u, by_u), (of_w, by_w) = (
         (at[:, None] ** powers, powers * at[:, None] ** np.maximum(powers - 1, 0)) for at in (u, w)
@@ -79,7 +79,7 @@ def _polynomials(
     return value, along_u, along_w
 
 
-#: Coefficients of a polynomial; a constant, so that the compiler unrolls what runs over them.
+#: Number of polynomial coefficients; a compile-time constant, so that loops over them are unrolled.
 ORDERS = 3
 
 
@@ -90,14 +90,15 @@ def _find_coefficients(
     powers: NDArray[np.float32],
     coefficients: NDArray[np.float32],
 ) -> None:
-    """Coefficients (spans, 3, q…) of x, y and z from the first control point on.
+    """Coefficients (spans, 3, q…) of x, y and z relative to the first control point.
 
-    From there, all are so near that single precision does: rounding moves a vertex by less than it does afterwards.
+    The relative coordinates are small, so single precision suffices: its rounding is below that of the final vertices.
 
     Args:
         control: one candidate's parameters (3 · control points,).
         span_control: control points of every span (spans, q).
-        powers: each control point's share of every coefficient (spans, q, q…), zeros up to a multiple of `LANES`.
+        powers: contribution of each control point to each coefficient (spans, q, q…), zero-padded to a multiple of
+            `LANES`.
         coefficients: results.
     """
     lanes = np.uintp(powers.shape[2] // LANES * LANES)
@@ -119,11 +120,11 @@ def _find_coefficients(
 def _polynomial(
     coefficients: NDArray[np.float32], u: np.float32, w: np.float32
 ) -> tuple[np.float32, np.float32, np.float32]:
-    """Value and derivatives by u and by w, by Horner's rule, of coefficients as in `_evaluate`."""
+    """Value and derivatives with respect to u and w by Horner's rule, for coefficients as in `_evaluate`."""
     value, by_u, by_w = np.float32(0), np.float32(0), np.float32(0)
     for i in range(ORDERS):
         row, slope = coefficients[(ORDERS - i) * ORDERS - 1], np.float32(0)
-        # Nothing is multiplied by 0 to begin with: since that could be NaN, the compiler would not leave it out.
+        # Starts at 1: the compiler cannot remove a multiplication by an initial 0, because the product may be NaN.
         for j in range(1, ORDERS):
             slope = slope * w + row if j > 1 else row
             row = row * w + coefficients[(ORDERS - i) * ORDERS - 1 - j]
@@ -142,13 +143,13 @@ def _evaluate(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
-    """Eq. 8 for a candidate.
+    """Eq. 8 for one candidate.
 
     Args:
-        coefficients: of the numerator's x, y and z (spans, 3, (d + 1)²…), powers of w within those of u.
-        origin: from which they count (3…) [m].
+        coefficients: of the numerator's x, y and z (spans, 3, (d + 1)²…), powers of w varying fastest.
+        origin: point (3…) [m] to which the coefficients are relative.
         start: first vertex of every span, and the number of vertices, (spans + 1,).
-        places: u, w, offset, 1 / denominator and its derivatives by u and by w (6, n + `LANES`).
+        places: u, w, offset, 1 / denominator and its derivatives with respect to u and w (6, n + `LANES`).
         vertices, normals: results (3, n).
     """
     one, n, s = np.float32(1), vertices.shape[1], 0
@@ -193,7 +194,7 @@ def _deform(
     vertices: NDArray[np.float32],
     normals: NDArray[np.float32],
 ) -> None:
-    """Vertices and normals (population, 3, n) of parameters (population, dim)."""
+    """Vertices and normals (population, 3, n) for thetas (population, dim)."""
     for k in prange(thetas.shape[0]):
         coefficients = np.empty((powers.shape[0], 3, powers.shape[2]), np.float32)
         _find_coefficients(thetas[k], span_control, powers, coefficients)

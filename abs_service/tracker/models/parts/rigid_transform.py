@@ -1,4 +1,4 @@
-"""Where a model's parameters put what it has made: the pose that comes after all bends."""
+"""Rigid transform of a deformed object, applied after all bends."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from calib.jit import kernel
 def place(
     rotation: NDArray[np.float64], translation: NDArray[np.float64], pose: NDArray[np.float64]
 ) -> tuple[tuple[np.float32, ...], tuple[np.float32, ...], tuple[np.float32, ...]]:
-    """Rows of the motion (3, 4) from an object to the rig, as tuples: what a loop reads of them stays in registers.
+    """Rows of the transform (3, 4) from an object to the rig, as tuples, which a loop keeps in registers.
 
     Args:
         rotation: vector (3,) [rad] about the object's origin.
@@ -20,7 +20,7 @@ def place(
     x, y, z = rotation[0], rotation[1], rotation[2]
     square = x * x + y * y + z * z
     angle = np.sqrt(square)
-    # Rodrigues' formula; its series near zero.
+    # Rodrigues' formula, with its series near zero.
     a = np.sin(angle) / angle if square > 1e-8 else 1 - square / 6
     b = (1 - np.cos(angle)) / square if square > 1e-8 else 0.5 - square / 24
     return (
@@ -32,7 +32,7 @@ def place(
 
 @kernel
 def _row(r0: float, r1: float, r2: float, pose: NDArray[np.float64], shift: float) -> tuple[np.float32, ...]:
-    """A rotation's row times the pose's rotation, and a shift."""
+    """One row of a rotation times the pose's rotation, and a translation."""
     return (
         np.float32(r0 * pose[0, 0] + r1 * pose[1, 0] + r2 * pose[2, 0]),
         np.float32(r0 * pose[0, 1] + r1 * pose[1, 1] + r2 * pose[2, 1]),

@@ -1,4 +1,4 @@
-"""Base splines of NURBS surfaces and their derivatives (eqs. 3–5)."""
+"""B-spline basis functions of NURBS surfaces and their derivatives (eqs. 3–5)."""
 
 import math
 
@@ -10,13 +10,13 @@ Basis = NDArray[np.float64]
 
 
 def clamped_knots(control_points: int, degree: int) -> NDArray[np.float64]:
-    """Equidistant knots in [0, 1], clamped at both ends, shape (control_points + degree + 1,)."""
+    """Uniform knots in [0, 1], clamped at both ends, (control_points + degree + 1,)."""
     inner = np.linspace(0.0, 1.0, control_points - degree + 1)
     return np.concatenate([np.zeros(degree), inner, np.ones(degree)])
 
 
 def base_splines(u: NDArray[np.floating], control_points: int, degree: int, derivative: int = 0) -> Basis:
-    """Values n_{i,d}(u) of eqs. 4 and 5, or of their derivative, shape (len(u), control_points); u = 1 is included."""
+    """Basis functions n_{i,d}(u) of eqs. 4 and 5, or a derivative, (len(u), control_points); u = 1 is included."""
     knots = clamped_knots(control_points, degree)
     return scipy.interpolate.BSpline(knots, np.eye(control_points), degree)(np.clip(u, 0.0, 1.0), nu=derivative)
 
@@ -24,7 +24,7 @@ def base_splines(u: NDArray[np.floating], control_points: int, degree: int, deri
 def rational_basis(
     u: NDArray[np.floating], w: NDArray[np.floating], degree: int, weights: NDArray[np.float64]
 ) -> tuple[Basis, Basis, Basis]:
-    """Weighting functions R_p of eq. 3 and their derivatives by u and by w.
+    """Rational basis functions R_p of eq. 3 and their derivatives with respect to u and w.
 
     Args:
         u, w: surface parameters (n,) in [0, 1].
@@ -46,10 +46,11 @@ def rational_basis(
 
 
 def power_form(control_points: int, degree: int) -> NDArray[np.float64]:
-    """Base splines as polynomials, span by span, of a coordinate that runs from −½ to ½ in each.
+    """Basis functions as polynomials per knot span, in a local coordinate from −½ to ½.
 
     Returns:
-        Coefficients (spans, degree + 1, degree + 1), by ascending power, of the splines that reach into the span.
+        Coefficients (spans, degree + 1, degree + 1), in ascending powers, of the basis functions that are not zero in
+        the span.
     """
     spans = control_points - degree
     middle = (np.arange(spans) + 0.5) / spans
@@ -63,7 +64,7 @@ def power_form(control_points: int, degree: int) -> NDArray[np.float64]:
 def support(
     u: NDArray[np.floating], w: NDArray[np.floating], shape: tuple[int, int], degree: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Knot span of every vertex and the control points that reach into each span.
+    """Knot span of every vertex, and the control points on which each span depends.
 
     Returns:
         span (n,), numbered row by row; control points (spans, (degree + 1)²).
@@ -78,6 +79,6 @@ def support(
 
 
 def _spans(u: NDArray[np.floating], control_points: int, degree: int) -> NDArray[np.int32]:
-    """Knot span of every parameter (n,). The knots decide: u · spans may round across one, unlike the base splines."""
+    """Knot span of every parameter (n,), found by comparison with the knots: u · spans may round across one."""
     inner = clamped_knots(control_points, degree)[degree + 1 : -degree - 1]
     return np.searchsorted(inner, u, side="right").astype(np.int32)

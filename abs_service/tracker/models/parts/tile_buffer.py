@@ -1,15 +1,15 @@
-"""How kernels collect a surface before they write it: a few vertices at a time, in rows a constant distance apart."""
+"""Buffer in which kernels collect a tile of vertices before it is written, with rows of constant stride."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel
 
-#: Vertices whose results are collected before they are written: few enough to stay in the fastest cache. A constant,
-#: so that the compiler knows how far apart the rows of results are and need not fear that they overlap.
+#: Vertices per tile: few enough for the L1 cache. A compile-time constant, so that the stride between rows is constant
+#: and the compiler can exclude aliasing between them.
 TILE = 256
 
-#: Vertices are computed so many at once; what a vertex is made from goes on so far beyond the last one.
+#: Vertices computed at once (SIMD width); per-vertex inputs are padded by this number.
 LANES = 8
 
 
@@ -25,13 +25,13 @@ def write(
 
     Args:
         result: x, y, z of the vertices and of their normals, in the first six rows (…, at least count).
-        first: vertex that the tile begins with.
+        first: index of the tile's first vertex.
         count: number of its vertices.
-        vertices, normals: of the whole surface (3, n).
+        vertices, normals: those of the whole surface (3, n).
     """
     for i in range(3):
         of_vertices, of_normals = vertices[i, first:], normals[i, first:]
-        for v in range(np.uintp(count)):  # twice as fast as the assignment of slices
+        for v in range(np.uintp(count)):  # twice as fast as assigning slices
             of_vertices[v] = result[i, v]
         for v in range(np.uintp(count)):
             of_normals[v] = result[3 + i, v]
