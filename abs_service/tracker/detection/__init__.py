@@ -1,1 +1,1 @@
-"""The object in the first depth image: region, detection, initial mesh."""
+"""Detection of the object in the first depth image: region, initial detection, initial mesh."""

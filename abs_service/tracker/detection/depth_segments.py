@@ -1,4 +1,4 @@
-"""Which pixels of a depth image belong to one and the same surface."""
+"""Connected components of a depth image: pixels that belong to the same surface."""
 
 import cv2
 import numpy as np
@@ -11,12 +11,12 @@ _AROUND = np.ones((3, 3))
 def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> tuple[NDArray[np.int32], int]:
     """Label of every pixel's surface, 0 for none, and the number of labels.
 
-    Surfaces are separated where the distance jumps; noise is smoothed first, because one noisy pixel would
-    otherwise connect or cut.
+    Surfaces are separated at jumps in distance; the image is smoothed first, because a single noisy pixel would
+    otherwise connect or split surfaces.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
-        largest_step: difference between neighbours that still connects them [m].
+        largest_step: largest difference between connected neighbours [m].
     """
     known = np.isfinite(distance)
     smooth = cv2.medianBlur(np.where(known, distance, 0).astype(np.float32, copy=False), 5)

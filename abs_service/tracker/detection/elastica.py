@@ -1,8 +1,8 @@
-"""The heavy elastica: the shape of a strip that is held at one end and bends under its own weight.
+"""The heavy elastica: the shape of a strip that is clamped at one end and bends under its own weight.
 
 Equilibrium of the moments, D κ(s) = ∫ₛᴸ w (h(σ) − h(s)) dσ, gives D dκ/ds = −w (L − s) cos φ with κ = dφ/ds and a free
 end, κ(L) = 0 (W. G. Bickley, The heavy elastica, Phil. Mag. 17, 1934; L. D. Landau, E. M. Lifshitz, Theory of
-Elasticity, § 19). Large slopes included; the strip is uniform, straight where nothing bends it, and does not move.
+Elasticity, § 19). Valid for large slopes; the strip is uniform, straight without load, and at rest.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from calib.jit import kernel
 
-#: Steps of the integration along the strip; of fourth order, so that up to a load of 60 they err by less than 1e-6.
+#: Integration steps along the strip; of fourth order, so that the error is below 1e-6 up to a load of 60.
 STEPS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class Elastica:
-    """Shapes of strips of length one, one per row; the nodes go from the clamp to the free end in equal steps.
+    """Shapes of strips of unit length, one per row; nodes from the clamp to the free end in equal steps.
 
     Attributes:
         inclination: φ (m, STEPS + 1): angle of the tangent from the horizontal towards gravity [rad].
-        points: horizontal and downward coordinates (m, STEPS + 1, 2) from the clamp on.
+        points: horizontal and downward coordinates (m, STEPS + 1, 2) relative to the clamp.
     """
 
     inclination: NDArray[np.float64]
@@ -30,7 +30,7 @@ class Elastica:
 
 
 def heavy_elastica(tip: ArrayLike, load: ArrayLike) -> Elastica:
-    """Integrates from the free end, where all is known but the inclination, so that nothing has to be searched.
+    """Integrates from the free end, where only the inclination is unknown, so that no shooting method is needed.
 
     Args:
         tip: inclination (m,) at the free end [rad].
@@ -45,7 +45,7 @@ def heavy_elastica(tip: ArrayLike, load: ArrayLike) -> Elastica:
 
 @kernel
 def _integrate(load: NDArray[np.float64], nodes: NDArray[np.float64]) -> None:
-    """Runge and Kutta's steps of fourth order; nodes (m, STEPS + 1, 4) are φ, κ and two coordinates, the last given."""
+    """Fourth-order Runge-Kutta steps; nodes (m, STEPS + 1, 4) are φ, κ and two coordinates, the last node given."""
     last = nodes.shape[1] - 1
     h = 1.0 / last
     for m in range(nodes.shape[0]):

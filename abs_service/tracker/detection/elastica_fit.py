@@ -1,4 +1,4 @@
-"""A hanging strip seen from its side: the plane in which it bends, and the heavy elastica nearest to its points."""
+"""Fit of a hanging strip: its plane of bending, and the heavy elastica closest to its points."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,16 +11,16 @@ from abs_service.tracker.detection.elastica import Elastica, heavy_elastica
 
 Vector = NDArray[np.float64]
 
-#: Typical error of a distance [m]; points that are farther from the fitted shape count less and less.
+#: Typical error of a distance [m]; scale of the robust loss, which down-weights points far from the fitted shape.
 NOISE_M = 5e-3
 
-#: What is this many times farther away is something else, or a pixel that shows two things at once.
+#: Points farther away than this multiple of the noise are outliers: another object, or a mixed pixel.
 LARGEST_GAP = 3.0
 
-#: Step of the numerical derivatives: of a place [m], an angle [rad], and the logarithm of a load.
+#: Step of the numerical derivatives: of a position [m], an angle [rad], and the logarithm of a load.
 STEP = 1e-3
 
-#: Loads w L³ / D that are looked for: a strip that sags by a thousandth of its length, and a thread.
+#: Range of loads w L³ / D: from a strip that sags by a thousandth of its length to a thread.
 LOADS = (1e-2, 300.0)
 
 
@@ -41,7 +41,7 @@ class Plane:
         return normals_at(phi) @ np.array([self.ahead, self.down])
 
     def tilted(self, tilt: NDArray[np.float64]) -> "Plane":
-        """The frame whose across points more ahead and down by `tilt` (2,); down stays as near to gravity as it can."""
+        """The plane with `across` tilted ahead and down by `tilt` (2,); down stays as close to gravity as possible."""
         return _plane(self.across + tilt[0] * self.ahead + tilt[1] * self.down, self.down, self.ahead)
 
 
@@ -63,7 +63,7 @@ class FittedElastica:
 
     @cached_property
     def inclination(self) -> Vector:
-        """Of the nodes (STEPS + 1,) [rad]."""
+        """Inclination of the nodes (STEPS + 1,) [rad]."""
         return self._shape.inclination[0]
 
     @cached_property
@@ -73,7 +73,7 @@ class FittedElastica:
         return points - points.mean(axis=0) + self.middle
 
     def unroll(self, points: NDArray[np.float64]) -> tuple[Vector, Vector, Vector]:
-        """Arc length from the gripper, distance along the normal [m], inclination [rad] nearest to points (n, 2)."""
+        """Arc length from the gripper [m], normal distance [m] and inclination [rad], all closest to points (n, 2)."""
         nodes = self.nodes
         nearest = np.argmin(np.sum(nodes**2, axis=1) - 2 * points @ nodes.T, axis=1)
         phi, gap = self.inclination[nearest], points - nodes[nearest]
@@ -82,7 +82,7 @@ class FittedElastica:
         return along, np.sum(gap * normals_at(phi), axis=1), phi
 
     def cut(self, low: float, high: float) -> "FittedElastica":
-        """About the part from arc length `low` to `high`; beyond the ends it goes on straight."""
+        """Approximately the part from arc length `low` to `high`; extrapolated straight beyond the ends."""
         shift = (low + high - self.length) / 2
         slope = self.inclination[len(self.inclination) // 2]
         middle = self.middle + shift * np.array([np.cos(slope), np.sin(slope)])
@@ -108,10 +108,10 @@ def _plane(across: Vector, down: Vector, ahead: Vector) -> Plane:
 
 
 def find_plane(points: NDArray[np.float64], gravity: Vector) -> Plane:
-    """The horizontal gripper line along which all points fall onto one curve, and with which the outline is even.
+    """The plane across a horizontal gripper line along which all points project onto one curve, with the least skew.
 
-    A bent strip is a cylinder, so its points collapse onto a curve in one direction only. A flat one collapses in all
-    directions of its plane; then that is the one in which a rectangle has no skew. Among equals, the shorter side.
+    A bent strip is a cylinder, so its points project onto a curve along one direction only. A flat one does so along
+    all directions of its plane; the skew of its outline then determines the direction, in a tie the shorter side.
     """
     some = np.cross(gravity, np.eye(3)[np.argmin(np.abs(gravity))])
     some /= np.linalg.norm(some)
@@ -123,7 +123,7 @@ def find_plane(points: NDArray[np.float64], gravity: Vector) -> Plane:
 
 
 def _unevenness(across: Vector, flat: NDArray[np.float64]) -> float:
-    """How thick the curve is in logarithmic measure, plus the skew; slightly more if the curve is shorter than wide."""
+    """Logarithm of the curve's thickness plus the skew; slightly larger if the curve is shorter than wide."""
     chord, height, _ = _chord(flat)
     curve, near = _curve(chord, height)
     thickness = np.std((height - curve(chord))[near])
@@ -132,7 +132,7 @@ def _unevenness(across: Vector, flat: NDArray[np.float64]) -> float:
 
 
 def _chord(flat: NDArray[np.float64]) -> tuple[Vector, Vector, NDArray[np.float64]]:
-    """Coordinates (n,) along and beside the longest direction of points (n, 2), and the axes (2, 2) as rows."""
+    """Coordinates (n,) along and orthogonal to the principal axis of points (n, 2), and both axes (2, 2) as rows."""
     centered = flat - flat.mean(axis=0)
     axes = np.linalg.eigh(centered.T @ centered)[1].T[::-1]
     along, beside = axes @ centered.T
@@ -140,7 +140,7 @@ def _chord(flat: NDArray[np.float64]) -> tuple[Vector, Vector, NDArray[np.float6
 
 
 def _curve(along: Vector, beside: Vector) -> tuple[np.polynomial.Polynomial, NDArray[np.bool_]]:
-    """A smooth curve through points, and which of them (n,) it is for: all but a few that show two things at once."""
+    """A smooth curve through points, and its inliers (n,), which exclude mixed pixels."""
     near = np.ones(len(along), bool)
     curve = np.polynomial.Polynomial.fit(along, beside, 4)
     for _ in range(2):
@@ -151,7 +151,7 @@ def _curve(along: Vector, beside: Vector) -> tuple[np.polynomial.Polynomial, NDA
 
 
 def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> FittedElastica:
-    """The best of some shapes of about the right length, place and direction."""
+    """Initial guess: the best of several shapes of approximately the right length, position and direction."""
     along, beside, axes = _chord(flat)
     curve, near = _curve(along, beside)
     low, high = (float(np.quantile(along[near], share)) for share in (0.02, 0.98))
@@ -172,7 +172,7 @@ def first_guess(flat: NDArray[np.float64], towards_gripper: Vector) -> FittedEla
 
 
 def fit(elastica: FittedElastica, flat: NDArray[np.float64]) -> FittedElastica:
-    """The elastica of the same length with the least distance to points (n, 2); it may not slide along itself."""
+    """The elastica of the same length with the smallest distance to points (n, 2), without sliding along itself."""
     bounds = ([-np.inf, -np.inf, np.log(LOADS[0] / elastica.load)], [np.inf, np.inf, np.log(LOADS[1] / elastica.load)])
     found = scipy.optimize.least_squares(
         lambda p: _changed(elastica, p).unroll(flat)[1] / NOISE_M,
@@ -185,16 +185,16 @@ def fit(elastica: FittedElastica, flat: NDArray[np.float64]) -> FittedElastica:
 
 
 def load_deviation(elastica: FittedElastica, flat: NDArray[np.float64]) -> float:
-    """Standard deviation of the logarithm of a fitted elastica's load, from how its points (n, 2) scatter."""
+    """Standard deviation of the logarithm of a fitted elastica's load, from the scatter of its points (n, 2)."""
     steps = STEP * np.eye(3)
     ahead, back = ([_changed(elastica, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
     slopes = (np.array(ahead) - np.array(back)) / (2 * STEP)
-    scatter = 1.4826 * np.median(np.abs(elastica.unroll(flat)[1]))  # of a normal distribution, whatever a few points do
+    scatter = 1.4826 * np.median(np.abs(elastica.unroll(flat)[1]))  # robust σ from the MAD
     return float(scatter * np.sqrt(np.linalg.inv(slopes @ slopes.T)[2, 2]))
 
 
 def _changed(elastica: FittedElastica, by: NDArray[np.float64]) -> FittedElastica:
-    """Moved beside its chord [m], with another inclination at the free end [rad] and another logarithm of the load."""
+    """Shifted normal to its chord [m], with another inclination at the free end [rad] and logarithm of the load."""
     chord = elastica.nodes[-1] - elastica.nodes[0]
     beside = np.array([-chord[1], chord[0]]) / np.linalg.norm(chord)
     return FittedElastica(

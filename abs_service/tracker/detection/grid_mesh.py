@@ -1,4 +1,4 @@
-"""The mesh of an object of unknown shape: a grid laid over it in the depth image."""
+"""The initial mesh of an object of unknown shape: a regular grid over it in the depth image."""
 
 from dataclasses import replace
 
@@ -11,29 +11,29 @@ from abs_service.tracker.detection.initial_detection import DetectionError, Init
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 
-#: A mesh with fewer vertices carries no deformation.
+#: Minimum number of vertices; fewer do not determine a deformation.
 LEAST_VERTICES = 25
 
-#: Share of a grid point's neighbourhood that must show the object for it to become a vertex.
+#: Minimum share of a grid point's neighbourhood that shows the object for it to become a vertex.
 LEAST_COVER = 0.75
 
-#: Distances around a grid point that differ by more from their median belong to another surface [m].
+#: Distances around a grid point that deviate by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
 
-#: A triangle with a side longer than this many typical sides spans a jump between two surfaces.
+#: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces.
 LONGEST_SIDE = 5.0
 
-#: A connected part of the mesh with a smaller share of its vertices is an island: the region's rim often shows some of
-#: what is behind the object, which no smooth surface could carry.
+#: A connected component with a smaller share of the vertices is an island and removed: the rim of the region often
+#: shows background, which cannot be bound to a smooth surface.
 LEAST_PART = 0.1
 
 
 def grid_mesh(detection: InitialDetection) -> Mesh:
-    """Lays a square grid over the object in the image, along the sides of the smallest rectangle around it.
+    """Mesh from a square grid over the object in the image, aligned with the minimum-area rectangle around it.
 
-    What one camera sees is one distance per direction, so the grid never folds, whatever the object's shape. Every
-    vertex is a plane fitted to the distances around it, so it is less noisy than a pixel; where the object is not,
-    there is no vertex, so the mesh has its outline.
+    A camera measures one distance per direction, so the grid never folds for any shape of the object. Every vertex
+    comes from a plane fitted to the distances around it, so it is less noisy than a pixel; grid points off the object
+    are left out, so the mesh has the object's outline.
 
     Returns:
         The mesh without colours; its chart is the grid.
@@ -66,7 +66,7 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
 
 
 def _grid(pixels: NDArray[np.float32], spacing: float) -> NDArray[np.float64]:
-    """Pixel coordinates (rows, columns, 2) of a grid over the smallest rectangle around pixels (k, 2)."""
+    """Pixel coordinates (rows, columns, 2) of a grid over the minimum-area rectangle around pixels (k, 2)."""
     center, size, angle = cv2.minAreaRect(pixels)
     if size[0] < size[1]:
         size, angle = size[::-1], angle + 90
@@ -84,8 +84,8 @@ def _local_planes(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Distance [m] at pixel coordinates (g, 2) from a plane fitted around each, and its standard deviation [m].
 
-    Both are NaN where the object is not. How far a single pixel deviates is told from the residuals of all planes
-    together, because one plane alone may have no more pixels than coefficients.
+    Both are NaN off the object. The deviation of a single pixel is estimated from the residuals of all planes together,
+    because a single plane may have no more pixels than coefficients.
     """
     height, width = distance.shape
     reach = int(np.ceil(radius))
@@ -111,9 +111,9 @@ def _local_planes(
 
 
 def triangles(place: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles (m, 3) of a grid of vertex indices (rows, columns), −1 where there is none; seen from the camera.
+    """Triangles (m, 3) of a grid of vertex indices (rows, columns), −1 for none; oriented towards the camera.
 
-    A cell with four vertices gives two triangles, one with three gives one.
+    A cell with four vertices has two triangles, a cell with three has one.
     """
     corners = np.stack([place[:-1, :-1], place[1:, :-1], place[1:, 1:], place[:-1, 1:]], axis=-1).reshape(-1, 4)
     whole = np.all(corners >= 0, axis=1)
@@ -134,7 +134,7 @@ def _without_jumps(positions: NDArray[np.float64], faces: NDArray[np.int64]) -> 
 
 
 def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles (m, 3) of the connected parts that are large enough."""
+    """The triangles (m, 3) of the connected components that are large enough."""
     used, corners = np.unique(faces, return_inverse=True)
     corners = corners.reshape(-1, 3)
     links = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]]).T

@@ -1,4 +1,4 @@
-"""The segmented first depth image of the object, from which mesh and model are made."""
+"""The segmented first depth image of the object, from which mesh and model are built."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from calib.camera import Camera
 
 
 class DetectionError(ValueError):
-    """An object that is not in view, or of which too little is visible to track it."""
+    """The object is not in view, or too little of it is visible to track it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,7 +20,7 @@ class InitialDetection:
     Attributes:
         distance: radial distances (height, width) [m] without mean offset, NaN outside the object.
         camera: the camera that measured them.
-        vertices: approximate number of vertices of the mesh to be made.
+        vertices: approximate number of vertices of the mesh to be built.
         surroundings: the same image without segmentation; empty if unknown.
     """
 

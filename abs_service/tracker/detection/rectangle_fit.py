@@ -1,4 +1,4 @@
-"""Finds a flat sheet in a depth image."""
+"""Detection of a flat rectangular sheet in a depth image."""
 
 import cv2
 import numpy as np
@@ -10,30 +10,30 @@ from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
 
-#: A sheet with fewer pixels has no sides that could be found.
+#: Minimum number of pixels; the sides of a smaller sheet cannot be fitted.
 LEAST_PIXELS = 200
 
-#: Points that plane and paraboloid are fitted to; more would be slower, not better.
+#: Maximum number of points for the fits of plane and paraboloid; more are slower but not more accurate.
 MOST_POINTS = 5000
 
-#: Height of the arch over the object above which it is not flat [m].
+#: Largest height of a fitted paraboloid over the object for it to be flat [m].
 LARGEST_BOW_M = 0.02
 
-#: Distance from the plane up to which a pixel shows the sheet, however small the noise is [m].
+#: Lower bound of the inlier distance from the plane, for small noise [m].
 LEAST_GAP_M = 0.01
 
-#: Share of their pixels that object and rectangle have in common if it is a sheet. A disc has 0.90, a sheet of 450
-#: pixels 0.96 and more, one of which a finger hides 6 % 0.94.
+#: Minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels 0.96 and more, a
+#: sheet of which a finger occludes 6 % has 0.94.
 LEAST_OVERLAP = 0.93
 
 
 def find_sheet(detection: InitialDetection) -> Sheet:
-    """The sheet in sight: a plane through its points, and the rectangle around its outline on that plane.
+    """Fits a plane to the points of a sheet, and a rectangle to its outline on that plane.
 
-    A long side across the image points to the right, another one up.
+    The x axis points right if the long side is nearer to horizontal in the image, otherwise up.
 
     Raises:
-        DetectionError: too little is in sight, or it is not flat, or no rectangle.
+        DetectionError: too little is visible, or the object is not flat, or not a rectangle.
     """
     camera = detection.camera
     seen = np.isfinite(detection.distance)
@@ -53,13 +53,13 @@ def find_sheet(detection: InitialDetection) -> Sheet:
 
 
 def _window(seen: NDArray[np.bool_]) -> tuple[slice, slice]:
-    """Rows and columns of the smallest part of an image (height, width) that contains all that is set, and some rim."""
+    """Rows and columns of the bounding box of the set pixels of an image (height, width), with a margin."""
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     return slice(max(rows[0] - 2, 0), rows[-1] + 3), slice(max(columns[0] - 2, 0), columns[-1] + 3)
 
 
 def _plane(points: NDArray[np.float64], camera: Camera) -> Pose:
-    """The plane of least absolute distances from points (k, 3); x to the camera's right, z away from it."""
+    """The plane with the least absolute distances from points (k, 3); x to the camera's right, z away from it."""
     points = points[:: len(points) // MOST_POINTS + 1]
     center, normal = np.mean(points, axis=0), camera.T_rs[:3, 2]
     weights = np.ones(len(points))
@@ -77,15 +77,15 @@ def _plane(points: NDArray[np.float64], camera: Camera) -> Pose:
 
 
 def _pixels_on_plane(points_p: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """The largest connected set of pixels (height, width) with points near the plane z = 0; specks do not count.
+    """The largest connected component of pixels (height, width) near the plane z = 0; specks are ignored.
 
     Raises:
-        DetectionError: the points (height, width, 3), NaN where there is none, are on no plane.
+        DetectionError: the points (height, width, 3), NaN without return, do not lie on a plane.
     """
     valid = points_p[np.isfinite(points_p[..., 2])]
     _check_flat(valid)
     gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), LEAST_GAP_M)
-    near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # NaN is not
+    near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # False for NaN
     labels, statistics = cv2.connectedComponentsWithStats(cv2.medianBlur(near, 3))[1:3]
     return np.asarray(labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
 
@@ -94,7 +94,7 @@ def _check_flat(points_p: NDArray[np.float64]) -> None:
     """Fits a paraboloid to points (k, 3), which averages their noise.
 
     Raises:
-        DetectionError: it rises by more than `LARGEST_BOW_M` over them.
+        DetectionError: its height over the points exceeds `LARGEST_BOW_M`.
     """
     a, b, z = points_p[:: len(points_p) // MOST_POINTS + 1].T
     arch = np.column_stack([a * a, a * b, b * b])
@@ -109,7 +109,7 @@ def _check_flat(points_p: NDArray[np.float64]) -> None:
 
 
 def _outline(pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Pixel coordinates (k, 2) halfway between neighbours of which one is set: the rim, give or take half a pixel."""
+    """Pixel coordinates (k, 2) halfway between a set and an unset neighbour: the rim to half a pixel."""
     padded = np.pad(pixels, 1)
     row, column = np.nonzero(padded[:, 1:] != padded[:, :-1])
     across = np.column_stack([column - 0.5, row - 1.0])
@@ -118,16 +118,16 @@ def _outline(pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
 
 
 def _meet(rays: NDArray[np.float64], center: NDArray[np.float64], T_rp: Pose) -> NDArray[np.float64]:
-    """Coordinates (…, 2) on a plane [m] where lines of sight (…, 3) from a camera's centre meet it."""
+    """Coordinates (…, 2) on a plane [m] of its intersections with lines of sight (…, 3) from a camera's centre."""
     rays_p, center_p = rays @ T_rp[:3, :3], pose.transform(pose.inverse(T_rp), center)
     return np.asarray(center_p[:2] - rays_p[..., :2] * (center_p[2] / rays_p[..., 2:]), np.float64)
 
 
 def _rectangle(outline: NDArray[np.float64], T_rp: Pose) -> Sheet:
-    """The rectangle of least absolute distances from the points (k, 2) of an outline on a plane, and its pose."""
+    """The rectangle, with its pose, of the least absolute distances from an outline (k, 2) on a plane."""
     middle, _, degrees = cv2.minAreaRect(outline.astype(np.float32))
     angle, arms = np.deg2rad(degrees), outline - middle
-    sides = np.zeros((2, 2))  # of the first axis low, high; of the second
+    sides = np.zeros((2, 2))  # rows: first and second axis; columns: low, high
     for turn in range(15):
         local = arms @ _axes(angle).T
         sides = np.stack([local.min(axis=0), local.max(axis=0)], axis=1) if turn == 0 else sides
@@ -153,10 +153,10 @@ def _axes(angle: float) -> NDArray[np.float64]:
 
 
 def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet) -> None:
-    """Compares the object's pixels (height, width) with those whose places (height, width, 2) are in the rectangle.
+    """Compares the object's pixels (height, width) with those whose points (height, width, 2) are in the rectangle.
 
     Raises:
-        DetectionError: they have less than `LEAST_OVERLAP` in common.
+        DetectionError: their overlap is below `LEAST_OVERLAP`.
     """
     rectangle = np.all(np.abs(places) < (sheet.width / 2, sheet.height / 2), axis=-1)
     overlap = np.count_nonzero(pixels & rectangle) / np.count_nonzero(pixels | rectangle)

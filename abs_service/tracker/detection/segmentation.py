@@ -1,4 +1,4 @@
-"""Segmentation of the object in a depth image with a region."""
+"""Segmentation of the object in a depth image by a region."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from calib.rig import Rig
 def detect_object(
     observation: Observation, rig: Rig, reference: str, region: Region, vertices: int
 ) -> InitialDetection:
-    """Segments the reference sensor's depth image with a region, for a mesh of about `vertices` vertices.
+    """Segments the reference sensor's depth image by a region, for a mesh of about `vertices` vertices.
 
     Raises:
         DetectionError: there is no depth image, or no object in it.

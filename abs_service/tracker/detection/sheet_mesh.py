@@ -1,4 +1,4 @@
-"""A flat rectangular sheet, and the mesh over it."""
+"""A flat rectangular sheet and its mesh."""
 
 from dataclasses import dataclass, replace
 
@@ -29,7 +29,7 @@ class Sheet:
         """The same sheet with known sides [m].
 
         Raises:
-            DetectionError: a detected side differs by more than the share `tolerance` from the known one.
+            DetectionError: the relative difference of a detected side from the known one exceeds `tolerance`.
         """
         long, short = max(width, height), min(width, height)
         if max(abs(self.width / long - 1), abs(self.height / short - 1)) > tolerance:
@@ -40,9 +40,9 @@ class Sheet:
         return replace(self, width=long, height=short)
 
     def mesh(self, vertices: int) -> Mesh:
-        """A regular grid of about `vertices` vertices without colours, seen from the sensor's side.
+        """A regular grid of about `vertices` vertices without colours, oriented towards the sensor.
 
-        The outer vertices are half a cell inside the rim, where a pixel shows the sheet and what is behind it.
+        The outer vertices lie half a cell inside the rim, because pixels at the rim mix sheet and background.
         """
         columns = max(2, round(np.sqrt(vertices * self.width / self.height)))
         rows = max(2, round(vertices / columns))

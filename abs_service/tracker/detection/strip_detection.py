@@ -1,4 +1,4 @@
-"""A strip that a gripper holds, found in the depth image in which it is first seen, bent by its weight as it is."""
+"""Detection of a strip held by a gripper, bent by its weight, in the first depth image."""
 
 from dataclasses import dataclass
 
@@ -24,42 +24,42 @@ from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
 
-#: Fewer pixels tell no shape; of more, as many as this are used.
+#: Minimum number of pixels for a fit, and the maximum that are used.
 LEAST_PIXELS, MOST_PIXELS = 100, 1500
 
-#: A pixel farther beyond an end, as a share of the length, shows something else in the same direction.
+#: Pixels farther beyond an end than this share of the length are outliers.
 LARGEST_OVERHANG = 0.08
 
-#: A part of the pixels that lies on one elastica at least if they show a strip.
+#: Minimum share of the pixels on one elastica for the object to be a strip.
 LEAST_SHARE = 0.7
 
-#: Relative difference between the length that is given and the one that is seen up to which it is the strip.
+#: Largest relative difference between the given and the detected length.
 LENGTH_TOLERANCE = 0.2
 
-#: So many pixels beside those that certainly show the strip may show it as well.
+#: Distance from the segmented pixels within which pixels may show the strip as well.
 RIM_PX = 4
 
-#: The outline is read off where this share of the strip is still beyond, because rims are ragged.
+#: Quantile of the area at which the extent is measured and then extrapolated, because rims are ragged.
 RIM_SHARE = 0.05
 
-#: A pixel shows no more of the strip than under this cosine between line of sight and normal. Pixels at an end that
-#: show other things as well lie on the curve's extrapolation, which may turn away from the camera: with all the area
-#: that they would have there, the strip grew by a fifth.
+#: Lower bound of the cosine of incidence by which a pixel's area on the strip is divided. Mixed pixels at an end lie on
+#: the curve's extrapolation, which may turn away from the camera: without the bound, their area lengthened the strip by
+#: a fifth.
 LEAST_COSINE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Strip:
-    """Where a strip is held and how it hangs.
+    """Pose, size and shape of a detected strip.
 
     Attributes:
         T_rg: pose of the gripper line: origin in its middle, x along the strip, y along the line, z the normal of the
             side that faces the sensor.
         length, width: free length from the gripper line to the other end, and width [m].
-        turn: nodes (STEPS + 1,) from the gripper to the free end: angle by which the tangent has turned since the
-            gripper, positive towards z [rad].
-        pixel: length along the strip that one of the sensor's pixels shows [m].
-        load_deviation: standard deviation of the logarithm of the load by which it hangs like this; 0 if that is known.
+        turn: angle of the tangent relative to the gripper at the nodes (STEPS + 1,) from the gripper to the free end,
+            positive towards z [rad].
+        pixel: footprint of one of the sensor's pixels along the strip [m].
+        load_deviation: standard deviation of the logarithm of the load that explains the shape; 0 if it is known.
     """
 
     T_rg: Pose
@@ -70,35 +70,35 @@ class Strip:
     load_deviation: float = 0.0
 
     def bends(self, segments: int) -> NDArray[np.float64]:
-        """Angles (segments,) by which equal parts of the strip bend, the first at the gripper [rad]."""
+        """Bending angles (segments,) of equal parts of the strip, the first at the gripper [rad]."""
         nodes = np.linspace(0, 1, len(self.turn))
         return np.diff(np.interp(np.linspace(0, 1, segments + 1), nodes, self.turn))
 
     @property
     def length_deviation(self) -> float:
-        """Standard deviation of the length and of the gripper's place along the strip [m]: about a pixel.
+        """Standard deviation of the length and of the gripper's position along the strip [m]: about a pixel.
 
-        So much the ends scatter in simulated images, because the pixels there show what is behind the strip as well.
+        Equal to the scatter of the ends in simulated images, where pixels mix strip and background.
         """
         return self.pixel
 
     def flat_mesh(self, vertices: int) -> Mesh:
-        """A regular grid of about so many vertices on the strip if it were flat; rows go along it."""
+        """A regular grid of about `vertices` vertices on the flattened strip; rows run along it."""
         T_gp = pose.from_rotation_vector((np.pi, 0, 0), (self.length / 2, 0, 0))
         return Sheet(self.T_rg @ T_gp, self.length, self.width).mesh(vertices)
 
 
 def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Vector, length: float = 0.0) -> Strip:
-    """Fits a heavy elastica to the points of a strip; where its edges are tells the rest.
+    """Fits a heavy elastica to the points of a strip, and its size to the edges.
 
     Args:
-        detection: the strip alone.
+        detection: the segmented strip.
         gravity: unit vector (3,) in the rig.
-        towards_gripper: vector (3,) in the rig that tells the held end from the other one.
-        length: free length if it is known [m], else 0: as it is seen.
+        towards_gripper: vector (3,) in the rig from the free end towards the held one.
+        length: free length [m]; 0 uses the detected length.
 
     Raises:
-        DetectionError: too little to see, or no strip.
+        DetectionError: too little is visible, or the object is not a strip.
     """
     seen = detection.points
     if len(seen) < LEAST_PIXELS:
@@ -115,7 +115,7 @@ def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Ve
     elastica = fitted.elastica.cut(fitted.elastica.length - (length or fitted.elastica.length), fitted.elastica.length)
     flat = fitted.plane.coordinates(points)[1][fitted.belongs]
     along = elastica.unroll(flat)[0]
-    # Pixels on an end show what is behind it as well, and would bend the strip most of all.
+    # Pixels at an end mix strip and background, and would distort the fitted shape most.
     inner = flat[np.minimum(along, elastica.length - along) > fitted.pixel / 2]
     elastica = fit(elastica, inner)
     return _strip(fitted, elastica, load_deviation(elastica, inner))
@@ -123,15 +123,15 @@ def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Ve
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """How far the search for a strip is.
+    """Intermediate state of the iterative fit of a strip.
 
     Attributes:
-        plane: of bending.
-        elastica: shape, from end to end of what is seen.
-        belongs: which points (n,) show the strip.
-        sides: first and last place across [m].
-        faces: whether the camera is on the side of the plane's normals.
-        pixel: length along the strip that a pixel shows [m].
+        plane: plane of bending.
+        elastica: shape of the visible part, from end to end.
+        belongs: inlier mask (n,) of the points.
+        sides: smallest and largest coordinate across [m].
+        faces: True if the camera is on the side of the plane's normals.
+        pixel: footprint of a pixel along the strip [m].
     """
 
     plane: Plane
@@ -143,7 +143,7 @@ class _Fitted:
 
 
 def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fitted:
-    """Fits shape, outline and plane to points (n, 3) once more, one after the other."""
+    """One iteration that fits shape, outline and plane to points (n, 3), one after the other."""
     plane, sight = before.plane, points - camera.center
     across, flat = plane.coordinates(points)
     elastica = fit(before.elastica, flat[before.belongs])
@@ -162,10 +162,10 @@ def _refine(before: _Fitted, points: NDArray[np.float64], camera: Camera) -> _Fi
 
 
 def _check(size: tuple[float, float], length: float, share: float) -> None:
-    """Whether what is seen can be the strip.
+    """Checks size and inlier share of a fitted strip.
 
     Raises:
-        DetectionError: it is wider than long, not of the given length [m] (0: not given), or not such a curve.
+        DetectionError: it is wider than long, not of the given length [m] (0: not given), or not an elastica.
     """
     if share < LEAST_SHARE:
         raise DetectionError(
@@ -181,21 +181,20 @@ def _check(size: tuple[float, float], length: float, share: float) -> None:
 
 
 def _pixel_sizes(sight: NDArray[np.float64], normals: NDArray[np.float64], focal: float) -> tuple[Vector, Vector]:
-    """Length along and across the strip (n,) [m] that each pixel shows; `sight` goes from the camera to the points."""
+    """Footprint (n,) of each pixel along and across the strip [m]; `sight` points from the camera to the points."""
     distance = np.linalg.norm(sight, axis=1)
     cosine = np.abs(np.sum(normals * sight, axis=1)) / distance
     return distance / focal / np.maximum(cosine, LEAST_COSINE), distance / focal
 
 
 def _extent(coordinate: Vector, size: Vector, other_size: Vector) -> tuple[float, float]:
-    """First and last place that a rectangle covers, from where shares of its area lie.
+    """Smallest and largest coordinate of a rectangle, extrapolated from quantiles of its area.
 
-    A pixel at the rim that shows something else as well has been left out, whatever its share; half a pixel is what
-    goes lost on average.
+    Mixed pixels at the rim have been excluded, which removes half a pixel on average; it is added again.
 
     Args:
-        coordinate: of the pixels (n,) [m].
-        size, other_size: of the pixels in that direction and the other one (n,) [m].
+        coordinate: coordinate of the pixels (n,) [m].
+        size, other_size: footprint of the pixels in that direction and the other one (n,) [m].
     """
     order = np.argsort(coordinate)
     area = (size * other_size)[order]
@@ -207,10 +206,10 @@ def _extent(coordinate: Vector, size: Vector, other_size: Vector) -> tuple[float
 
 
 def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np.float64]:
-    """How much more ahead and down (2,) the gripper line points than it was thought to.
+    """Correction (2,) of the gripper line's direction, ahead and down.
 
-    Seen from a wrong direction the points scatter beside the curve in proportion to where they are across; what
-    turns in the strip's own plane shows as skew of the outline.
+    A wrong direction causes residuals normal to the curve in proportion to the coordinate across; a rotation in the
+    strip's own plane causes skew of the outline.
     """
     normals = normals_at(phi)
     tangent = np.array([np.cos(np.median(phi)), np.sin(np.median(phi))])
@@ -223,7 +222,7 @@ def _tilt(across: Vector, along: Vector, gap: Vector, phi: Vector) -> NDArray[np
 
 
 def _strip(fitted: _Fitted, elastica: FittedElastica, deviation: float) -> Strip:
-    """The strip in the rig, whose z axis is on the camera's side."""
+    """The strip in rig coordinates, its z axis towards the camera."""
     plane, sides = fitted.plane, fitted.sides
     start = elastica.inclination[:1]
     sign = 1.0 if fitted.faces else -1.0

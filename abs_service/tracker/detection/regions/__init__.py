@@ -1,1 +1,1 @@
-"""Ways to say which part of the first depth image is the object, one per file; a rig file names them with `type`."""
+"""Regions that select the object's pixels in the first depth image, one per file; a rig file selects by `type`."""

@@ -1,4 +1,4 @@
-"""What a region is."""
+"""Interface of regions."""
 
 from typing import Protocol
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 
 class Region(Protocol):
-    """Says which pixels of the first depth image show the object."""
+    """Selects the object's pixels in the first depth image."""
 
     def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Pixels (height, width) of the object.

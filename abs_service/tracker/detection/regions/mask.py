@@ -1,4 +1,4 @@
-"""A mask image drawn by the user or made by a segmentation."""
+"""A mask image, drawn by the user or computed by a segmentation."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -16,8 +16,8 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        largest_step_m: neighbouring pixels whose distances differ by more belong to different surfaces [m].
-        least_pixels: smaller surfaces are taken for noise.
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
     """
 
     largest_step_m: Annotated[float, Gt(0)] = 0.04
