@@ -1,1 +1,1 @@
-"""One sensor's part of an objective, one kind of sensor per file."""
+"""Terms: negative log-likelihood of one sensor's image, one file per kind of sensor."""

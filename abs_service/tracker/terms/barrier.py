@@ -1,4 +1,4 @@
-"""A light barrier's reading against whether the deformed mesh crosses its beam."""
+"""Term of a light barrier: its reading compared with the crossing of mesh and beam."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,22 +37,22 @@ class BarrierTerm:
         self._costs = np.minimum(np.add(self._noise.cost(image.interrupted), self._bounds.inlier), self._bounds.outlier)
 
     def foreground(self) -> NDArray[np.float64]:
-        """None: where on the beam something is remains unknown."""
+        """No points: the position along the beam is unknown."""
         return np.zeros((0, 3))
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Nothing: what interrupts the beam is taken for the object; how often that is wrong is in the noise model."""
+        """Does nothing: an interruption is attributed to the object; the noise model holds the error rate."""
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
-        """−log P(reading | does the mesh cross the beam) (population,)."""
+        """−log P(reading | mesh crosses the beam or not), (population,)."""
         return self._costs[self._crossing(surface).astype(int)]
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
-        """Nothing: the cost is constant but for a step, which the search has to find."""
+        """No residuals: the cost is piecewise constant, its derivative zero."""
         return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), sparse_jacobian)
 
     def fit(self, surface: Surface) -> SensorFit:
-        """One sample, which agrees or not."""
+        """Agreement of the single sample with a population of one."""
         agrees = int(self._crossing(surface)[0] == self._interrupted)
         return SensorFit(self.sensor, 1, 0, 1, agrees, -float(self.cost(surface)[0]), float("nan"))
 
@@ -70,10 +70,10 @@ def _crossing(
     end: NDArray[np.float32],
     crossing: NDArray[np.bool_],
 ) -> None:
-    """Whether any face of each member meets the segment from begin to end (3,) [m].
+    """True for each candidate of which any face intersects the segment from begin to end (3,) [m].
 
-    A line meets a face if it passes all edges on the same side; the volumes that tell the side are the weights of the
-    opposite corners in the meeting point. Neighbouring faces share an edge's volume, so there is no crack between them.
+    A line intersects a face if it passes all edges on the same side. The signed volumes that decide the side are the
+    barycentric weights of the opposite corners. Adjacent faces share the volume of an edge, so there are no cracks.
     """
     ox, oy, oz = np.float64(begin[0]), np.float64(begin[1]), np.float64(begin[2])
     x, y, z = end[0] - ox, end[1] - oy, end[2] - oz

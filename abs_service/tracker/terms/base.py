@@ -1,4 +1,4 @@
-"""What a term is, and how its agreement with a deformed mesh is summed up."""
+"""Interface of a term, and summary of its agreement with a deformed mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ INLIER_DEVIATIONS = 3.0
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """What one measurement costs where its noise model has nothing to say.
+    """Costs of the outlier model of one measurement [nats].
 
     Attributes:
-        inlier: added to the cost of a measurement that the noise model explains.
-        uniform: cost where there is no measurement, or none that this vertex could explain.
-        outlier: the most that a measurement can cost.
+        inlier: added to the cost of an inlier.
+        uniform: cost of a vertex without a measurement, or with one that it cannot explain.
+        outlier: upper bound of the cost of a measurement.
     """
 
     inlier: float
@@ -33,17 +33,17 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class SensorFit:
-    """How well one sensor agrees with one deformed mesh.
+    """Agreement of one sensor with one deformed mesh.
 
     Attributes:
         sensor: its name.
-        visible: vertices that face the sensor and lie inside its image, with nothing before them that is known of.
-        occluded: vertices behind the mesh's own surface, behind something else, or where the sensor has a hole.
-        samples: of these, how many met a measurement.
-        inliers: of these, how many the measurement's own noise explains.
-        mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if that is what the objective sums.
-        normalized_residual: deviation of the residuals over their own deviations, told from the inliers: 1 if the noise
-            model is right, 2 if it says half of what is true; NaN where there is none, or no noise model to judge.
+        visible: number of vertices that face the sensor and lie inside its image without a known occluder.
+        occluded: number of vertices behind the mesh's own surface, behind an occluder, or in a hole of the measurement.
+        samples: number of visible vertices with a measurement.
+        inliers: number of samples that their noise explains.
+        mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if the objective is a likelihood.
+        normalized_residual: standard deviation of the normalised residuals, estimated from the inliers: 1 if the noise
+            model is right, 2 if its σ is half the true one; NaN without inliers or without a noise model.
     """
 
     sensor: str
@@ -64,17 +64,16 @@ def summarize(
     mean_log_likelihood: float,
     channels: int = 1,
 ) -> SensorFit:
-    """Counts what the per-vertex arrays (n,) say.
+    """Summary of per-vertex arrays (n,).
 
-    The parameters that the search fits to the residuals make them smaller by a few per cent; nothing corrects for that.
+    Fitting theta reduces the residuals by a few per cent; this is not corrected.
 
     Args:
         sensor: its name.
-        visible, occluded, measured: masks of the vertices that are in sight, behind something, and have a
-            measurement.
-        residual: size of each residual in its deviations, the root mean square over the channels.
+        visible, occluded, measured: masks of the vertices that are visible, occluded, and measured.
+        residual: absolute normalised residual, root mean square over the channels.
         mean_log_likelihood: see `SensorFit`.
-        channels: values that a measurement consists of.
+        channels: number of values per measurement.
     """
     inlier = measured & (residual < INLIER_DEVIATIONS)
     square = float(np.mean(residual[inlier] ** 2)) if inlier.any() else float("nan")
@@ -97,16 +96,16 @@ def inlier_share(fits: Sequence[SensorFit]) -> float:
 
 
 def occluded_share(fits: Sequence[SensorFit]) -> float:
-    """Share of the vertices that are occluded in the sensor that sees most of them; 0 without a sensor.
+    """Share of occluded vertices in the sensor with the smallest such share; 0 without a sensor.
 
-    A light barrier, whose single sample is no vertex, is ignored.
+    Light barriers are ignored: their single sample is no vertex.
     """
     shares = [fit.occluded / (fit.occluded + fit.visible) for fit in fits if fit.occluded + fit.visible > 1]
     return min(shares, default=0.0)
 
 
 class Term(Protocol):
-    """One sensor's part of an objective.
+    """Negative log-likelihood of one sensor's image given a surface.
 
     Attributes:
         sensor: name of the sensor.
@@ -115,21 +114,21 @@ class Term(Protocol):
     sensor: str
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Takes the image that the following costs refer to.
+        """Sets the image that the following costs refer to.
 
         Args:
-            image: what the sensor measured.
-            predicted: the predicted mesh, a population of one.
-            reach_m: the costs of meshes that are farther from it may say no more than that they are wrong [m].
+            image: measurement of the sensor.
+            predicted: predicted mesh, a population of one.
+            reach_m: radius around the prediction outside which costs need not be exact, only high [m].
         """
         ...
 
     def foreground(self) -> NDArray[np.float64]:
-        """Points (k, 3) [m] of things that stand between the sensor and the predicted mesh, as far as it sees them."""
+        """Measured points (k, 3) [m] of occluders between the sensor and the predicted mesh."""
         ...
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Leaves out of this frame what the sensor cannot see behind points (k, 3) [m] that other sensors saw."""
+        """Masks, for this frame, pixels occluded by points (k, 3) [m] that other sensors measured."""
         ...
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -137,9 +136,9 @@ class Term(Protocol):
         ...
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linear:
-        """The inliers' normalised residuals around a deformed mesh; arguments as in `Objective`."""
+        """Normalised residuals of the inliers and their derivatives; arguments as in `Objective`."""
         ...
 
     def fit(self, surface: Surface) -> SensorFit:
-        """How the sensor agrees with a population of one."""
+        """Agreement of the sensor with a population of one."""
         ...

@@ -1,4 +1,4 @@
-"""The term of a sensor: what its noise model is about decides which one."""
+"""Factory of terms: the type of a sensor's noise model selects the term."""
 
 from collections.abc import Callable
 from functools import partial
@@ -32,9 +32,9 @@ def make_term(
     misplacement: Misplacement = NOT_AT_ALL,
     outline_px: float = 0.0,
 ) -> Term:
-    """The term that compares a mesh with what a sensor measures, under the sensor's own noise model.
+    """Term of a sensor for a mesh, under the sensor's own noise model.
 
-    Where outlines are known to `outline_px`, depth sensors compare them with the mesh's rim; 0: they do not.
+    Depth sensors compare the outline with the mesh's rim, with standard deviation `outline_px`; 0 disables this.
     """
     name = sensor.name
     match sensor.noise:

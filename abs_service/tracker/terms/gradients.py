@@ -1,4 +1,4 @@
-"""Derivatives of residuals by vertex positions, from which the curvature of the objective is built."""
+"""Derivatives of residuals with respect to vertex positions, for the Gauss–Newton curvature of the objective."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,15 +7,15 @@ from abs_service.tracker.synthesis.perspective import project_with_slopes
 from calib.camera import Camera
 from calib.jit import kernel
 
-#: Half the side of the neighbourhood whose colours give the image's slope at a vertex [px].
+#: Half the side of the neighbourhood from which the image gradient at a vertex is estimated [px].
 RADIUS_PX = 2
 _STEPS = np.arange(-RADIUS_PX, RADIUS_PX + 1.0)
 
-#: Weights of the neighbourhood: a Gaussian of one pixel; and those of a regression on steps.
+#: Weights of the neighbourhood: a Gaussian with σ of one pixel; and those of a linear regression on the steps.
 _BELL = np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
 _REGRESSION = _BELL / np.sum(_BELL * _STEPS**2)
 
-#: Grazing views: the cosine between line of sight and normal below which a row would explode.
+#: Smallest cosine between line of sight and normal; at grazing views a row would grow without bound.
 LEAST_COSINE = 0.2
 
 
@@ -26,10 +26,10 @@ def depth_rows(
     use: NDArray[np.intp],
     weight: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Derivatives (m, 3) of weighted measured − synthesised distances by some of the vertices.
+    """Derivatives (m, 3) of weighted measured − synthesised distances with respect to the selected vertices.
 
-    A vertex that slides along the surface keeps its residual, because the measurement moves with the pixel; only its
-    motion along the normal counts, lengthened by the angle between normal and line of sight.
+    A vertex that slides along the surface keeps its residual, because the measurement moves with the pixel. Only its
+    motion along the normal counts, divided by the cosine between normal and line of sight (point-to-plane).
 
     Args:
         vertices, normals: positions [m] and unit normals (n, 3).
@@ -43,11 +43,11 @@ def depth_rows(
 
 
 def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Derivatives (n, channels, 3) of the measurement at a vertex's pixel by the vertex, in the image's unit per metre.
+    """Derivatives (n, channels, 3) of the measurement at a vertex's pixel with respect to the vertex [image unit / m].
 
     Args:
-        image: what every pixel measured (height, width, channels), a colour for example; NaN where nothing is known:
-            there it is taken to be level.
+        image: measured values (height, width, channels), for example colours; unknown pixels are NaN and have zero
+            gradient.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
@@ -63,13 +63,13 @@ def channel_slopes(
     camera: Camera,
     vertices: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """How the measured value changes at a vertex's pixel, to the right and down (n, 2), in the image's unit per pixel.
+    """Image gradient at a vertex's pixel, to the right and down (n, 2) [image unit / px].
 
-    Behind a Bayer mosaic the slope is that of the lattice of pixels with the same channel: between channels the values
-    jump, and a slope across them is none of the surface's.
+    In a Bayer mosaic the gradient is that of the pixels with the same channel; differences between channels are no
+    gradient of the surface.
 
     Args:
-        values: image (height, width), NaN where nothing is known.
+        values: image (height, width), NaN where unknown.
         channels: channel (height, width) of every pixel.
         camera: its camera.
         vertices: positions (n, 3) [m].
@@ -85,7 +85,7 @@ def channel_slopes(
 def _slope(
     patches: NDArray[np.float64], weights: NDArray[np.float64], steps: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Weighted regression (n,) of patches (n, rows, columns) on steps along one axis; 0 where there is nothing."""
+    """Weighted regression slope (n,) of patches (n, rows, columns) along one axis; 0 without data."""
     total = np.maximum(weights.sum(axis=(1, 2)), 1e-12)
     mean = (weights * steps).sum(axis=(1, 2)) / total
     centered = steps - mean[:, None, None]
@@ -94,14 +94,14 @@ def _slope(
 
 
 def _pixels(camera: Camera, vertices: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Pixels (n, 2) of vertices (n, 3)."""
+    """Pixel (n, 2) of each vertex (n, 3)."""
     return np.floor(camera.project(np.asarray(vertices, np.float64)) + 0.5).astype(int)
 
 
 def _neighborhood(pixels: NDArray[np.intp], shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Columns (n, 1, k) and rows (n, k, 1) around pixels (n, 2), as indices of an image.
 
-    Only the vertices' pixels are looked at; an image has a thousand times as many.
+    Restricted to the vertices' pixels; an image has a thousand times as many.
     """
     steps = _STEPS.astype(int)
     column = np.clip(pixels[:, :1] + steps, 0, shape[1] - 1)
@@ -118,7 +118,7 @@ def _depth_rows(
     weight: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> None:
-    """Weighted normals (n, 3) over the cosines of the angles at which vertices (n, 3) are seen from a centre (3,)."""
+    """Weighted normals (m, 3) divided by the cosine between normal and line of sight from a centre (3,)."""
     for k in range(use.size):
         v = use[k]
         x, y, z = vertices[v, 0] - center[0], vertices[v, 1] - center[1], vertices[v, 2] - center[2]
@@ -136,7 +136,7 @@ def _color_rows(
     projection: NDArray[np.float64],
     rows: NDArray[np.float64],
 ) -> None:
-    """Regression of the image around the pixels of places (n, 2) on column and row, times how these move (n, 2, 3)."""
+    """Image gradients at places (n, 2) by regression, times the Jacobians of the projection (n, 2, 3)."""
     height, width, channels = image.shape
     side, reach = weights.shape[0], weights.shape[0] // 2
     for v in range(places.shape[0]):

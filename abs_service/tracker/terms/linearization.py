@@ -1,4 +1,4 @@
-"""Linearised residuals: each depends on the position of one point of the surface, and the point on few parameters."""
+"""Linearised residuals: each depends on one point of the surface, each point on a few parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,12 +16,12 @@ EVERY = slice(None)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearization:
-    """Normalised residuals and their derivatives by the parameters: the cost is about ½‖residual + jacobian δΘ‖².
+    """Normalised residuals and their Jacobian with respect to theta: cost ≈ ½‖residual + jacobian δΘ‖².
 
     Attributes:
         residual: (m,).
         jacobian: (m, k).
-        parameters: the k parameters that the residuals depend on.
+        parameters: indices of the k parameters that the residuals depend on.
     """
 
     residual: NDArray[np.float64]
@@ -29,11 +29,11 @@ class Linearization:
     parameters: NDArray[np.int64] | slice = field(default_factory=lambda: EVERY)
 
     def parts(self) -> list["Linearization"]:
-        """Itself."""
+        """A list of this linearisation alone."""
         return [self]
 
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
-        """The residuals, to first order, when all parameters have changed by so much (dim,)."""
+        """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
         return Linearization(self.residual + self.jacobian @ by[self.parameters], self.jacobian, self.parameters)
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
@@ -45,12 +45,12 @@ class Linearization:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointLinearization:
-    """Normalised residuals and their derivatives by positions: every residual depends on that of one point.
+    """Normalised residuals and their derivatives with respect to positions; each residual depends on one point.
 
     Attributes:
         residual: (m,).
-        rows: derivatives (m, 3) by the position of the point [1/m].
-        points: which point (m,) that is.
+        rows: derivatives (m, 3) with respect to the position of the point [1/m].
+        points: index (m,) of the point.
         sparse_jacobian: derivative of the points with respect to theta.
     """
 
@@ -61,14 +61,14 @@ class PointLinearization:
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
-        """Derivatives (m, dim) by all parameters, in the order of the residuals."""
+        """Dense Jacobian (m, dim) with respect to theta, in the order of the residuals."""
         order = np.argsort(self.sparse_jacobian.group[self.points], kind="stable")
         result = np.empty((len(order), self.sparse_jacobian.dimension))
         result[order] = stack(self.parts(), self.sparse_jacobian.dimension).jacobian
         return result
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
-        """Jᵀ times values (m, k) of the residuals (dimension, k), without making J."""
+        """Jᵀ times values (m, k) of the residuals (dimension, k), matrix-free."""
         sparse_jacobian = self.sparse_jacobian
         at_points, result = (
             np.zeros((len(sparse_jacobian.local), 3, values.shape[1])),
@@ -79,7 +79,7 @@ class PointLinearization:
         return result
 
     def parts(self) -> list[Linearization]:
-        """The residuals by the parameters, by the chain rule; those of each group of points in one part."""
+        """Linearisations with respect to theta by the chain rule, one per group of points."""
         sparse_jacobian = self.sparse_jacobian
         end = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
         _count(self.points, sparse_jacobian.group, end)
@@ -102,10 +102,10 @@ class PointLinearization:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Together:
-    """Several linearisations as one.
+    """Concatenation of several linearisations.
 
     Attributes:
-        all: them.
+        all: the linearisations.
         dimension: number of parameters.
     """
 
@@ -114,12 +114,12 @@ class Together:
 
     @property
     def residual(self) -> NDArray[np.float64]:
-        """Their residuals, one after the other."""
+        """Concatenated residuals (m,)."""
         return np.concatenate([part.residual for part in self.all])
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
-        """Their derivatives by all parameters, in the order of the residuals."""
+        """Dense Jacobian (m, dim) with respect to theta, in the order of the residuals."""
         return stack(self.all, self.dimension).jacobian
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
@@ -129,12 +129,12 @@ class Together:
         return np.sum([part.transposed_times(own, dimension) for part, own in split_values], axis=0)
 
     def parts(self) -> list[Linearization]:
-        """The parts of each."""
+        """Parts of all linearisations."""
         return [part for linear in self.all for part in linear.parts()]
 
 
 class Linear(Protocol):
-    """What a linearisation can be asked, however it is kept."""
+    """Interface of a linearisation, independent of its storage."""
 
     @property
     def residual(self) -> NDArray[np.float64]:
@@ -143,20 +143,20 @@ class Linear(Protocol):
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
-        """Their derivatives (m, dim or k) by the parameters that they depend on."""
+        """Jacobian (m, dim or k) with respect to the parameters that the residuals depend on."""
         ...
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
         """Jᵀ times values (m, k) of the residuals, in their order (dimension, k).
 
         Args:
-            values: of the residuals (m, k).
-            dimension: number of all parameters.
+            values: one row per residual (m, k).
+            dimension: number of parameters of the model.
         """
         ...
 
     def parts(self) -> list[Linearization]:
-        """The same residuals, in any order, each part by the parameters that it depends on."""
+        """The same residuals in any order, grouped by the parameters that they depend on."""
         ...
 
 
@@ -166,7 +166,7 @@ def split(
     start: NDArray[np.int64],
     parameters: NDArray[np.int64],
 ) -> list[Linearization]:
-    """Residuals (m,) that are sorted by group, of which each begins at `start`, one part for each that has any."""
+    """One linearisation per non-empty group of residuals (m,), sorted by group with first indices `start`."""
     return [
         Linearization(residual[first:last], jacobian[first:last], own)
         for first, last, own in zip(start[:-1], start[1:], parameters)
@@ -175,7 +175,7 @@ def split(
 
 
 def stack(parts: Sequence[Linear], dimension: int) -> Linearization:
-    """All residuals of several linearisations below each other, by all parameters."""
+    """Vertically stacked residuals and Jacobians with respect to all parameters."""
     rows = [np.zeros((0, dimension))]
     for part in parts:
         rows.append(np.zeros((len(part.residual), dimension)))
@@ -188,7 +188,7 @@ def stack(parts: Sequence[Linear], dimension: int) -> Linearization:
 
 @kernel
 def _count(points: NDArray[np.int64], group: NDArray[np.int32], start: NDArray[np.int64]) -> None:
-    """Where the residuals of each group begin when they are sorted, and their number; zeros (groups + 1,) before."""
+    """First index of each group's residuals in sorted order, and their total, into zeros (groups + 1,)."""
     for m in range(points.size):
         start[group[points[m]] + 1] += 1
     for g in range(1, start.size):
@@ -206,9 +206,9 @@ def _chain(
     sorted_residual: NDArray[np.float64],
     jacobian: NDArray[np.float64],
 ) -> None:
-    """Rows times the moves of their points, sorted by group; `place` is where each group's first goes.
+    """Rows times the Jacobians of their points, sorted by group; `place` is the first index of each group.
 
-    A library multiplies thousands of 3 × 3 by 3 × k matrices ten times as slowly.
+    A library needs ten times as long for thousands of products of 1 × 3 by 3 × k matrices.
     """
     for m in range(points.size):
         v = points[m]
@@ -224,7 +224,7 @@ def _chain(
 def _gather(
     rows: NDArray[np.float64], points: NDArray[np.int64], values: NDArray[np.float64], at_points: NDArray[np.float64]
 ) -> None:
-    """Adds rowᵀ times value (3, k) of every residual to its point's; zeros (n, 3, k) before."""
+    """Sum of rowᵀ times value (3, k) over the residuals of each point, into zeros (n, 3, k)."""
     for m in range(points.size):
         for i in range(3):
             total = at_points[points[m], i]
@@ -240,7 +240,7 @@ def _transpose(
     local: NDArray[np.float64],
     result: NDArray[np.float64],
 ) -> None:
-    """Moves transposed times what is at the points (n, 3, k), added up by parameter; zeros (dim, k) before."""
+    """Transposed Jacobian of the points times values at the points (n, 3, k), into zeros (dim, k)."""
     for v in range(group.size):
         own = parameters[group[v]]
         for d in range(own.size):
