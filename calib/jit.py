@@ -1,4 +1,4 @@
-"""Configuration of kernel compilation, in one place."""
+"""Compilation of kernels with Numba: configuration, composition and cache keys."""
 
 import functools
 import hashlib
@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
-#: Sums may be reordered for vectorisation; NaN keeps its meaning, because it marks missing returns.
+#: Sums may be reordered for vectorisation; NaN semantics are kept, because NaN marks missing returns.
 _FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 
 #: Parallel loop over a population. A kernel divides its iterations among as many threads as the environment sets;
@@ -19,7 +19,7 @@ _FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 #: several are in processes that load the code from the cache, but not always in the process that compiled it.
 prange = range
 
-#: Environment variable with the number of threads of a kernel, as Numba names it; one if it is not set.
+#: Numba's environment variable for the number of threads of a kernel; one if it is not set.
 THREADS = "NUMBA_NUM_THREADS"
 
 
@@ -34,19 +34,19 @@ def kernel(function: Function) -> Function:
 
 @functools.cache
 def composed(template: Function, **parts: Callable[..., Any] | int) -> Function:
-    """Kernel like `template`, with other kernels and constants in place of the globals with these names.
+    """Copy of the kernel `template` in which the named globals are replaced by other kernels and constants.
 
-    The parts are compiled into it as if they had been written there, without dispatch at run time.
+    The parts are compiled into it like ordinary globals, without dispatch at run time.
 
     Args:
         template: a kernel.
-        parts: other kernels or constants, by the names of the template's globals.
+        parts: kernels or constants, keyed by the names of the template's globals.
     """
     return cast(Function, _Kernel(cast(_Kernel, template).function, parts))
 
 
 class _Kernel:
-    """Function that is compiled at its first call."""
+    """A function that is compiled at its first call."""
 
     def __init__(self, function: Callable[..., Any], parts: Mapping[str, Any]):
         functools.update_wrapper(self, function)
@@ -63,7 +63,7 @@ class _Kernel:
             return self.undivided
         from numba import config, prange  # noqa: PLC0415
 
-        # OpenMP is the threading layer that several threads may enter at once; its idle workers spin briefly.
+        # OpenMP is the threading layer that is safe to enter from several threads; its idle workers spin briefly.
         config.THREADING_LAYER = "omp"  # pyright: ignore[reportAttributeAccessIssue]
         return self._compile("_divided", {"prange": prange}, parallel=True)
 
@@ -101,7 +101,7 @@ class _Kernel:
 
 
 def _readable(function: Callable[..., Any]) -> tuple[object, ...]:
-    """Code of a function without its location and docstring."""
+    """Byte code, names and constants of a function, without its location and docstring."""
     code = function.__code__
     constants = [repr(constant) for constant in code.co_consts if constant != function.__doc__]
     return code.co_code, code.co_names, code.co_varnames, constants

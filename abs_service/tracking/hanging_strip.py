@@ -1,4 +1,4 @@
-"""A recording of a strip that hangs from a gripper, tracked from beginning to end."""
+"""Tracking of a recorded strip that hangs from a gripper, for the estimate of its stiffness."""
 
 from dataclasses import dataclass
 
@@ -27,15 +27,15 @@ from drivers.replay import Recording
 
 @dataclass(frozen=True, eq=False)
 class Profiles:
-    """One frame.
+    """Measured, tracked and predicted profile of the strip in one frame.
 
     Attributes:
-        measured: depth pixels, horizontal distance from the gripper and drop below it (k, 2) [m].
-        tracked: the same of the tracked vertices (n, 2) [m].
-        predicted: the same of nodes of the elastica (m, 2) [m].
-        along: ends of the segments (s + 1,), distance from the gripper [m].
+        measured: side view of the depth pixels: horizontal distance from the gripper and drop below it (k, 2) [m].
+        tracked: side view of the tracked vertices (n, 2) [m].
+        predicted: side view of the nodes of the elastica (m, 2) [m].
+        along: arc length from the gripper to the ends of the segments (s + 1,) [m].
         inclination, deviation: tracked angles there and their standard deviation (s + 1,) [rad].
-        predicted_along, predicted_inclination: the elastica's (m,) [m], [rad].
+        predicted_along, predicted_inclination: arc length (m,) [m] and inclination (m,) [rad] of the elastica.
     """
 
     measured: NDArray[np.float64]
@@ -50,14 +50,14 @@ class Profiles:
 
 @dataclass(frozen=True, eq=False)
 class HangingStrip:
-    """What was tracked.
+    """Result of tracking a strip in a recording.
 
     Attributes:
-        model: of the strip.
-        inclinations: of all frames in which it was tracked.
-        untracked: frame sets in which it was not, or not yet.
-        shown: an estimate from the middle of the recording, to be drawn.
-        pixels: of that moment, what the reference sensor saw of the strip (k, 3) [m].
+        model: model of the strip.
+        inclinations: inclination profiles of all tracked frames.
+        untracked: number of frame sets without a tracked strip.
+        shown: an estimate from the middle of the recording, for the plot.
+        pixels: points of the strip from the reference sensor in the same frame (k, 3) [m].
     """
 
     model: Gravity
@@ -67,7 +67,7 @@ class HangingStrip:
     pixels: NDArray[np.float64]
 
     def profiles(self, found: Stiffness) -> Profiles:
-        """What there is to be drawn of the frame that is shown."""
+        """Profiles of the frame `shown`, for the plot."""
         model, theta, length = self.model, self.shown.theta, self.model.strip.length
         here = inclination_profile(model, theta, self.shown.covariance)
         tip = predicted_tip(found.load, here)
@@ -87,10 +87,10 @@ class HangingStrip:
 def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Plan) -> HangingStrip:
     """Tracks a recording with a gravity model.
 
-    Of a strip that was lost and found again, the mesh that was tracked longest counts.
+    If the strip was lost and detected again, the mesh with the most tracked frames is used.
 
     Raises:
-        StiffnessError: no strip was ever tracked.
+        StiffnessError: no strip was tracked in any frame.
     """
     tracking, observer = TrackingSession(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}

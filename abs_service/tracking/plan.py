@@ -1,4 +1,4 @@
-"""The parts of one tracker, and a tracker made of them from the first observation of its object."""
+"""The settings of one tracker's parts, and a tracker built from them on the first observation of its object."""
 
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -30,7 +30,7 @@ class ModelSettings(Protocol):
 
     @property
     def board(self) -> tuple[float, float]:
-        """Width and height [m] of a flat board from which `build` makes a model; used by the warm-up."""
+        """Width and height [m] of a flat board from which `build` can build a model; used by the warm-up."""
         ...
 
     def build(self, detection: InitialDetection) -> DeformationModel:
@@ -58,7 +58,7 @@ class OptimizerSettings(Protocol):
     """`Settings` of a module of `abs_service.tracker.optimizers`."""
 
     def build(self, dimension: int, generator: np.random.Generator) -> Optimizer:
-        """A search that draws from `generator`."""
+        """An optimiser that draws random numbers from `generator`."""
         ...
 
 
@@ -75,12 +75,12 @@ class Plan:
     """The settings of all parts of a tracker.
 
     Attributes:
-        reference: sensor whose depth image gives the initial mesh.
+        reference: sensor from whose depth image the initial mesh is built.
         model, region, synthesis, objective, optimizer: settings of the exchangeable parts.
         evaluations: maximum number of cost evaluations per frame.
         vertices: approximate number of vertices of the mesh.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
-        seed: of the search; equal seeds and frame sets give equal estimates.
+        seed: seed of the search; equal seeds and frame sets result in equal estimates.
     """
 
     reference: str
@@ -99,7 +99,7 @@ class Plan:
 
 
 def make_posterior(plan: Plan, rig: Rig, model: DeformationModel, observation: Observation) -> tuple[Posterior, Mesh]:
-    """Likelihood and priors of a model, and its mesh with the appearance that the observation shows."""
+    """Posterior of a model, and its mesh with the appearance from the observation."""
     synthesizer = plan.synthesis.build(rig, model.mesh)
     mesh = replace(
         dressed(model.mesh, observation.images, rig),
@@ -120,7 +120,7 @@ def make_tracker(plan: Plan, rig: Rig, detection: InitialDetection, observation:
 
     Raises:
         DetectionError: the model finds no object of its kind.
-        ModelError: the model cannot be made of the object.
+        ModelError: the model cannot be built from the object.
     """
     model = plan.model.build(detection)
     posterior, mesh = make_posterior(plan, rig, model, observation)

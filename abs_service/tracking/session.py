@@ -1,4 +1,4 @@
-"""One tracker over time: initial detection, tracking, loss, and detection anew."""
+"""A tracker over time: initial detection, tracking, loss and renewed detection."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -26,8 +26,8 @@ class TrackingSession:
 
     Attributes:
         mesh: the undeformed mesh; None before the first detection.
-        mesh_version: number of meshes made.
-        made_ns: moment of the frames from which the mesh was made, CLOCK_MONOTONIC [ns].
+        mesh_version: number of meshes built so far.
+        made_ns: time of the frames from which the mesh was built, CLOCK_MONOTONIC [ns].
     """
 
     def __init__(self, rig: Rig, plan: Plan):
@@ -54,7 +54,7 @@ class TrackingSession:
 
         Args:
             frames: images of one moment.
-            in_time: False when the time of the search is up.
+            in_time: False after the deadline of the search.
 
         Raises:
             ObservationError: the frames do not fit the rig.
@@ -86,11 +86,11 @@ class TrackingSession:
         return estimate if estimate.status == Status.TRACKING else replace(estimate, reasons=reasons)
 
     def reinitialize(self) -> None:
-        """Detects the object anew in the next frame set; safe from any thread."""
+        """Requests a new detection in the next frame set; thread-safe."""
         self._reinitialize_requested = True
 
     def _detect_again(self, tracker: Tracker, requested: bool, observation: Observation) -> None:
-        """Detects the object anew; DetectionError or ModelError if it is not in view, or is another one."""
+        """Detects the object again; DetectionError or ModelError if it is not in view or does not match the model."""
         if not requested and self._loss_monitor.keeps_mesh(observation.t_host_ns):
             tracker.relocate(self._detect(observation).points)
             return
@@ -103,7 +103,7 @@ class TrackingSession:
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
         self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
         self._vertex_offsets = self._plan.vertex_offsets.build(tracker.model, self._rig.sensors[self._plan.reference])
-        # Their appearance is unknown: when one of them delivers, mesh and appearance are made anew.
+        # Their appearance is unknown: once one of them delivers images, mesh and appearance are built again.
         sensors = self._rig.sensors
         self._without_appearance = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
         self.mesh_version += 1
@@ -116,7 +116,7 @@ class TrackingSession:
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
-    """The (head, stream) of every image that the sensors' noise models need; streams are called by their kind."""
+    """The (head, stream) of every image that the sensors' noise models require; streams are named after their kind."""
     return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in kinds(sensor.noise)))
 
 

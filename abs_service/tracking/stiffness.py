@@ -1,9 +1,8 @@
-"""Bending stiffness of a strip from how it hangs: the heavy elastica that fits the tracked inclinations of many frames.
+"""Bending stiffness of a hanging strip: fit of the heavy elastica to the tracked inclinations of many frames.
 
-The beam model is that of `elastica`: D κ(s) is the moment of all that hangs beyond s (W. G. Bickley, The heavy
-elastica, Phil. Mag. 17, 1934), for slopes of any size. Only the ratio of weight and stiffness has a shape, so the
-weight must be known. What the model assumes: the strip is uniform, straight without load, and moves so slowly that it
-hangs at rest.
+The beam model is that of `elastica`: D κ(s) is the moment of the weight beyond s (W. G. Bickley, The heavy elastica,
+Phil. Mag. 17, 1934), for slopes of any size. The shape determines only the ratio of weight and stiffness, so the weight
+must be given. Assumptions: the strip is uniform, straight without load, and quasi-static.
 """
 
 from collections.abc import Sequence
@@ -18,36 +17,37 @@ from abs_service.tracker.models.gravity import Gravity
 
 Vector = NDArray[np.float64]
 
-#: Successive frames have correlated errors; the scatter of the load is estimated from so many blocks of frames.
+#: Number of blocks of frames from which the scatter of the load is estimated, because errors of successive frames are
+#: correlated.
 STRETCHES = 8
 
-#: With fewer frames nothing can be said about how they scatter.
+#: Minimum number of frames for an estimate of their scatter.
 LEAST_FRAMES = 5 * STRETCHES
 
-#: Loads w L³ / D that can be told from none, and from a thread.
+#: Range of loads w L³ / D that can be distinguished from zero load and from a thread.
 LEAST_LOAD, MOST_LOAD = 1e-3, 300.0
 
-#: Nobody knows better how a gripper is inclined, even if the model takes it for fixed [rad].
+#: Lower bound of the standard deviation of the gripper's inclination, even if the model keeps it fixed [rad].
 LEAST_DEVIATION = 1e-3
 
 #: Step of the numerical derivatives [rad], and relative step of the load.
 STEP = 1e-4
 
-#: The search for the load ends with a step of its logarithm below this, or after so many steps.
+#: Termination of the search for the load: largest step of its logarithm, and maximum number of steps.
 CONVERGED, MOST_STEPS = 1e-7, 60
 
 
 class StiffnessError(ValueError):
-    """Nothing can be said about the stiffness; the message says why."""
+    """The stiffness cannot be estimated; the message contains the reason."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InclinationProfile:
-    """The strip in one frame.
+    """Inclination of the strip in one frame.
 
     Attributes:
-        inclination: angle from the horizontal (segments + 1,) at the ends of the segments, from the gripper on [rad].
-        covariance: of these angles [rad²].
+        inclination: angle from the horizontal at the ends of the segments (segments + 1,), gripper first [rad].
+        covariance: covariance of these angles (segments + 1, segments + 1) [rad²].
     """
 
     inclination: Vector
@@ -56,15 +56,16 @@ class InclinationProfile:
 
 @dataclass(frozen=True, slots=True)
 class Stiffness:
-    """What the frames say.
+    """Estimated load of a strip with its uncertainty.
 
     Attributes:
         load: weight per area times length cubed over stiffness per width; no unit.
-        deviation: standard deviation of the load's logarithm: that of all parts together.
-        scatter: the part of it that is told from how stretches of the recording differ.
-        from_length: the part of it that comes from the strip's length.
-        from_first: the part of it that comes from how the strip hung when it was found.
-        misfit: mean squared residual of the inclinations, in their own variances: about 1 if the beam model holds.
+        deviation: standard deviation of the load's logarithm, combined from the following parts.
+        scatter: contribution of the scatter between blocks of the recording.
+        from_length: contribution of the uncertain length of the strip.
+        from_first: contribution of the uncertain shape of the strip at its detection.
+        misfit: mean squared residual of the inclinations, normalised by their covariance: about 1 if the beam model
+            holds.
         frames: number of frames used.
     """
 
@@ -77,12 +78,12 @@ class Stiffness:
     frames: int
 
     def bending(self, weight: float, length: float) -> float:
-        """Bending stiffness per width D [N·m] of a strip of a weight per area [N/m²] and a length [m]."""
+        """Bending stiffness per width D [N·m] for a weight per area [N/m²] and a length [m]."""
         return weight * length**3 / self.load
 
 
 def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> InclinationProfile:
-    """The inclinations of tracked parameters (dim,) with their covariance (dim, dim)."""
+    """Inclinations and their covariance, propagated from theta (dim,) and its covariance (dim, dim)."""
     offsets = STEP * np.eye(len(theta))
     slopes = np.stack(
         [(model.inclination(theta + step) - model.inclination(theta - step)) / (2 * STEP) for step in offsets], axis=1
@@ -94,26 +95,26 @@ def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.fl
 def estimate_stiffness(
     frames: Sequence[InclinationProfile], length: float, length_deviation: float, first_deviation: float
 ) -> Stiffness:
-    """Fits one load to all frames, each with an inclination of its own.
+    """Fits one load to all frames, with a separate inclination at the free end per frame.
 
-    What the strip looks like is told from the frame in which it was found, with the shape that it seemed to have there.
-    Colours hold on to that shape in all frames, so they share its error.
+    The appearance is sampled on the shape detected in the first frame. The colours tie all frames to that shape, so
+    its error is common to all of them.
 
     Args:
-        frames: in the order of time.
-        length: of the strip [m].
+        frames: in temporal order.
+        length: length of the strip [m].
         length_deviation: standard deviation of the length [m]; the load grows with its third power.
-        first_deviation: standard deviation of the logarithm of the load that the first frame seemed to show.
+        first_deviation: standard deviation of the logarithm of the load fitted to the first frame.
 
     Raises:
-        StiffnessError: too few frames, or a strip that does not bend, or that hangs like a thread.
+        StiffnessError: too few frames, or the strip does not bend, or hangs like a thread.
     """
     if len(frames) < LEAST_FRAMES:
         raise StiffnessError(f"{len(frames)} frames with a tracked strip are too few, at least {LEAST_FRAMES} needed")
     fit = _fit(frames)
     borders = np.linspace(0, len(frames), STRETCHES + 1).astype(int)
     parts = [_fit(frames[first:last]).log_load for first, last in pairwise(borders)]
-    # The variance of Student's distribution with one degree of freedom less than there are stretches.
+    # Standard deviation of Student's t distribution with STRETCHES − 1 degrees of freedom.
     wide = np.sqrt((STRETCHES - 1) / (STRETCHES - 3))
     scatter = max(wide * float(np.std(parts, ddof=1) / np.sqrt(STRETCHES)), fit.deviation)
     from_length = 3 * length_deviation / length
@@ -123,7 +124,7 @@ def estimate_stiffness(
 
 
 def predicted_tip(load: float, frame: InclinationProfile) -> float:
-    """Inclination at the free end [rad] that goes with a load and fits a frame best."""
+    """Inclination at the free end [rad] that best fits a frame, for a given load."""
     inclination, weights = frame.inclination, np.linalg.inv(frame.covariance)
     tip = inclination[-1:]
     for _ in range(10):
@@ -135,7 +136,7 @@ def predicted_tip(load: float, frame: InclinationProfile) -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """Logarithm of the load, its deviation if the frames were independent, and the misfit as in `Stiffness`."""
+    """Logarithm of the load, its deviation for independent frames, and the misfit as in `Stiffness`."""
 
     log_load: float
     deviation: float
@@ -143,7 +144,7 @@ class _Fit:
 
 
 def _fit(frames: Sequence[InclinationProfile]) -> _Fit:
-    """Gauss and Newton's method for one load and an inclination of every frame, which is eliminated."""
+    """Gauss-Newton for one load and one inclination per frame, which is eliminated (Schur complement)."""
     inclination = np.stack([frame.inclination for frame in frames])
     weights = np.linalg.inv(np.stack([frame.covariance for frame in frames])).astype(np.float64)
     count = inclination.shape[1]
@@ -172,7 +173,7 @@ def _fit(frames: Sequence[InclinationProfile]) -> _Fit:
 
 
 def _product(a: NDArray[np.float64], weights: NDArray[np.float64], b: NDArray[np.float64]) -> Vector:
-    """aᵀ W b of every frame (frames,)."""
+    """Product aᵀ W b of every frame (frames,)."""
     return np.einsum("fi,fij,fj->f", a, weights, b)
 
 

@@ -1,4 +1,4 @@
-"""Compiles all kernels before the first real frame: once per installation, then they are loaded from the cache."""
+"""Compilation of all kernels before the first real frame; later processes load them from the cache."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -16,7 +16,7 @@ from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Noise, Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
-#: Placeholder cameras: kernels take images of any size, so that the real cameras need not be known yet.
+#: Placeholder camera: kernels accept images of any size, so the real cameras are not required yet.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
 _DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
 _FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
@@ -28,8 +28,8 @@ def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
     """Tracks and loses a synthetic flat board with every kind of lens and the parts of the plan.
 
     Args:
-        noises: noise model of every sensor that the tracker uses, by name; gives the kind of image.
-        plan: of the tracker.
+        noises: noise model of every sensor of the tracker, by name; determines the kind of image.
+        plan: settings of the tracker.
     """
     for camera in (_CAMERA, _DISTORTED, _FISHEYE):
         rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
