@@ -1,4 +1,4 @@
-"""The tracker's heavy elastica, which integrates from the free end, against the beam theory and another integration."""
+"""The heavy elastica, integrated from the free end, compared with beam theory and with another integration."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_it_is_what_an_adaptive_integration_gives(tip, load):
 
 
 def test_a_little_sag_is_that_of_the_cantilever():
-    """Euler and Bernoulli: w L⁴ / 8 D at the end, slope w L³ / 6 D."""
+    """Euler-Bernoulli beam: deflection w L⁴ / 8 D and slope w L³ / 6 D at the free end."""
     load = 1e-3
     shape = heavy_elastica(load / 6, load)
     assert shape.inclination[0, 0] == pytest.approx(0, abs=1e-8)

@@ -1,4 +1,4 @@
-"""The first mesh covers the object that the reference sensor sees, and nothing else."""
+"""The initial mesh covers the object in the reference sensor, and nothing else."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ WIDTH, HEIGHT = 0.30, 0.20
 
 
 def rectangle(T_ro: np.ndarray, background: float = np.nan) -> np.ndarray:
-    """Distances of a rectangle of 0.30 × 0.20 m in the x-y plane of o, before a background at one distance."""
+    """Distances of a rectangle of 0.30 × 0.20 m in the x-y plane of o, in front of an equidistant background."""
     T_os = pose.inverse(T_ro) @ TOF.T_rs
     rays = TOF.rays() @ T_os[:3, :3].T
     distance = -T_os[2, 3] / rays[..., 2]
@@ -32,7 +32,7 @@ def rectangle(T_ro: np.ndarray, background: float = np.nan) -> np.ndarray:
 
 
 def placed(turn: float = 0.0, tilt: float = 0.0, z: float = 1.0) -> np.ndarray:
-    """Pose in the rig of a rectangle before the camera, turned about its normal and tilted [rad]."""
+    """Pose in the rig of a rectangle in front of the camera, rotated about its normal and tilted [rad]."""
     T_so = pose.from_rotation_vector([0, 0, 0], [0.01, -0.02, z]) @ pose.from_rotation_vector(
         [tilt, tilt / 2, 0], [0] * 3
     )
@@ -56,7 +56,9 @@ def test_the_mesh_is_the_rectangle(turn, tilt):
     np.testing.assert_allclose(points[:, 2], 0, atol=5e-4)  # in the plane
     assert np.abs(points[:, 0]).max() < WIDTH / 2 + 0.006  # a pixel is 4.5 mm wide
     assert np.abs(points[:, 1]).max() < HEIGHT / 2 + 0.006
-    assert 0.72 * WIDTH * HEIGHT < area(mesh) < 1.02 * WIDTH * HEIGHT  # no vertex is nearer to the rim than it sees
+    assert (
+        0.72 * WIDTH * HEIGHT < area(mesh) < 1.02 * WIDTH * HEIGHT
+    )  # no vertex lies closer to the rim than its neighbourhood
     assert 0.75 * 300 < len(mesh.vertices) < 1.15 * 300
 
 
@@ -64,7 +66,7 @@ def test_the_mesh_is_the_rectangle(turn, tilt):
 def test_there_are_about_as_many_vertices_as_wanted(vertices):
     mesh = grid_mesh(InitialDetection(rectangle(placed()), TOF, vertices))
     assert len(mesh.vertices) == pytest.approx(vertices, rel=0.2)
-    assert len(np.unique(mesh.faces)) == len(mesh.vertices)  # none is left over
+    assert len(np.unique(mesh.faces)) == len(mesh.vertices)  # no unused vertices
 
 
 @pytest.mark.parametrize("turn", TURNS)
@@ -90,7 +92,7 @@ def test_noise_is_averaged():
 
 
 def test_no_face_spans_a_jump_in_distance():
-    """A step of 20 cm between the halves: without a gap in the image, but not one surface."""
+    """A step of 20 cm between the halves: no gap in the image, but two surfaces."""
     near, far = rectangle(placed()), rectangle(placed(z=1.2))
     distance = near.copy()
     distance[:, 90:] = far[:, 90:]

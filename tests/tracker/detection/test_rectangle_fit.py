@@ -1,4 +1,4 @@
-"""A flat sheet is found where it is, as large as it is, with axes that do not jump; what is none is refused."""
+"""A flat sheet is detected with accurate pose and size and stable axes; other objects are rejected."""
 
 import dataclasses
 
@@ -25,18 +25,18 @@ CAMERA = Camera(
 )
 RAYS = CAMERA.rays()
 A4 = (0.297, 0.210)
-#: A pixel is 3 mm wide on a sheet at 0.9 m.
+#: Footprint of a pixel on a sheet at 0.9 m: 3 mm.
 PIXEL = 0.9 / 300
 
 
 def placed(turn: float = 0.0, tilt: float = 0.0) -> np.ndarray:
-    """Pose of a plane before the camera, turned about its normal and tilted [rad]; its z axis points away."""
+    """Pose of a plane in front of the camera, rotated about its normal and tilted [rad]; its z axis points away."""
     T_sp = pose.from_rotation_vector([tilt, -tilt / 2, 0], [0.02, -0.01, 0.9])
     return CAMERA.T_rs @ T_sp @ pose.from_rotation_vector([0, 0, turn], [0, 0, 0])
 
 
 def on_plane(T_rp: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Distances of a plane in every pixel, and the two coordinates on it [m]."""
+    """Distances of a plane in every pixel, and both coordinates on it [m]."""
     T_ps = pose.inverse(T_rp) @ CAMERA.T_rs
     rays = RAYS @ T_ps[:3, :3].T
     distance = -T_ps[2, 3] / rays[..., 2]
@@ -53,7 +53,7 @@ def seen(distance: np.ndarray, vertices: int = 300) -> InitialDetection:
 
 
 def assert_is(found: Sheet, T_rp: np.ndarray, size: tuple[float, float], pixels: float = 0.5) -> None:
-    """The same rectangle, however its axes are called."""
+    """Asserts that the sheet is the same rectangle, up to the choice of its axes."""
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 2
     true, there = (
         pose.transform(T, np.column_stack([corners * wh, np.zeros(4)]))
@@ -84,7 +84,7 @@ def test_the_long_side_points_right_or_up_whatever_the_sheet_s_own_idea(degrees)
 
 
 def test_noise_spikes_and_a_finger_do_not_move_it():
-    """5 mm of noise, 3 % of the pixels anywhere, and a finger over the rim that hides 3 % of the sheet."""
+    """5 mm of noise, 3 % outliers, and a finger over the rim that occludes 3 % of the sheet."""
     generator = np.random.default_rng(3)
     T_rp = placed(0.3, 0.3)
     distance = rectangle(T_rp)
@@ -166,7 +166,7 @@ def test_the_mesh_is_a_grid_on_the_sheet(vertices, size):
 
 
 def test_a_sheet_is_seen_by_a_sensor_anywhere():
-    """The rig's frame is not the camera's: everything moves along with the rig."""
+    """The rig's frame differs from the camera's: the result moves with the rig."""
     T = pose.from_rotation_vector([0.4, 0.5, -0.6], [1.0, 2.0, 3.0])
     here = find_sheet(seen(rectangle(placed(0.3, 0.2))))
     moved = dataclasses.replace(CAMERA, T_rs=T @ CAMERA.T_rs)

@@ -1,4 +1,4 @@
-"""Ways to say which pixels are the object."""
+"""Regions select the pixels of the object."""
 
 import cv2
 import numpy as np
@@ -91,12 +91,12 @@ def test_a_box_inside_out_is_an_error(highest):
 
 
 def drawn(folder, channels: int):
-    """A mask image, and which of its pixels are the object."""
+    """A mask image, and the object's pixels in it."""
     inside = np.zeros(SHAPE, bool)
     inside[5:25, 10:40] = True
     image = (inside * np.uint8(255))[..., None].repeat(channels, axis=2).squeeze()
     if channels == 4:
-        image[..., :3] = 77  # with an alpha channel brightness means nothing
+        image[..., :3] = 77  # with an alpha channel the brightness is ignored
     if channels == 3:
         image[..., :2] = 0
     path = folder / "mask.png"

@@ -1,4 +1,4 @@
-"""The TOML tables in docs/models.md load, and name every key of every deformation model with its default."""
+"""The TOML tables in docs/models.md load and contain every key of every deformation model with its default."""
 
 import dataclasses
 import re

@@ -1,4 +1,4 @@
-"""FlexPad is eight bends of a sheet that add up, a height map and a pose; it follows a sheet and does not collapse."""
+"""FlexPad: summed bends of eight sides, height map and pose; tracks a sheet without collapse."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ def test_without_bends_the_sheet_is_flat_and_where_it_was():
 
 @given(seed=seeds, size=st.sampled_from([1e-12, 1e-6, 1e-3, 1.0, 1.5]))
 def test_deformation_is_the_sum_of_exact_bends(seed, size):
-    """Of weak ones, too, of which quotients would be rounded; beyond its range a parameter is at its end."""
+    """Includes weak bends, where quotients suffer from rounding; parameters outside their range are clamped."""
     generator = np.random.default_rng(seed)
     theta = size * generator.uniform(-2, 2, 15) * ([1.0] * 8 + [0.3] * 4 + [0.1] * 3)
     theta[generator.integers(8)] = 0.0
@@ -81,7 +81,7 @@ def test_deformation_is_the_sum_of_exact_bends(seed, size):
 
 
 def turns_up_to(turns: float) -> float:
-    """Least radius at which the corners of the A4 sheet's mesh roll up by as many turns."""
+    """Least radius at which the corners of the A4 sheet's mesh roll up by a number of turns."""
     return float(np.linalg.norm(PLACES, axis=1).max()) / (2 * np.pi * turns)
 
 
@@ -94,7 +94,7 @@ def test_the_series_are_as_exact_as_they_promise_and_not_much_more(turns, degree
     sine, versine = (np.polyval(c, series.scale * t**2 - 1) for c in series.coefficients.astype(float))
     error = np.hypot(sine - exact[0], t * (versine - exact[1])).max()
     print(f"{turns:.2f} turns: degree {degree}, error {error:.1e} of the distance from the centre")
-    assert error < (2e-7 if turns < 1 else 2e-6)  # single precision's share is larger than that of the degree
+    assert error < (2e-7 if turns < 1 else 2e-6)  # single precision dominates the error of the polynomial
 
 
 @pytest.mark.parametrize(("turns", "tolerance"), [(0.3, 5e-7), (0.6, 5e-7), (1.3, 1e-6), (2.99, 3e-6)])
@@ -119,7 +119,7 @@ def test_a_sheet_that_would_roll_up_more_often_is_refused_with_what_is_allowed()
 @pytest.mark.parametrize("side", range(8))
 @pytest.mark.parametrize("value", [-2.0, 0.7, 2.0])
 def test_a_single_bend_keeps_all_lengths(side, value):
-    """An edge of length l becomes the chord of an arc, shorter by (κl)²/24; rounding adds 0.002 %."""
+    """An edge of length l becomes a chord, shorter by the relative amount (κl)²/24; rounding adds 0.002 %."""
     theta = theta_of(*np.eye(8)[side] * value)
     lengths = np.linalg.norm(np.diff(MESH.vertices[MESH.edges], axis=1)[:, 0], axis=1)
     chord = (value / (2 * RADIUS) * lengths) ** 2 / 24
@@ -190,7 +190,7 @@ def test_scales_move_the_farthest_vertex_by_about_a_metre():
 
 
 def test_what_is_known_of_bends_and_height_keeps_them_in_range():
-    """Nothing changes beyond ±2, but the prior goes on rising, so that the most likely Θ is never out there."""
+    """Bends are clamped at ±2, but the prior keeps rising, so that the optimum never lies outside the range."""
     inside, outside = bend(e=2.0), bend(e=2.6)
     np.testing.assert_array_equal(vertices_of(inside), vertices_of(outside))
     costs = 0.5 * np.sum((MODEL.prior @ np.stack([inside, outside]).T) ** 2, axis=0)
@@ -215,7 +215,7 @@ def test_half_a_size_is_refused(sizes):
     ],
 )
 def test_bends_of_several_directions_change_lengths_as_documented(sides, documented):
-    """Largest change of an edge in docs/models.md; sums of isometric bends are isometric to first order only."""
+    """Largest change of an edge in docs/models.md; sums of isometric bends are isometric only to first order."""
     assert 0.8 * documented < np.abs(stretches(bend(**sides))).max() < documented
 
 
@@ -223,7 +223,7 @@ COLLAPSED = bend(e=1, w=1, s=1, n=1, se=-1, nw=-1, sw=-1, ne=-1)
 
 
 def test_opposite_bends_shrink_a_sheet_that_stays_nearly_flat():
-    """The trap is there: without the stretch prior nothing speaks against it but what is seen beside the sheet."""
+    """The local optimum exists: without the stretch prior only the background beside the sheet penalises it."""
     there = in_plane(COLLAPSED)
     assert np.abs(there[:, 2]).max() < 6e-3
     assert np.ptp(there[:, 0]) < 0.9 * np.ptp(PLACES[:, 0])
@@ -255,7 +255,7 @@ def tracking(simulation: Simulation, model: object = Settings(), **changes: obje
 @pytest.mark.parametrize("value", [0.0, -1.0, 1.0])
 @pytest.mark.parametrize("collapse", [0.5, 1.0])
 def test_the_truth_is_likelier_than_a_collapsed_sheet(value, collapse):
-    """Both explain what is seen of the surface; what they say of the edges' lengths decides."""
+    """Both fit the measured surface; the lengths of the edges discriminate between them."""
     simulation = simulate("simulated://sheet?seed=1")
     bent = standing(simulation, curvature=-value / (2 * RADIUS), direction=0.0, offset=0.0)
     tracker, rig = tracking(simulation), rig_of(simulation)

@@ -1,4 +1,4 @@
-"""The gravity model is eq. 9 segment by segment: exact, isometric, and safe where nothing bends."""
+"""The gravity model is eq. 9 segment by segment: exact, isometric, and stable for straight segments."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -79,7 +79,7 @@ def test_without_curvature_the_strip_is_flat(segments):
 
 @given(st.floats(-1e-3, 1e-3), st.integers(1, 6))
 def test_small_angles_lose_nothing(beta, segments):
-    """Against the series; the textbook form with the radius has lost all digits here."""
+    """Compared with the series; the textbook form with the radius loses all digits here."""
     shape = model(segments, np.eye(4))
     theta = np.concatenate([np.full(segments, beta / segments), np.zeros(6)])
     x, _, z = shape.deform(theta[None]).vertices[0].astype(float)
@@ -137,7 +137,7 @@ def test_at_rest_the_normals_face_the_side_that_faces_the_sensor():
 
 @dataclass(frozen=True)
 class Seen:
-    """What a simulated depth camera sees of a strip, and where it is."""
+    """A strip in a simulated depth camera, with ground truth."""
 
     detection: InitialDetection
     strip: PlacedStrip
@@ -155,7 +155,7 @@ def seen(uri: str, exposure: int) -> Seen:
 
 @pytest.mark.parametrize(("stiffness", "degrees"), [(0.003, 5.5), (0.01, 3.0), (0.05, 1.5)])
 def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
-    """Root mean squares of twelve poses: the more it bends at the gripper, the less its direction there is seen."""
+    """RMS errors over twelve poses: the more the strip bends at the gripper, the less certain its direction there."""
     places, angles, sizes, bends = [], [], [], []
     for seed in range(2, 14):
         case = seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", seed)
@@ -168,7 +168,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
     place = np.sqrt(np.mean(np.sum(np.square(places), axis=1)))
     angle, length, width, bend = np.sqrt(np.mean(np.square(np.column_stack([angles, sizes, bends])), axis=0))
     print(stiffness, place, angle, length, width, bend)
-    assert place < 5e-3  # a pixel shows 5 mm of the strip
+    assert place < 5e-3  # a pixel's footprint on the strip is 5 mm
     assert max(angle, bend) < degrees
     assert length < 6e-3
     assert width < 3e-3
@@ -176,7 +176,7 @@ def test_the_gripper_line_is_found_in_a_depth_image(stiffness, degrees):
 
 @pytest.mark.parametrize("stiffness", [0.005, 0.02])
 def test_lengths_scatter_as_they_say_they_do(stiffness):
-    """In a strip that sags by 80°, the end at the gripper once turned away from the camera: 50 mm too long."""
+    """Regression: the gripper's end of a strip that sags by 80° turned away from the camera, 50 mm too long."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
     found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
     errors = np.array([(one.length - 0.30) / one.length_deviation for one in found])
@@ -186,10 +186,10 @@ def test_lengths_scatter_as_they_say_they_do(stiffness):
 
 @pytest.mark.parametrize("stiffness", [0.02, 0.08])
 def test_the_load_that_a_first_frame_shows_scatters_as_it_says(stiffness):
-    """Pixels at the rim, which show what is behind as well, once bent the strip: it seemed up to a third less stiff."""
+    """Regression: mixed pixels at the rim bent the fitted strip, whose stiffness was up to a third too small."""
     cases = [seen(f"simulated://strip?seed={seed}&stiffness={stiffness}", 0) for seed in range(1, 13)]
     found = [find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0])) for case in cases]
-    # To first order, the angle by which a strip bends is in proportion to the load.
+    # To first order, the bending angle of a strip is proportional to the load.
     turned = [np.ptp(case.strip.profile.angle) for case in cases]
     errors = np.array([np.log(abs(one.turn[-1]) / true) for one, true in zip(found, turned)])
     said = np.array([one.load_deviation for one in found])
@@ -229,7 +229,8 @@ def test_a_strip_of_another_length_is_not_the_one_that_is_meant():
 def test_a_few_pixels_between_strip_and_wall_do_not_mislead(seed):
     case = seen(f"simulated://strip?seed={seed}&stiffness=0.01", seed)
     found = find_strip(case.detection, np.array([0, 1.0, 0]), np.array([0, -1.0, 0]), 0.3)
-    assert np.linalg.norm(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3]) < 10e-3  # two pixels; without care it was 40 mm
+    # Two pixels; it was 40 mm when mixed pixels were included in the fit.
+    assert np.linalg.norm(found.T_rg[:3, 3] - case.strip.T_rg[:3, 3]) < 10e-3
 
 
 def test_gravity_without_direction_is_refused():

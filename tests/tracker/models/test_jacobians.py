@@ -1,4 +1,4 @@
-"""Every model's derivatives are those of its vertices, at rest, bent, and where a form divides by nearly nothing."""
+"""Jacobians of all models match finite differences of the vertices: at rest, bent, and near singular expressions."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ bends = st.lists(st.integers(-1500, 1500), min_size=1, max_size=8).map(lambda mi
 @pytest.mark.parametrize("name", MODELS)
 @given(seed=seeds, size=st.sampled_from([0.0, 1e-6, 0.01, 0.02]))
 def test_derivatives_are_those_of_deform(name, seed, size):
-    """To the rounding of 32-bit vertices over a step of a millimetre, per metre of the surface's motion."""
+    """Tolerance: rounding of float32 vertices over a step of 1 mm, per metre of the surface's motion."""
     model = MODELS[name]
     theta = model.rest + size * model.scales * np.random.default_rng(seed).uniform(-1, 1, len(model.rest))
     found = model.jacobian(theta)
@@ -58,7 +58,7 @@ def test_derivatives_are_those_of_deform(name, seed, size):
 @pytest.mark.parametrize(("shape", "degree"), [((4, 4), 2), ((5, 4), 3), ((7, 3), 1), ((6, 6), 4)])
 @given(seed=seeds, weighted=st.booleans(), squeezed=st.sampled_from([1.0, 0.01]))
 def test_nurbs_in_double_precision(shape, degree, seed, weighted, squeezed):
-    """Also on a surface that is squeezed in one direction until its normals are nearly undefined."""
+    """Includes a surface compressed in one direction until its normals are nearly undefined."""
     generator = np.random.default_rng(seed)
     x, y = np.meshgrid(np.linspace(-0.2, 0.2, shape[0]), np.linspace(-0.15, 0.15, shape[1]), indexing="ij")
     rest = np.stack([x, y, wave(x, y)], axis=-1)
@@ -82,9 +82,9 @@ def test_nurbs_in_double_precision(shape, degree, seed, weighted, squeezed):
 
 @given(seed=seeds, size=st.sampled_from([1e-6, 0.1]))
 def test_flexpad_in_double_precision(seed, size):
-    """Of what is beyond its range there is no derivative."""
+    """The derivative with respect to a clamped parameter is zero."""
     generator = np.random.default_rng(seed)
-    # Bends up to 2.45 and g up to 0.6, but none so near the end of its range that a difference would cross it.
+    # Bends up to 2.45 and g up to 0.6, but none so close to the limit that a finite difference crosses it.
     theta = size * (generator.integers(-25, 25, 15) + 0.5) / np.repeat([1, 4], [8, 7])
     theta[generator.integers(8)] = 0.0
     direction = FLEXPAD.scales * generator.standard_normal(15)

@@ -1,4 +1,4 @@
-"""The NURBS model is eqs. 2–8: it leaves the mesh at rest as it is and follows its control points."""
+"""The NURBS model is eqs. 2–8: it reproduces the mesh at rest and follows its control points."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def vertices_of(model: Nurbs, theta: np.ndarray) -> np.ndarray:
 
 
 def order_of(mesh: Mesh) -> np.ndarray:
-    """For every vertex of `MESH` the place of the vertex of `mesh` with the same colour."""
+    """For every vertex of `MESH` the index of the vertex of `mesh` with the same colour."""
     return np.array([np.flatnonzero((mesh.colors == color).all(axis=1))[0] for color in MESH.colors])
 
 
@@ -35,7 +35,7 @@ def order_of(mesh: Mesh) -> np.ndarray:
 def test_at_rest_the_mesh_is_as_it_was(case):
     model = MODELS[case]
     np.testing.assert_allclose(vertices_of(model, model.rest), model.mesh.vertices, atol=1e-6)
-    creased = case[1] == 1  # beside a crease there is space that no normal reaches; a vertex there is moved
+    creased = case[1] == 1  # beside a crease no surface normal reaches some points; a vertex there is moved
     np.testing.assert_allclose(model.mesh.vertices[order_of(model.mesh)], MESH.vertices, atol=2e-4 if creased else 1e-6)
 
 
@@ -52,7 +52,7 @@ def random_weights(generator: np.random.Generator, shape: tuple[int, int] = (5, 
 
 
 def bound(control, weights, degree, count, generator):
-    """Parameters, offsets and the vertices that they belong to."""
+    """Surface parameters, offsets and the corresponding vertices."""
     u, w = generator.uniform(0.05, 0.95, (2, count))
     offset = generator.uniform(-5e-3, 5e-3, count)
     vertices = np.array([reference.deform(*at, control, weights, degree) for at in zip(u, w, offset)])
@@ -67,7 +67,7 @@ def bent_control(rows=5, columns=4):
 @pytest.mark.parametrize("degree", [2, 3])
 @pytest.mark.parametrize("weighted", [False, True])
 def test_binding_finds_the_closest_point_and_the_offset(degree, weighted):
-    """Eqs. 6 and 7, from a start that is some way off."""
+    """Eqs. 6 and 7, from an inaccurate initial guess."""
     generator = np.random.default_rng(7)
     weights = random_weights(generator) if weighted else np.ones((5, 4))
     u, w, offset, vertices = bound(bent_control(), weights, degree, 40, generator)
@@ -134,7 +134,7 @@ def test_normals_are_of_unit_length_and_face_the_camera(case):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_normals_are_on_the_side_of_the_mesh_s(mirrored):
-    """However the chart lies on the mesh; a chart that is mirrored does not turn the surface inside out."""
+    """For any orientation of the chart; a mirrored chart does not flip the normals of the surface."""
     mesh = sheet()
     chart = mesh.chart * (-1, 1) if mirrored else mesh.chart
     model = Settings().of_mesh(Mesh(mesh.vertices, mesh.faces, mesh.colors, chart))
@@ -147,7 +147,7 @@ def test_parameters_are_lengths_of_which_there_are_three_per_control_point():
     assert model.rest.shape == model.scales.shape == (60,)
     assert np.all(model.scales == 1)
     control = model.rest.reshape(5, 4, 3)
-    # The surface reaches beyond the mesh by the margin, and rows of control points follow the long side.
+    # The surface extends beyond the mesh by the margin, and rows of control points follow the long side.
     assert control[0, 0, 0] < -0.15
     assert control[-1, 0, 0] > 0.15
     assert np.ptp(control[..., 0], axis=0).min() > 0.3
@@ -161,14 +161,14 @@ def test_too_few_control_points_for_the_degree_are_named(shape, degree):
 
 
 def test_a_mesh_that_the_surface_cannot_follow_is_refused():
-    """A step of 10 cm is no smooth surface of 3 × 3 control points; its normals there leave the vertices behind."""
+    """A step of 10 cm is not a smooth surface of 3 × 3 control points; its normals miss the vertices there."""
     mesh = sheet(height=lambda x, y: flat(x, y) + 0.3 * (np.sin(60 * x) > 0))
     with pytest.raises(ModelError, match="away from the normal of its closest surface point"):
         Settings(control_points=(3, 3)).of_mesh(mesh)
 
 
 def test_the_surface_comes_closer_to_a_heavier_control_point():
-    """And the mesh at rest stays where it is, whatever the weights: the control points are fitted with them."""
+    """The mesh at rest is reproduced for any weights, because the fit of the control points includes them."""
     gaps = []
     for weight in (0.5, 1.0, 4.0):
         rows = tuple(tuple(weight if (i, j) == (1, 2) else 1.0 for j in range(4)) for i in range(4))

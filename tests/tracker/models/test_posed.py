@@ -1,4 +1,4 @@
-"""A posed model is its shape, moved; what of the motion is pose and what is shape is decided once and for all."""
+"""A posed model is its shape with a rigid motion; the prior fixes the gauge freedom between pose and shape."""
 
 from dataclasses import dataclass, field
 from importlib import resources
@@ -73,7 +73,7 @@ def test_at_rest_it_is_the_shape_at_rest():
 
 @dataclass
 class Waves:
-    """A shape that cannot move rigidly: two waves along x, of which something is known."""
+    """A shape without rigid motions: two waves along x, with a prior."""
 
     mesh: Mesh = field(default_factory=lambda: MESH)
     rest: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -109,7 +109,7 @@ class Waves:
     ids=["nurbs", "rigid", "flexpad", "posed", "waves"],
 )
 def test_a_shape_that_can_move_rigidly_is_kept_from_it(shape, known, rigid):
-    """One row of the prior for each rigid motion that pose and shape have in common, none for others."""
+    """One row of the prior per rigid motion that the shape contains, none for others."""
     model = Posed(shape)
     assert model.prior.shape == (known + rigid, 6 + len(shape.rest))
     np.testing.assert_array_equal(model.prior[:, :6], 0)
@@ -127,7 +127,7 @@ def test_a_rigid_motion_of_the_shape_costs_what_it_moves_the_vertices():
 
 
 def test_what_only_deforms_the_shape_costs_nothing():
-    """A bend whose vertices on the whole neither shift nor turn."""
+    """A bend with zero mean translation and rotation of the vertices."""
     jacobian = SHAPE.jacobian(SHAPE.rest).reshape(-1, 48)
     x = SHAPE.mesh.vertices[:, 0]
     target = np.column_stack([np.zeros_like(x), np.zeros_like(x), x**2 - np.mean(x**2)]).ravel()
@@ -146,7 +146,7 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
     metric = search_metric(gauss_newton([Linearization(np.zeros(len(rows)), rows)], 54))
     np.testing.assert_allclose(metric.T @ rows.T @ rows @ metric, np.eye(54), atol=1e-6)
     deviation = np.sqrt(np.diag(metric @ metric.T))
-    assert np.all(deviation[3:5] > 5e-3)  # along the sheet, nothing but the motion prior tells where it is
+    assert np.all(deviation[3:5] > 5e-3)  # in the plane of the sheet, only the motion prior constrains the position
     assert deviation[5] < 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Base splines and rational bases are those of eqs. 3–5."""
+"""B-spline and rational basis functions are those of eqs. 3–5."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_their_derivatives_are_cox_de_boor_s(size, u):
     degree, n = size
     eta = spline.clamped_knots(n, degree)
     expected = [reference.base_spline_slope(i, degree, u, eta) for i in range(n)]
-    if u < 1:  # there, the recursion for degree 1 is that of the span on the right
+    if u < 1:  # at knots, the recursion for degree 1 uses the span on the right
         np.testing.assert_allclose(spline.base_splines(np.array([u]), n, degree, 1)[0], expected, atol=1e-8)
 
 
@@ -64,7 +64,7 @@ def test_its_derivatives_are_those_of_its_values(degree):
 
 @pytest.mark.parametrize(("degree", "n"), EVERY_SIZE)
 def test_the_support_holds_every_control_point_that_moves_a_vertex(degree, n):
-    """On knots too, where rounding decides to which of two spans a vertex belongs."""
+    """Includes knots, where rounding determines which of two spans contains a vertex."""
     u = np.unique(np.r_[np.linspace(0, 1, 61), np.linspace(0, 1, n - degree + 1), np.arange(11) / 10])
     w = u[::-1].copy()
     span, control = spline.support(u, w, (n, n), degree)

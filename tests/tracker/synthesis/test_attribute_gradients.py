@@ -1,4 +1,4 @@
-"""A texture is compared at the centres of pixels: exactly where it is linear, wherever the surface has gone."""
+"""Attributes are evaluated at pixel centres: exact for a linear texture, for any pose of the surface."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from tests import reference
 from tests.tracker.scenes import CAMERA, FISHEYE, as_surface, flat, sheet
 
 STEP_M = 1e-3
-#: Of two channels along the flat sheet [1/m].
+#: Gradients of two channels along the flat sheet [1/m].
 LINEAR = np.array([[300.0, -100.0, 0.0], [50.0, 400.0, 0.0]])
 
 
@@ -54,7 +54,7 @@ def test_the_surroundings_lie_in_the_tangential_planes_and_have_the_vertices_nor
     st.lists(st.floats(-0.05, 0.05), min_size=3, max_size=3),
 )
 def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, shift):
-    """The reference shoots the ray of each pixel's centre at the plane and asks the texture what is there."""
+    """The reference intersects the ray through each pixel's centre with the plane and evaluates the texture there."""
     mesh = sheet(height=flat)
     around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
     motion = around @ pose.from_rotation_vector(turn, shift) @ np.linalg.inv(around)
@@ -70,7 +70,7 @@ def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, 
     level = canvas_values(mesh)[: len(mesh.vertices)][visible]
     error = np.abs(seen.attributes[0][visible] - expected)
     assert visible.any()
-    # What remains: perspective and lens are not linear over an edge of 25 mm. A pixel changes the texture by 2.7.
+    # Remaining error: perspective and lens are not linear over an edge of 25 mm. A pixel changes the texture by 2.7.
     assert error.max() < 0.15
     assert error.mean() < 0.15 * np.abs(level - expected).mean()
 

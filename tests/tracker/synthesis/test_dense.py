@@ -1,4 +1,4 @@
-"""Dense synthesis: the samples are the pixels that the mesh covers, and lie on it."""
+"""Dense synthesis: the samples are the pixels that the mesh covers, and lie on the mesh."""
 
 import dataclasses
 
@@ -27,7 +27,7 @@ seeds = st.integers(0, 2**32 - 1)
 def nearest_face(
     place: np.ndarray, inverse_z: np.ndarray, faces: np.ndarray, x: int, y: int
 ) -> tuple[int, float, np.ndarray, float]:
-    """Face at a pixel, its 1/z and the weights of its corners there, and how near the pixel is to any edge."""
+    """Face at a pixel, its 1/z and barycentric weights there, and the distance of the pixel from the nearest edge."""
     best, nearness, weights, margin = -1, 0.0, np.zeros(3), np.inf
     for f, face in enumerate(faces):
         if np.isnan(inverse_z[face]).any():
@@ -60,12 +60,12 @@ def test_the_z_buffer_is_what_its_definition_says(seed, step):
         for x in range(0, 16, step):
             face, near, weights, margin = nearest_face(place.astype(float), inverse_z, faces, x, y)
             if margin < 1e-3:
-                continue  # single precision may decide otherwise
+                continue  # single precision may differ here
             assert ((y + 1, x + 1) in found) == (face >= 0)
             if face >= 0:
                 i = found[y + 1, x + 1]
                 assert samples.distance[0, i] == pytest.approx(ray_length[y, x] / near, rel=1e-4)
-                if samples.face[0, i] == face:  # where faces cross each other, either one is right
+                if samples.face[0, i] == face:  # where faces intersect, either is correct
                     np.testing.assert_allclose(samples.weights[0, i], weights, atol=2e-3)
 
 
@@ -89,7 +89,7 @@ def test_the_projection_is_eq_10(seed):
 
 
 def reference_inside(vertices: np.ndarray) -> np.ndarray:
-    """Whether points are before the camera and project into its image from within its field of view."""
+    """True for points in front of the camera, within its field of view and image."""
     local = pose.transform(CAMERA.T_sr, vertices)
     pixel = CAMERA.project(vertices)
     with np.errstate(invalid="ignore"):
@@ -98,7 +98,7 @@ def reference_inside(vertices: np.ndarray) -> np.ndarray:
 
 
 def facing(face: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """The corners of a face in the order in which it shows its front: clockwise where y points down."""
+    """The corners of a face in front-face order: clockwise where y points down."""
     (ax, ay), (bx, by), (cx, cy) = place[face].astype(float)
     return face if (bx - ax) * (cy - ay) < (by - ay) * (cx - ax) else face[::-1]
 
@@ -107,12 +107,12 @@ LATTICE = lattice(MESH, 4)
 
 
 def view(camera: Camera, step: int = 1) -> DenseView:
-    """The sheet with a colour that tells where on it a point is, in cm."""
+    """The sheet with the coordinates of its points as colours, in cm."""
     return DenseView(camera, MESH.faces, (LATTICE.vertices * 100).astype(np.float32), step, 4)
 
 
 def moved(*thetas: list[float]) -> Surface:
-    """The sheet, turned and shifted."""
+    """The sheet, rotated and translated."""
     return Rigid(MESH).deform(np.array(thetas))
 
 
@@ -183,7 +183,7 @@ def test_interpolation_is_the_weighted_sum_of_the_corners():
 
 
 def test_both_syntheses_see_the_same_surface():
-    """What a vertex measures is what the pixel shows that it falls into, up to the slope of the surface in a pixel."""
+    """Sparse and dense distances agree in the same pixel, up to the slope of the surface within a pixel."""
     surface = moved([0.1, -0.2, 0.1, 0.01, 0, 0.02])
     attributes = np.zeros((len(MESH.vertices), 0), np.float32)
     sparse = SparseView(CAMERA, MESH.faces, attributes).synthesize(surface)
@@ -195,7 +195,7 @@ def test_both_syntheses_see_the_same_surface():
 
 
 def test_the_appearance_is_that_of_the_material_point():
-    """The colours tell where a point is on the sheet at rest, wherever the sheet has gone."""
+    """The colours are the coordinates of a point on the sheet at rest, for any pose of the sheet."""
     theta = [0.2, -0.3, 0.1, 0.01, 0, 0.02]
     dense, surface = view(CAMERA), moved(theta)
     colors = dense.synthesize(surface).attributes[0] / 100
@@ -206,7 +206,7 @@ def test_the_appearance_is_that_of_the_material_point():
 @settings(max_examples=25)
 @given(seeds, st.integers(1, 6))
 def test_the_lattice_is_linear_between_its_points(seed, detail):
-    """Random colours: the one of a sample is the linear interpolation in the small face that it lies in."""
+    """Random colours: a sample's colour is the linear interpolation within its sub-triangle."""
     generator = np.random.default_rng(seed)
     fine = lattice(MESH, detail)
     values = generator.normal(size=(len(fine.vertices), 2)).astype(np.float32)
@@ -222,7 +222,7 @@ def test_the_lattice_is_linear_between_its_points(seed, detail):
         small = fine.faces[(fine.faces >= mine.start).all(axis=1) & (fine.faces < mine.stop).all(axis=1)]
         assert len(small) == detail**2
         shares = np.array([np.linalg.lstsq(np.vstack([fine.vertices[f].T, np.ones(3)]), [*point, 1])[0] for f in small])
-        best = shares.min(axis=1).argmax()  # the small face that the point lies in
+        best = shares.min(axis=1).argmax()  # the sub-triangle that contains the point
         np.testing.assert_allclose(painted[0, s], shares[best] @ values[small[best]], atol=2e-3)
 
 
@@ -235,7 +235,7 @@ def test_the_lattice_lies_on_the_mesh_and_faces_the_same_way():
 
 
 def test_neither_covering_more_nor_less_is_worth_anything():
-    """Agreeing everywhere costs the same near and far; what leaves the image costs what is unseen."""
+    """A perfect fit has the same cost at any distance; a part outside the image has the cost of unseen samples."""
     dense = view(CAMERA)
     near, far = moved([0, 0, 0, 0, 0, -0.1]), moved([0, 0, 0, 0, 0, 0.1])
     dense.look(moved([0] * 6))

@@ -1,4 +1,4 @@
-"""The compiled projection is the camera's, and the regression on edges that of its definition."""
+"""The compiled projection equals that of the camera, and the regression over edges equals its definition."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Every synthesis serves every sensor: gradients are those of the cost, and the sheet is tracked through a lens."""
+"""Every synthesis with every kind of sensor: gradients match the cost, and a sheet is tracked through a lens."""
 
 import dataclasses
 
@@ -46,7 +46,7 @@ BOUNDS = Bounds(0.0, 5.0, 20.0)
 
 
 def built(kind, mesh: Mesh = MESH) -> Synthesizer:
-    """The synthesis of a sheet for two distorted sensors, after an observation of a wall where the sheet is."""
+    """The synthesis of a sheet for two distorted sensors, after an observation of a wall at the sheet's pose."""
     sensors = [Sensor("tof", TOF, GaussianPolynomial(((SIGMA,),))), Sensor("color", COLOR, GaussianColor(LEVELS))]
     synthesizer = kind.build(Rig("r", {sensor.name: sensor for sensor in sensors}), mesh)
     synthesizer.observe(observation(tof=depth_image(plane_distance(TOF, WALL, 1.0))))
@@ -54,7 +54,7 @@ def built(kind, mesh: Mesh = MESH) -> Synthesizer:
 
 
 def slope(term, model: Rigid, theta: np.ndarray, parameter: int, step: float) -> tuple[float, float]:
-    """Derivative of the cost by a parameter of the pose, numerically and as the linearisation says."""
+    """Derivative of the cost with respect to a pose parameter, by finite differences and by linearisation."""
     offset = step * np.eye(6)[parameter]
     ahead, behind = term.cost(model.deform(np.stack([theta + offset, theta - offset])))
     linear = term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
@@ -73,7 +73,7 @@ def test_the_depth_gradient_is_that_of_the_cost(kind):
 
 
 def gradient_colors(points: np.ndarray) -> np.ndarray:
-    """A colour that changes evenly over the wall, two levels per pixel; points (…, 3)."""
+    """A linear colour gradient over the wall, two levels per pixel; points (…, 3)."""
     x, y = points[..., 0], points[..., 1]
     return np.stack([128 + 400 * x, 128 + 400 * y, 128 - 400 * x], axis=-1).astype(np.float32)
 
@@ -97,7 +97,7 @@ def test_the_colour_gradient_is_that_of_the_cost(kind):
 @ALL
 @pytest.mark.parametrize("order", ["rggb", "bggr", "grbg", "gbrg"])
 def test_a_mosaic_is_compared_channel_by_channel(kind, order):
-    """Of every pixel the channel that it has, whatever the order; in another order the colours do not fit."""
+    """Every pixel is compared in its own channel, for any Bayer order; another order does not fit the colours."""
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
     synthesizer = built(kind, mesh)
     looks = gradient_colors(synthesizer.canvas.vertices) * np.array([1.0, 0.6, 0.3], np.float32)
@@ -120,9 +120,9 @@ def test_a_mosaic_is_compared_channel_by_channel(kind, order):
 @ALL
 @pytest.mark.parametrize("order", BAYER_ORDERS)
 def test_the_gradient_of_a_mosaic_is_that_of_the_cost(kind, order):
-    """Whether the slope is the surface's own, as in sparse synthesis, or measured in the image.
+    """For gradients of the surface, as in sparse synthesis, and for gradients measured in the image.
 
-    All channels change alike, so that it does not matter how many vertices meet which filter.
+    All channels have the same gradient, so the number of vertices per colour filter has no effect.
     """
     mesh = sheet(21, 31, flat, size=(0.2, 0.14))
     synthesizer = built(kind, mesh)
@@ -146,7 +146,7 @@ def test_the_gradient_of_a_mosaic_is_that_of_the_cost(kind, order):
 
 @ALL
 def test_a_lamp_of_its_own_lights_the_samples(kind):
-    """Of a wall of even reflectivity, every sample has the brightness that the law of the lamp says."""
+    """For a wall of uniform reflectivity, every sample has the brightness of the illumination model."""
     reflectivity = 3000.0
     synthesizer = built(kind)
     looks = np.full((len(synthesizer.canvas.vertices), 1), reflectivity, np.float32)
@@ -162,7 +162,7 @@ def test_a_lamp_of_its_own_lights_the_samples(kind):
 
 @ALL
 def test_what_leaves_the_image_neither_gains_nor_gets_lost(kind):
-    """Wherever else it goes, it costs as much as a mesh without any measurement."""
+    """Outside, it has the cost of a mesh without any measurement."""
     term = DepthTerm("tof", built(kind), len(MESH.vertices), GaussianPolynomial(((SIGMA,),)), BOUNDS)
     surface = as_surface((MESH.vertices, MESH.normals))
     term.observe(depth_image(plane_distance(TOF, WALL, 1.0)), surface)
@@ -186,7 +186,7 @@ def test_a_bending_sheet_is_tracked_through_a_lens(kind):
 
 @pytest.mark.slow
 def test_a_sheet_before_a_fisheye_is_tracked_as_well_as_before_a_pinhole(monkeypatch):
-    """Heads that see 55° to the sides, with pixels that see as much of the sheet as those of the usual heads."""
+    """Heads with a half field of view of 55°, at the same footprint per pixel on the sheet as the default heads."""
 
     def vertex_mm(uri: str) -> float:
         simulation = simulate(uri)

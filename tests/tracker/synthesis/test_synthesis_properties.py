@@ -1,4 +1,4 @@
-"""Wherever a sheet is, every synthesis finds it in what its sensors measured, and slopes are those of the cost."""
+"""Every synthesis matches the measurements of a sheet at any pose, and its gradients match the cost."""
 
 import numpy as np
 import pytest
@@ -37,18 +37,18 @@ PICTURE = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, LENS, pose.look_at([0.05, 0
 MESH = sheet(13, 19, flat, size=(0.2, 0.14))
 DEPTH, LEVELS = Constant(0.01), 10.0
 BOUNDS = Bounds(0.0, 5.0, 20.0)
-#: Colours of the material at the sheet's centre and their slopes over it [levels/m], two levels per pixel: alike in all
-#: channels, so that it does not matter to a gradient whose turn it is in a pixel, and with jumps between them.
+#: Colours at the sheet's centre and their gradients over it [levels/m], two levels per pixel: the same in all channels,
+#: so that a pixel's colour filter has no effect on a gradient, with offsets between the channels.
 TINTS, SLOPES = np.array([100.0, 128.0, 160.0]), np.array([450.0, -350.0])
 
 
 def tints(points: np.ndarray) -> np.ndarray:
-    """Red, green and blue of material points (…, 3), where they lie at rest."""
+    """Red, green and blue of material points (…, 3) at rest."""
     return np.clip(TINTS + (points[..., :2] @ SLOPES)[..., None], 0, 255).astype(np.float32)
 
 
 class Scene:
-    """A textured plane that was moved with the sheet from z = 1 m, exactly as two sensors with a lens see it."""
+    """Exact images, in two sensors with a lens, of a textured plane that moved with the sheet from z = 1 m."""
 
     def __init__(self, kind: str, theta: np.ndarray):
         around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
@@ -84,9 +84,9 @@ class Scene:
     st.lists(st.floats(-0.25, 0.25), min_size=3, max_size=3), st.lists(st.floats(-0.02, 0.02), min_size=3, max_size=3)
 )
 def test_a_plane_is_found_where_it_is(kind, turn, shift):
-    """Samples agree with ray-casting of the same plane, up to what lies between pixels; no reference shares its code.
+    """Samples agree with ray casting of the same plane up to the pixel size; the reference shares no code with them.
 
-    A pixel is 3.3 mm wide and four levels of the texture in one channel; half of that is what rounding to it costs.
+    A pixel is 3.3 mm wide and four levels of the texture in one channel; half of that is the rounding error.
     """
     scene = Scene(kind, np.array(turn + shift))
     depth = DepthTerm("tof", scene.synthesizer, len(MESH.vertices), DEPTH, BOUNDS)
@@ -94,9 +94,7 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
     residual, _, cost = depth._residuals(depth._view.synthesize(scene.surface))
     measured = np.isfinite(cost)
     assert np.count_nonzero(measured) > 0.9 * np.sum(depth._view.synthesize(scene.surface).pixel > 0) > 100
-    steepest = (
-        1.7e-3 * np.sqrt(2) * np.tan(0.25 * np.sqrt(3) + 0.27)
-    )  # half a diagonal pixel on a plane seen from aside
+    steepest = 1.7e-3 * np.sqrt(2) * np.tan(0.25 * np.sqrt(3) + 0.27)  # half a pixel diagonal on an inclined plane
     assert np.abs(residual[measured]).max() * DEPTH.sigma < 1.5 * steepest + 1e-5
     color = ColorTerm("color", scene.synthesizer, scene.looks(), GaussianColor(LEVELS), BOUNDS)
     color.observe(ColorImage(np.rint(scene.colors).astype(np.uint8)), scene.surface)
@@ -109,7 +107,7 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
 
 
 def slopes(term: ChannelTerm, parameter: int) -> tuple[float, float]:
-    """Derivative of the cost by a shift, 1 cm from the truth: numerically, and as the linearisation says."""
+    """Derivative of the cost with respect to a shift, 1 cm from the truth: by finite differences and linearisation."""
     model, step = Rigid(MESH), 0.01
     theta = 0.01 * np.eye(6)[parameter]
     offset = step * np.eye(6)[parameter]
@@ -133,9 +131,9 @@ def test_the_gradient_of_one_number_per_pixel_is_that_of_the_cost(kind, name):
 
 @ALL
 def test_a_sheet_is_not_shifted(kind):
-    """Rounding to pixels averages out: a share of a pixel, the same for all vertices, would shift what is tracked.
+    """Rounding to pixels has zero mean: a fraction of a pixel common to all vertices would bias the estimate.
 
-    On average over where the sheet lies, less than a seventh of a pixel remains; a pixel is 1.5 and 1.2 levels.
+    On average over poses of the sheet, less than a seventh of a pixel remains; a pixel is 1.5 and 1.2 levels.
     """
     generator, means = np.random.default_rng(1), []
     for _ in range(10):

@@ -1,4 +1,4 @@
-"""Images without distortion, and images as another camera would have them: right against geometry in closed form."""
+"""Undistorted images, and images warped into another camera, compared with closed-form geometry."""
 
 import dataclasses
 
@@ -24,7 +24,7 @@ lenses = st.tuples(*(st.floats(-limit, limit) for limit in (0.15, 0.05, 2e-3, 2e
 
 
 def indices(camera: Camera, table: np.ndarray) -> np.ndarray:
-    """Pixel (…, 2) = (column, row) that indices into a bordered image mean."""
+    """Pixels (…, 2) = (column, row) of indices into a bordered image."""
     return np.stack([table % (camera.width + 2) - 1, table // (camera.width + 2) - 1], axis=-1)
 
 
@@ -40,7 +40,7 @@ def test_every_pixel_without_distortion_shows_the_nearest_line_of_sight(coeffici
     points = pose.transform(pinhole.T_rs, pinhole.directions(np.stack([column - 1, row - 1], axis=-1)))
     error = camera.project(points) - indices(camera, table[row, column])
     assert np.abs(error).max() < 0.5 + 1e-6
-    # Nothing of the field of view is left out: all corners of the image have their place.
+    # The field of view is complete: all corners of the image are mapped.
     corners = camera.directions(np.array([[0, 0], [camera.width - 1, camera.height - 1]]))
     place = pinhole.project(pose.transform(pinhole.T_rs, corners))
     assert np.all(place > -0.5)
@@ -73,7 +73,7 @@ def test_undistorted_measurements_are_those_of_the_nearest_pixels():
     known = there[..., 3] > 0
     expected = np.pad(plane_distance(camera, NORMAL, 1.0), 1)
     assert np.count_nonzero(known) > 0.9 * 96 * 72
-    # The nearest pixel is at most half a pixel of the original away, which the lens makes wider towards the rim.
+    # The nearest pixel is at most half a pixel of the original away; the lens enlarges it towards the rim.
     steps = [np.abs(np.diff(expected[1:-1, 1:-1], axis=axis)).max() / 2 for axis in (0, 1)]
     assert np.abs(there[known, 0] - expected[known]).max() < 1.5 * sum(steps)
     colors = np.moveaxis(np.indices((72, 96, 1))[:, :, :, 0], 0, -1).astype(np.float32)
@@ -88,7 +88,7 @@ def warped_rig() -> Rig:
 
 
 def position_colors(camera: Camera, distance: np.ndarray) -> np.ndarray:
-    """An image whose colours tell where the shown point is, in cm."""
+    """An image with the coordinates of the visible points as colours, in cm."""
     return (camera.unproject(distance) * 100).astype(np.float32)
 
 
@@ -109,7 +109,7 @@ def test_colours_of_what_is_hidden_from_the_other_camera_are_unknown():
     color, synthesis = rig.sensors["color"].camera, warped.Settings().build(rig, sheet())
 
     def with_board(camera: Camera) -> np.ndarray:
-        """A wall at 1.3 m, and before it a board at 0.8 m that is 8 cm wide."""
+        """A wall at 1.3 m, and in front of it a board at 0.8 m that is 8 cm wide."""
         wall, board = (plane_distance(camera, np.array([0, 0, 1.0]), z) for z in (1.3, 0.8))
         on_board = np.all(np.abs(camera.unproject(board)[..., :2]) < 0.04, axis=-1)
         return np.where(on_board, board, wall)
@@ -119,7 +119,7 @@ def test_colours_of_what_is_hidden_from_the_other_camera_are_unknown():
     camera = synthesis.view("color", np.zeros((117, 3), np.float32)).camera
     expected = position_colors(camera, with_board(camera))
     known = np.isfinite(image[..., 0])
-    # A wall's colour on the board, or the other way round, would err by half a metre of depth: 50.
+    # A wall's colour on the board, or the other way round, would be an error of half a metre of depth: 50.
     error = np.abs(image - expected)[known, 2]
     assert np.mean(error > 25) < 0.01
     assert 0.02 < np.mean(~known) < 0.4

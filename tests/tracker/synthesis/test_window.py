@@ -1,4 +1,4 @@
-"""Only a window around the prediction is prepared for a frame: within reach no cost changes, beyond it nothing fits."""
+"""Only a window around the prediction is prepared: costs within reach are unchanged, all beyond are outliers."""
 
 import numpy as np
 import pytest
@@ -41,7 +41,7 @@ def moved(*by: float) -> Surface:
 
 
 def scene(x: float = 0.0) -> np.ndarray:
-    """Distances of the sheet before a wall, with a finger before it and a hole in it."""
+    """Distances of a sheet with a hole in front of a wall, with a finger in front of the sheet."""
     mesh = (MESH.vertices + np.array([x, 0, 0])).T.astype(np.float32)
     distance = Raster(WIDE, MESH.faces).render(mesh)
     wall = plane_distance(WIDE, np.array([0, 0, 1.0]), 1.6)
@@ -78,7 +78,7 @@ def test_without_bounds_or_partly_out_of_sight_the_window_is_the_whole_image():
 @pytest.mark.parametrize("outline", [False, True])
 def test_within_reach_depth_costs_the_same_as_in_the_whole_image(outline):
     whole, window = depth_term(outline), depth_term(outline)
-    for x in (0.0, 0.02, -0.03):  # the memory that is kept between frames must not show
+    for x in (0.0, 0.02, -0.03):  # memory reused between frames must have no effect
         predicted = moved(x + 0.004, 0.002, 0)
         whole.observe(depth_image(scene(x)), predicted)
         window.observe(depth_image(scene(x)), predicted, REACH_M)
@@ -91,7 +91,7 @@ def test_within_reach_depth_costs_the_same_as_in_the_whole_image(outline):
 
 def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
     terms = [ColorTerm("color", sparse(WIDE, MESH), MESH.colors, GaussianColor(), BOUNDS) for _ in range(2)]
-    occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])  # one on the sheet, one beside the window
+    occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])  # one on the sheet, one outside the window
     for seed, x in enumerate((0.0, 0.03)):
         picture = ColorImage(np.random.default_rng(seed).integers(0, 255, (120, 200, 3)).astype(np.uint8))
         for term, reach in zip(terms, (np.inf, REACH_M)):
@@ -106,7 +106,7 @@ def test_within_reach_colours_cost_the_same_as_in_the_whole_image():
 
 @pytest.mark.parametrize("order", ["rggb", "gbrg"])
 def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
-    """The window may begin at any pixel of the pattern."""
+    """The window may start at any pixel of the Bayer pattern."""
     noise, pattern = GaussianBayer(60.0), BAYER_ORDERS[order]
     whole, window = (ChannelTerm("color", sparse(WIDE, MESH), MESH.colors, noise, Passive(), BOUNDS) for _ in range(2))
     occluder = np.array([[0.0, 0.0, 0.9], [1.0, 0.0, 0.9]])
@@ -129,7 +129,7 @@ def test_within_reach_a_mosaic_costs_the_same_as_in_the_whole_image(order):
 
 
 def test_beyond_the_window_nothing_is_explained():
-    """Else a search could flee from a bad fit to where nobody has looked."""
+    """Otherwise a search could escape from a bad fit into unprepared pixels."""
     depth = depth_term()
     depth.observe(depth_image(scene(0.2)), moved(-0.15, 0, 0), 0.01)
     assert depth.cost(moved(0.25, 0, 0))[0] == pytest.approx(len(MESH.vertices) * BOUNDS.outlier, rel=1e-5)
@@ -183,7 +183,7 @@ def test_values_of_a_window_are_placed_in_the_image():
 def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():
     prior = MotionPrior(np.zeros(3), np.ones(3), Settings(speed=0.3))
     prior.predict(0)
-    assert np.isinf(prior.reach_m)  # nothing is known of the first frame
+    assert np.isinf(prior.reach_m)  # no motion is known in the first frame
     prior.update(np.zeros(3))
     prior.predict(100_000_000)
     assert prior.reach_m == pytest.approx(4 * 0.3 * 0.1)
