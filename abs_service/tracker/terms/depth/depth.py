@@ -1,4 +1,4 @@
-"""A depth sensor's measurements against synthesised distances."""
+"""Term of a depth sensor: measured compared with synthesised distances."""
 
 from collections.abc import Callable
 
@@ -52,7 +52,7 @@ class DepthTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
-        # Unbounded and without a measurement, so that the search gains nothing where nobody has looked.
+        # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
         beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
         self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
         self._texture = np.zeros((0, 8), np.float32)
@@ -63,7 +63,7 @@ class DepthTerm:
         self._distance, self._foreground = np.zeros((0, 0), np.float32), np.zeros((0, 0), np.bool_)
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Renders the noise model over a depth image; what is hidden is left out of this frame."""
+        """Renders the noise model over a depth image; occluded pixels are masked in this frame."""
         if not isinstance(image, DepthImage):
             raise TypeError(f"sensor {self.sensor} has a depth noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
@@ -89,7 +89,7 @@ class DepthTerm:
         return texture
 
     def foreground(self) -> NDArray[np.float64]:
-        """Points (k, 3) [m] of what stands before the object."""
+        """Points (k, 3) [m] of occluders."""
         rows, columns = np.nonzero(self._foreground)
         if not len(rows):
             return np.zeros((0, 3))
@@ -98,14 +98,14 @@ class DepthTerm:
         return pose.transform(camera.T_rs, sight * self._distance[rows, columns, None])
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Nothing more: a depth sensor sees for itself what stands before the object."""
+        """Does nothing: a depth sensor detects occluders in its own image."""
 
     def _silence(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
-        """Puts constants into the texture (height + 2, width + 2, 8) where a pixel says nothing about distances.
+        """Writes constant costs into the texture (height + 2, width + 2, 8) at pixels without a usable distance.
 
-        Behind an occluder, where returns are missing, and right beside an outline that has a term of its own, a vertex
-        costs what one that agrees costs on average, so that it has no reason to move there or away. In free space it
-        costs an outlier, and more the farther it is from the object.
+        Behind an occluder, in a hole, and next to an outline with a term of its own, a vertex costs the mean of an
+        inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
+        the distance from the object.
         """
         silent = seen.foreground | seen.hole | doubtful
         agreeing = usual_cost(within(texture, self._window), seen.object) if silent.any() else 0.0
@@ -113,17 +113,17 @@ class DepthTerm:
         write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
-        """−Σ_v log φ (population,) with what the outline says."""
+        """−Σ_v log φ (population,) plus the cost of the outline."""
         return self._measured_cost(surface, self._view.synthesize(surface)) + self._outline.cost(surface)
 
     def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
-        """Of the measurements; the outlier share is mixed in by the larger of the two densities."""
+        """Cost (population,) of the distances; the density is the larger of inlier and outlier density."""
         out = np.empty(len(seen.pixel))
         depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:
-        """Normalised residuals of all but outliers and of what is in free space, and how they change with Θ."""
+        """Normalised residuals of inliers and of samples in free space, and their derivatives with respect to Θ."""
         samples, seen = self._view.follow(surface, sparse_jacobian), self._view.synthesize(surface)
         parts = (self._linearize_measured(surface, samples, seen), self._linearize_free(surface, samples, seen))
         return Together((*parts, self._outline.linearize(surface, sparse_jacobian)), sparse_jacobian.dimension)
@@ -138,7 +138,7 @@ class DepthTerm:
         return PointLinearization(residual[use], rows, use, samples)
 
     def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
-        """Without it, nothing tells the search of a thin sheet that has begun to slide along itself where to go back.
+        """Residuals of samples in free space, which stop a thin sheet from sliding along itself.
 
         The cost d / s of a sample that is d from the object is replaced by a square of the same slope, ½ d² / (s d₀).
         """
@@ -154,7 +154,7 @@ class DepthTerm:
         return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples)
 
     def fit(self, surface: Surface) -> SensorFit:
-        """How the sensor agrees with a population of one."""
+        """Agreement of the sensor with a population of one."""
         seen = self._view.synthesize(surface)
         residual, _, cost = self._residuals(seen)
         measured, pixel = cost < np.inf, seen.pixel[0]

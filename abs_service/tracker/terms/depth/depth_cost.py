@@ -1,4 +1,4 @@
-"""What samples cost whose distance was measured; textures are as `calib.noise.base.write_texture` makes them."""
+"""Kernels of the cost of measured distances; textures as written by `calib.noise.base.write_texture`."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ _TILE = 32
 
 @kernel
 def usual_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
-    """What a measurement of the object that agrees costs on average; 0 where a mask (rows, columns) shows none."""
+    """Mean cost of an inlier on the object, given its mask (rows, columns); 0 for an empty mask."""
     normalizer, count = np.empty(shown.size, np.float32), 0
     for row in range(shown.shape[0]):
         for column in range(shown.shape[1]):
@@ -27,7 +27,7 @@ def usual_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
 
 @kernel
 def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
-    """What every pixel (rows, columns) measured, without the mean offset [m]; not a number without a return."""
+    """Measured distance of every pixel (rows, columns), corrected for the mean offset [m]; NaN without return."""
     for row in range(found.shape[0]):
         for column in range(found.shape[1]):
             texel = texels[row, column]
@@ -44,7 +44,7 @@ def write_constants(
     left: int,
     texture: NDArray[np.float32],
 ) -> None:
-    """Texels that cost `agreeing` where a pixel is silent, and outlier + d / s where it is d > 0 into free space."""
+    """Writes texels of cost `agreeing` at silent pixels, and outlier + d / s at distance d > 0 into free space."""
     per_metre = np.float32(1 / FREE_SCALE_M)
     for row in range(silent.shape[0]):
         for column in range(silent.shape[1]):
@@ -64,9 +64,9 @@ def normalize(
     inverse: NDArray[np.float64],
     cost: NDArray[np.float64],
 ) -> None:
-    """Residuals of samples (n,) in their deviations, these deviations' inverses, and what they cost without any bound.
+    """Normalised residuals, inverse deviations and unbounded costs of samples, each (n,).
 
-    Where nothing was measured, the cost is infinite.
+    The cost is infinite without a measurement.
     """
     for v in range(pixel.size):
         texel = texture[max(pixel[v], 0)]
@@ -87,7 +87,7 @@ def depth_cost(
     outlier: float,
     out: NDArray[np.float64],
 ) -> None:
-    """What `_cost_of` says of every member of a population, (population, n)."""
+    """`_cost_of` for every candidate of a population, (population, n)."""
     for k in prange(pixel.shape[0]):
         out[k] = _cost_of(pixel[k], distance[k], texture, inlier, outlier)
 

@@ -1,7 +1,7 @@
-"""Where a sheet ends: the rim of its mesh against the outline that a depth sensor sees.
+"""Outline of a sheet: the rim of its mesh compared with the outline in a depth image.
 
-Distances say nothing about how a smooth surface slides along itself. Where it ends does: the rim belongs on the line
-between the pixels that show the object and those that look past it.
+Distances do not constrain a smooth surface that slides along itself; its outline does. The rim belongs on the line
+between the pixels on the object and those beside it.
 """
 
 from typing import Protocol
@@ -32,18 +32,21 @@ Optics = tuple[bool, NDArray[np.float32], NDArray[np.float32], NDArray[np.float3
 
 
 class Outline(Protocol):
-    """What the outline says, for one camera."""
+    """Cost of the outline in one camera."""
 
     def observe(
         self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
     ) -> NDArray[np.bool_]:
-        """Takes what a window of a depth image shows; the pixels beside the object that say nothing else.
+        """Sets the outline from a window of a depth image.
 
         Args:
             distance: measured distances (rows, columns) [m] in the window.
-            seen: what they show.
-            predicted: where the object is expected, a population of one.
+            seen: their classification.
+            predicted: predicted surface, a population of one.
             window: of the image.
+
+        Returns:
+            Mask (rows, columns) of the pixels beside the object that serve for the outline only.
         """
         ...
 
@@ -52,21 +55,21 @@ class Outline(Protocol):
         ...
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
-        """Normalised residuals of a population of one and their derivatives, from how the vertices move."""
+        """Normalised residuals of a population of one and their derivatives with respect to theta."""
         ...
 
 
 class Unknown:
-    """The outline of something that does not end at its mesh's rim: it says nothing."""
+    """Null object for bodies without an outline at the mesh's rim: zero cost."""
 
     def observe(
         self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
     ) -> NDArray[np.bool_]:
-        """Nothing."""
+        """Empty mask."""
         return np.zeros(distance.shape, np.bool_)
 
     def cost(self, surface: Surface) -> float:
-        """Nothing."""
+        """Zero."""
         return 0.0
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
@@ -77,13 +80,13 @@ class Unknown:
 class RimOutline:
     """The rim's distances from the outline are normal with zero mean, and bounded as outliers are.
 
-    A mesh that was made from an image ends up to a cell inside the object. How far the object goes on beyond it is told
-    from the first image: from then on, the rim is where the mesh, continued by as much, ends.
+    A mesh made from an image ends up to one cell inside the object. The gap is measured in the first image; from then
+    on, the rim is that of the mesh extrapolated by this gap.
 
     Args:
         camera: the camera.
         rim: outermost vertices.
-        deviation: standard deviation of where the outline seems to be [px].
+        deviation: standard deviation of the position of the outline [px].
     """
 
     def __init__(self, camera: Camera, rim: Rim, deviation: float):
@@ -99,7 +102,7 @@ class RimOutline:
     def observe(
         self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
     ) -> NDArray[np.bool_]:
-        """Takes what a window of a depth image shows; the pixels beside the object that say nothing else."""
+        """Sets the outline from a window of a depth image; the mask of pixels that serve for the outline only."""
         part, self._inwards = inwards(distance, seen, int(np.ceil(FARTHEST * self._deviation)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
@@ -115,7 +118,7 @@ class RimOutline:
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
-        """Residuals of what is near the outline, and their derivatives."""
+        """Normalised residuals of the rim near the outline, and their derivatives with respect to theta."""
         points, values, slopes = self._locate(surface)
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
@@ -128,19 +131,19 @@ class RimOutline:
 
     @property
     def _arguments(self) -> tuple[*Ends, *Optics, NDArray[np.float32], NDArray[np.float32]]:
-        """What `locate` takes between the vertices and the results."""
+        """Arguments of `locate` between the vertices and the results."""
         ends = self._rim.outer, self._rim.inner, self._beyond
         return *ends, *self._projection.arguments, self._corner, self._inwards
 
     def _locate(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]:
-        """Where the object ends (k, 3) [m], how far inside the outline that is (k,) [px], and slopes (k, 2) of that."""
+        """Extrapolated rim (k, 3) [m], its distances inside the outline (k,) [px], and their image gradients (k, 2)."""
         k = len(self._beyond)
         points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
         locate(surface.vertices, *self._arguments, points, values, slopes)
         return points[0].T, values, slopes
 
     def _measure(self, predicted: Surface) -> NDArray[np.float32]:
-        """How far (k,) the object goes on beyond the rim of the mesh, in distances from the next vertex."""
+        """Gap (k,) between the mesh's rim and the end of the object, relative to the distance from the inner vertex."""
         outer, away, slopes = self._locate(predicted)
         inner = predicted.vertices[0].T[self._rim.inner]
         steps = self._camera.project(outer.astype(np.float64)) - self._camera.project(inner.astype(np.float64))
@@ -160,11 +163,11 @@ def _around(mask: NDArray[np.bool_], reach: int) -> Window:
 def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tuple[Window, NDArray[np.float32]]:
     """Distance of pixels from the object's outline [px], negative outside it; NaN if unknown.
 
-    What hides the object, and where returns are missing inside it, is unknown: the object may go on there.
+    Occluders and holes are unknown: the object may continue there.
 
     Args:
         distance, seen: an image (height, width) [m], and what it shows.
-        reach: farther than so many pixels outside, nobody asks.
+        reach: pixels outside the object up to which distances are needed [px].
 
     Returns:
         The part of the image that is not farther outside, and the distances there (rows, columns).

@@ -1,4 +1,4 @@
-"""The rim of a mesh, and where it is in an image that tells how far every pixel is from an outline."""
+"""Rim of a mesh, and its distance from the outline in a distance image."""
 
 from dataclasses import dataclass
 
@@ -9,8 +9,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
-#: What is farther from the outline than so many deviations says no more about where the rim is: the outline may be that
-#: of something else.
+#: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
 FARTHEST = 4.0
 
 
@@ -74,10 +73,10 @@ def chain(
     local: NDArray[np.float64],
     jacobian: NDArray[np.float64],
 ) -> None:
-    """How residuals change with the parameters (k, dim), from how they do with outer + beyond (outer − inner).
+    """Derivatives with respect to theta (k, dim) from those with respect to outer + beyond (outer − inner).
 
     Args:
-        rows: derivatives (k, 3) by these points.
+        rows: derivatives (k, 3) with respect to these points.
         outer, inner, beyond: vertices and share (k,).
         group, parameters, local: as in `SparseJacobian`.
         jacobian: zeros before.
@@ -108,7 +107,7 @@ def locate(
     values: NDArray[np.float64],
     slopes: NDArray[np.float64],
 ) -> None:
-    """Where one candidate's object ends, and how far inside the outline that is.
+    """Extrapolated rim of one candidate, and its distances inside the outline.
 
     Args:
         vertices: of the candidate (1, 3, n) [m].
@@ -116,8 +115,8 @@ def locate(
         is_fisheye, pose, matrix, lens, limit: as in `projection.project`.
         corner: column and row of the image's first pixel (2,).
         inwards: distances (rows, columns) [px].
-        points: where the object ends (1, 3, k) [m].
-        values, slopes: as `look_up` tells them.
+        points: extrapolated rim (1, 3, k) [m].
+        values, slopes: as in `look_up`.
     """
     k = outer.size
     places, inverse_z = np.empty((1, k, 2), np.float32), np.empty((1, k), np.float32)

@@ -1,9 +1,8 @@
-"""What the pixels of a depth image show where the object is expected: the object, an occluder, nothing, free space.
+"""Classification of the pixels of a depth image near the prediction: object, occluder, hole or free space.
 
-A vertex may miss its measurement for three reasons, which say different things about the deformation. Something stands
-before it, or the sensor got no return where the object should be: then nothing is known. Or the sensor looks past
-the place where the vertex should be: then the vertex is not there, and the nearest part of the object says how far off
-it is.
+A vertex may have no measurement for three reasons. An occluder or a missing return gives no information about the
+deformation. Free space does: the vertex cannot be there, and the distance to the nearest pixel of the object is its
+error.
 """
 
 from dataclasses import dataclass
@@ -82,7 +81,7 @@ def _recognize(
     labels: NDArray[np.int32],
     is_object: NDArray[np.bool_],
 ) -> None:
-    """Which surfaces (count,), of which the first is none, are the object."""
+    """True for each connected surface (count,) that is the object; label 0 is no surface."""
     inside, agreeing = np.zeros(is_object.size, np.int64), np.zeros(is_object.size, np.int64)
     for row in range(distance.shape[0]):
         for column in range(distance.shape[1]):
@@ -106,7 +105,7 @@ def _compare(
     behind: NDArray[np.bool_],
     missing: NDArray[np.bool_],
 ) -> None:
-    """Which pixels show the object, something before it, part of a surface before it, something behind it, nothing."""
+    """Masks of the pixels on the object, before it, on a connected surface before it, behind it, and without return."""
     for row in range(distance.shape[0]):
         for column in range(distance.shape[1]):
             label, beyond = labels[row, column], distance[row, column] - near[row, column]
@@ -140,7 +139,7 @@ def _extended(predicted: NDArray[np.float32]) -> NDArray[np.float32]:
 
 @kernel
 def _spread(predicted: NDArray[np.float32], labels: NDArray[np.int32], values: NDArray[np.float32]) -> None:
-    """Gives every pixel what the pixel on the mesh has that is labelled like it; not a number if there is none."""
+    """Value of the pixel on the mesh with the same label, for every pixel; NaN if there is none."""
     table = np.full(labels.size + 1, np.float32(np.nan))
     for row in range(labels.shape[0]):
         for column in range(labels.shape[1]):

@@ -1,1 +1,1 @@
-"""Terms of sensors that deliver pictures."""
+"""Terms of imaging sensors: colour, grey, Bayer mosaic, intensity."""

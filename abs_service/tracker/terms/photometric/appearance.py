@@ -1,4 +1,4 @@
-"""What the vertices look like: their colours, and what each sensor that makes pictures sees of them."""
+"""Appearance of the vertices: their colours, and their values in each imaging sensor."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -22,20 +22,20 @@ from calib.rig import Rig, Sensor
 
 Values = NDArray[np.float64]
 
-#: Light that falls on a vertex at a flatter angle (cosine) tells nothing of how much it reflects.
+#: Smallest cosine of incidence from which a reflectivity is estimated.
 LEAST_COSINE = 0.2
 
 
 def dressed(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
-    """The mesh with its colours, and with what it looks like to every sensor that makes pictures.
+    """The mesh with its colours, and with its appearance in every imaging sensor.
 
-    Each sensor is compared with what it saw itself, because no two cameras agree on a colour; where it did not see a
-    vertex, with the colour that others saw. Only a Bayer sensor prefers the colour sensors' word, because they know all
+    The appearance comes from the sensor's own image, because no two cameras agree on a colour; for vertices that it
+    did not see, from the other sensors' colours. Only a Bayer sensor prefers the colour sensors, which measure all
     three channels of a vertex.
 
     Args:
-        mesh: the mesh where the images show it.
-        images: what the sensors saw at that moment, by name.
+        mesh: the mesh at the time of the images.
+        images: images of that moment, by sensor name.
         rig: the sensors.
     """
     own = {name: _seen(image, rig.sensors[name].camera, mesh) for name, image in images.items()}
@@ -74,7 +74,7 @@ def _colors(mesh: Mesh, own: Mapping[str, Values], rig: Rig) -> Values:
 
 
 def _filtered(sensor: Sensor, noise: GaussianBayer, mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Values:
-    """What a Bayer sensor will make of the colours (n, 3) that the colour sensors see, out of focus as it is."""
+    """Colours (n, 3) of the colour sensors after the defocus and crosstalk of a Bayer sensor."""
     seen = []
     for name, image in images.items():
         if isinstance(image, ColorImage):
@@ -100,7 +100,7 @@ def _brightness(camera: Camera, mesh: Mesh) -> Values:
 
 
 def _seen(image: Image, camera: Camera, mesh: Mesh) -> Values:
-    """What a picture shows of the vertices (n, channels), read between the pixels; NaN where it shows nothing."""
+    """Values of an image at the vertices (n, channels), interpolated bilinearly; NaN where unknown."""
     match image:
         case ColorImage():
             return _between(image.rgb, camera, mesh.vertices)

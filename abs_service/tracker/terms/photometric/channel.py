@@ -1,4 +1,4 @@
-"""A sensor whose pixels hold one number each: grey, a Bayer mosaic, amplitudes, infra-red."""
+"""Term of a sensor with one value per pixel: grey, Bayer mosaic, amplitude, infrared."""
 
 from dataclasses import replace
 from typing import Protocol
@@ -73,7 +73,7 @@ class ChannelTerm:
         self._bordered = Bordered(UNKNOWN, np.array([NOTHING_HAS, 0, 1, 0], np.float32))
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Takes an image; NaN, which the border is as well, stands for no measurement."""
+        """Sets the image; NaN, also in the border, means no measurement."""
         if not isinstance(image, ChannelImage):
             raise TypeError(f"sensor {self.sensor} has noise of one channel but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
@@ -93,11 +93,11 @@ class ChannelTerm:
         self._widening = self._misplacement.widening(self._view, predicted, deviation)
 
     def foreground(self) -> NDArray[np.float64]:
-        """None: brightness does not tell what is nearer."""
+        """No points: brightness carries no distance."""
         return np.zeros((0, 3))
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Marks the pixels that show points (k, 3) [m] before the object: their values say nothing."""
+        """Masks the pixels occluded by points (k, 3) [m]."""
         if len(points):
             self._bordered.inside[self._shadow.mask(points)[self._bordered.window], VALUE] = np.inf
 
@@ -114,9 +114,9 @@ class ChannelTerm:
         return self._texture, self._widening.factor, self._widening.log, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
-        """Normalised residuals of all but outliers, and how they change with the parameters.
+        """Normalised residuals of the inliers and their derivatives with respect to theta.
 
-        What light makes of a turning surface changes slower than its texture, and is left to the search.
+        The derivative of the shading is neglected: it is small compared with that of the texture.
         """
         residual, inverse, normalizer = self._residuals(surface)
         use = 0.5 * residual**2 + normalizer < self._bounds.outlier
@@ -126,7 +126,7 @@ class ChannelTerm:
         return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, sparse_jacobian))
 
     def fit(self, surface: Surface) -> SensorFit:
-        """How the sensor agrees with a population of one."""
+        """Agreement of the sensor with a population of one."""
         residual = self._residuals(surface)[0]
         pixel = self._view.synthesize(surface).pixel[0]
         hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
@@ -134,7 +134,7 @@ class ChannelTerm:
         return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean)
 
     def _slopes(self, surface: Surface) -> NDArray[np.float64]:
-        """How the channel of each sample's pixel changes there per pixel to the right and down (m, 2).
+        """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
 
         A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
         the surface's own where that is known, which is also exactly how a residual changes within a pixel.

@@ -1,11 +1,11 @@
-"""Images of one number per pixel as textures, and what samples of such an image cost."""
+"""Kernels for images of one value per pixel: texture and cost of the samples."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import kernel, prange
 
-#: What a texel of a channel image holds: measured value, channel, inverse deviation, log of the normaliser.
+#: Components of a texel of a channel image: measured value, channel, inverse deviation, log of the normaliser.
 VALUE, CHANNEL, INVERSE, NORMALIZER = range(4)
 
 
@@ -66,10 +66,10 @@ def channel_cost(
     uniform: float,
     out: NDArray[np.float64],
 ) -> None:
-    """Sum over samples of min(normaliser + ½e², outlier), with deviations widened as `Widening` says.
+    """Sum over samples of min(normaliser + ½e², outlier), with deviations widened by `Widening`.
 
-    Where the value or the vertex's own is unknown (NaN) of `uniform`, and where something stands before the object (∞)
-    of what an agreeing value costs on average. Texels are [value, channel, inverse deviation, normaliser].
+    Samples whose value or appearance is unknown (NaN) cost `uniform`, occluded ones (∞) the mean of an inlier. Texels
+    are [value, channel, inverse deviation, normaliser].
     """
     half, most, unknown = np.float32(0.5), np.float32(outlier), np.float32(uniform)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums

@@ -1,4 +1,4 @@
-"""A colour sensor's pixels against the colours of the vertices."""
+"""Term of a colour sensor: measured colours compared with those of the vertices."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class ColorTerm:
         self._bordered = Bordered(np.full(3, np.nan, np.float32), np.full(3, NOTHING_HAS, np.float32))
 
     def observe(self, image: Image, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Takes a colour image; the border is NaN, which stands for no measurement."""
+        """Sets the colour image; NaN, as in the border, means no measurement."""
         if not isinstance(image, ColorImage):
             raise TypeError(f"sensor {self.sensor} has a colour noise model but delivered {type(image).__name__}")
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
@@ -68,11 +68,11 @@ class ColorTerm:
         self._normalizer = (self._constant + 3 * widening.log.mean(axis=1)).astype(np.float32)
 
     def foreground(self) -> NDArray[np.float64]:
-        """None: colours do not tell what is nearer."""
+        """No points: colours carry no distance."""
         return np.zeros((0, 3))
 
     def hide(self, points: NDArray[np.float64]) -> None:
-        """Marks the pixels that show points (k, 3) [m] before the object: their colours say nothing."""
+        """Masks the pixels occluded by points (k, 3) [m]."""
         if len(points):
             self._bordered.inside[self._shadow.mask(points)[self._bordered.window]] = np.inf
 
@@ -89,7 +89,7 @@ class ColorTerm:
         return self._texture, self._inverse, self._normalizer, self._bounds.outlier, uniform
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
-        """Normalised residuals of all but outliers, three channels each, and how they change with the parameters."""
+        """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
         residual, measured = self._residuals(surface)
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
         vertices = self._view.spread(surface, surface.vertices[0].T)[use]
@@ -101,7 +101,7 @@ class ColorTerm:
         )
 
     def fit(self, surface: Surface) -> SensorFit:
-        """How the sensor agrees with a population of one."""
+        """Agreement of the sensor with a population of one."""
         residual, measured = self._residuals(surface)
         pixel = self._view.synthesize(surface).pixel[0]
         hidden = (pixel < 0) | np.isinf(self._texture[pixel, 0])
@@ -110,7 +110,7 @@ class ColorTerm:
         return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, size, mean, channels=3)
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Normalised residuals (n, 3) and whether there is a measurement (n,)."""
+        """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
         seen = self._view.synthesize(surface)
         colors = seen.attributes[0].astype(np.float64)
         residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
@@ -131,8 +131,7 @@ def _color_cost(
 ) -> None:
     """Sum over samples of min(normaliser + ½e², outlier), of as many samples as have noise of their own, or of all.
 
-    Where either colour is unknown (NaN) of `uniform`, and where something stands before the object (∞) of what an
-    agreeing colour costs on average.
+    Samples with an unknown colour (NaN) cost `uniform`, occluded ones (∞) the mean of an inlier.
     """
     half, most, unknown, average = np.float32(0.5), np.float32(outlier), np.float32(uniform), np.float32(1.5)
     farthest = np.float32(1e30)  # np.isfinite does not survive reordered sums

@@ -1,4 +1,4 @@
-"""What light makes of a surface's reflectivity, one class for each kind of light."""
+"""Illumination models: brightness of a surface from its reflectivity, one class per kind of light."""
 
 from dataclasses import replace
 from typing import Protocol
@@ -12,7 +12,7 @@ from calib.jit import kernel
 
 
 class Illumination(Protocol):
-    """Turns reflectivities into what a sensor sees."""
+    """Converts reflectivities into image values."""
 
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis of a population with its attributes as they look in this light."""

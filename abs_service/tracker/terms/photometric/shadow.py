@@ -1,4 +1,4 @@
-"""What one sensor saw before the object, in the image of another sensor that measures no distances."""
+"""Occluders measured by one sensor, projected into the image of a sensor that measures no distances."""
 
 import cv2
 import numpy as np
@@ -9,7 +9,7 @@ from calib.camera import Camera
 
 
 class Shadow:
-    """Where points that stand before the object cover it in one camera's image."""
+    """Mask of the pixels of one camera that occluders cover."""
 
     def __init__(self, camera: Camera):
         self._camera = camera
@@ -18,7 +18,7 @@ class Shadow:
     def mask(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Pixels (height, width) that points (k, 3) [m], neighbours in another sensor's image, cover.
 
-        Each stands for a square as wide as the gap to its neighbour, so that the mask has no holes.
+        Each covers a square as wide as the gap to its neighbour, so that the mask has no holes.
         """
         camera = self._camera
         covered = np.zeros((camera.height, camera.width), np.uint8)

@@ -1,4 +1,4 @@
-"""What not knowing where exactly on the mesh its appearance lies makes of a picture's noise."""
+"""Image noise due to the uncertain position of the appearance on the mesh."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -11,10 +11,10 @@ from abs_service.tracker.synthesis.base import View
 
 
 class Widening(NamedTuple):
-    """How much more than the sensor's noise a picture deviates from what the surface looks like.
+    """Factor by which texture registration noise widens the sensor's standard deviation.
 
     Attributes:
-        factor: of the standard deviation (m or 1, channels); one row stands for all samples.
+        factor: of the standard deviation (m or 1, channels); a single row applies to all samples.
         log: its logarithm.
     """
 
@@ -24,23 +24,23 @@ class Widening(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Misplacement:
-    """The appearance of every sample is known, but only to a part of a pixel where it belongs.
+    """Texture registration noise: the position of each sample's appearance is known to a fraction of a pixel only.
 
-    It was read from the first images through the first mesh, and since then the model has bent the mesh as well as it
-    can. Where a print is even that does no harm; at a sharp edge a tenth of a pixel is many levels. So the variance of
-    a sample is the sensor's σ² and the square of `px` times the slope of the appearance there, to first order.
+    The appearance was sampled in the first images on the first mesh, and the model follows the surface only
+    approximately. This is harmless on uniform areas; at a sharp edge a tenth of a pixel is many levels. To first order,
+    the variance of a sample is σ² of the sensor plus the square of `px` times the gradient of the appearance.
 
     Attributes:
-        px: standard deviation of the place, in pixels of the sensor that looks.
+        px: standard deviation of the position, in pixels of the sensor.
     """
 
     px: float
 
     def widening(self, view: View, predicted: Surface, deviation: NDArray[np.floating]) -> Widening:
-        """What it makes of the sensor's own noise, where the surface is expected.
+        """Widening of the sensor's own noise at the predicted surface.
 
         Args:
-            view: the sensor's, after it has looked.
+            view: the sensor's, after `look`.
             predicted: the predicted mesh, a population of one.
             deviation: the sensor's own standard deviation of every sample, broadcastable to (m, channels).
         """
