@@ -56,9 +56,8 @@ def test_the_mesh_is_the_rectangle(turn, tilt):
     np.testing.assert_allclose(points[:, 2], 0, atol=5e-4)  # in the plane
     assert np.abs(points[:, 0]).max() < WIDTH / 2 + 0.006  # a pixel is 4.5 mm wide
     assert np.abs(points[:, 1]).max() < HEIGHT / 2 + 0.006
-    assert (
-        0.72 * WIDTH * HEIGHT < area(mesh) < 1.02 * WIDTH * HEIGHT
-    )  # no vertex lies closer to the rim than its neighbourhood
+    # No vertex lies closer to the rim than its neighbourhood reaches.
+    assert 0.72 * WIDTH * HEIGHT < area(mesh) < 1.02 * WIDTH * HEIGHT
     assert 0.75 * 300 < len(mesh.vertices) < 1.15 * 300
 
 
