@@ -1,4 +1,4 @@
-"""The answer of the tracker to one observation."""
+"""Estimate of the tracker for one observation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from abs_service.tracker.terms.base import SensorFit
 
 
 class Status(StrEnum):
-    """How far an estimate can be trusted."""
+    """Reliability of an estimate."""
 
     INITIALIZING = "INITIALIZING"
     TRACKING = "TRACKING"
@@ -27,23 +27,23 @@ class Estimate:
 
     Attributes:
         seq: number of the frame set.
-        t_host_ns: the moment it shows, CLOCK_MONOTONIC [ns].
-        status: how far to trust it.
+        t_host_ns: time of the measurement, CLOCK_MONOTONIC [ns].
+        status: reliability of the estimate.
         reasons: why it is not TRACKING, in plain words.
         theta: parameters (dim,) of the model; empty while INITIALIZING.
-        covariance: of theta (dim, dim), the inverse curvature of the cost at theta; an approximation that trusts the
-            noise models and knows nothing of other minima.
+        covariance: of theta (dim, dim), the inverse curvature of the cost at theta; an approximation that assumes exact
+            noise models and a single minimum.
         vertices: deformed mesh (n, 3) [m] in the rig's frame.
-        vertex_covariance: of every vertex around its material point (n, 3, 3) [m²]: what is unknown of theta, and what
-            was unknown of the mesh when it was made.
+        vertex_covariance: of every vertex around its material point (n, 3, 3) [m²], due to the errors of theta and of
+            the initial mesh.
         cost: negative logarithm of likelihood times priors at theta, up to constants.
         deviation: step size of the search when it ended, in deviations of the posterior; 0 after a descent.
-        searcher: what found theta: "levenberg_marquardt", "cma", "cma_es"; "" while INITIALIZING.
-        stop: why the search ended.
-        generations, evaluations: what the frame took: generations or steps, and how often the cost was computed.
-        budget: how often the cost was allowed to be computed.
+        searcher: algorithm that found theta: "levenberg_marquardt", "cma", "cma_es"; "" while INITIALIZING.
+        stop: stopping criterion that ended the search.
+        generations, evaluations: number of generations or steps, and of evaluations of the cost.
+        budget: maximum number of evaluations.
         inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
-        fits: how every sensor agrees.
+        fits: agreement of every sensor.
         sources: exposure of every sensor that contributed.
         missing: sensors that did not contribute.
     """

@@ -17,9 +17,8 @@ class Mesh:
         colors: red, green, blue (n, 3) in 0…255 from a colour sensor; NaN where none saw the vertex.
         chart: flat coordinates (n, 2) of the vertices, in any unit, in which the mesh does not fold; first axis along
             the object's long side.
-        appearance: what sensors that make pictures see, by sensor, (k, channels) in the sensor's unit; for those with a
-            light of their own, per unit of light. On the points that the synthesis asks for, mostly the vertices; NaN
-            where unknown.
+        appearance: by imaging sensor, values (k, channels) in the sensor's unit; with active illumination, per unit of
+            light. At the points of the synthesis, mostly the vertices; NaN where unknown.
         deviation: standard deviation (n,) [m] of the vertices along their normals, from the noise of the measurement
             that they were made from; one number () if it is the same for all.
     """
@@ -32,7 +31,7 @@ class Mesh:
     deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(()))
 
     def appearance_of(self, sensor: str) -> NDArray[np.float32]:
-        """What a sensor sees on the points of its synthesis: the vertices' colours if nothing else is known."""
+        """Appearance in a sensor at the points of its synthesis; defaults to the vertices' colours."""
         return self.appearance.get(sensor, self.colors)
 
     @property

@@ -1,4 +1,4 @@
-"""What an objective is: how badly a deformed mesh explains the measurements."""
+"""Interface of an objective, and the sum of all terms."""
 
 from collections.abc import Sequence
 from functools import reduce
@@ -18,12 +18,12 @@ class Objective(Protocol):
     """A cost over deformed meshes, given one observation."""
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Takes the measurements that the following costs refer to.
+        """Sets the measurements that the following costs refer to.
 
         Args:
             observation: the measurements.
             predicted: the predicted mesh, a population of one.
-            reach_m: the costs of meshes that are farther from it may say no more than that they are wrong [m].
+            reach_m: radius around the prediction outside which costs need not be exact, only high [m].
         """
         ...
 
@@ -36,7 +36,7 @@ class Objective(Protocol):
 
         Args:
             surface: the deformed mesh.
-            sparse_jacobian: how its vertices move with the parameters.
+            sparse_jacobian: derivative of its vertices with respect to theta.
         """
         ...
 
@@ -54,7 +54,7 @@ class TermSum:
         self._active: list[Term] = []
 
     def observe(self, observation: Observation, predicted: Surface, reach_m: float = np.inf) -> None:
-        """Hands every sensor's image to its term."""
+        """Passes every sensor's image to its term, and all occluders to every term."""
         self._synthesizer.observe(observation)
         self._active = [term for term in self._terms if term.sensor in observation.images]
         for term in self._active:
@@ -70,7 +70,7 @@ class TermSum:
         return reduce(np.add, (term.cost(surface) for term in self._active))
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> list[Linear]:
-        """All sensors' normalised residuals and their derivatives."""
+        """Normalised residuals of all sensors and their derivatives."""
         return [term.linearize(surface, sparse_jacobian) for term in self._active]
 
     def fits(self, surface: Surface) -> list[SensorFit]:

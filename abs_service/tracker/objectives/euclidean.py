@@ -1,4 +1,4 @@
-"""The fitness that the likelihood replaces: squared distances and colour differences with weights chosen by hand."""
+"""Euclidean fitness, the baseline of the likelihood: squared differences with hand-tuned weights."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -36,7 +36,7 @@ class Settings:
         cutoff_levels: likewise for colours, in levels of 256.
         intensity_weight: cost of a squared unit between measured and synthesised intensity.
         cutoff_intensity: intensities that differ by more cost as much as this.
-        barrier_weight: cost of a light barrier that says the opposite of what the mesh does.
+        barrier_weight: cost of a light barrier whose reading contradicts the mesh.
     """
 
     depth_weight: Annotated[float, Gt(0)] = 5000.0
@@ -76,7 +76,7 @@ class SquareSum(TermSum):
     """The weighted squares of all sensors."""
 
     def fits(self, surface: Surface) -> list[SensorFit]:
-        """How every sensor agrees; its residuals over weights chosen by hand say nothing about its noise."""
+        """Agreement of every sensor; without normalised residuals, because weights are no noise model."""
         return [replace(fit, normalized_residual=float("nan")) for fit in super().fits(surface)]
 
 

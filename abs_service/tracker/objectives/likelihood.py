@@ -21,17 +21,16 @@ class Settings:
     """TOML keys of the likelihood; a sensor's own `outlier_share` and `range_m` go before them.
 
     Attributes:
-        outlier_share: share ε of measurements that come from anywhere (mixed pixels, occluders, what the model cannot
-            represent); it bounds what a single measurement can say against a deformation. The density is the larger of
-            (1 − ε) times the noise model's and ε times the uniform one, at most log 2 from their sum.
-        range_m: distances that a depth sensor can report at all; a measurement that says nothing about the surface is
-            uniform over it.
-        misplacement_px: standard deviation of where on the mesh its appearance lies, in pixels of the sensor that
-            looks: around edges of a print, pictures may deviate by so much more than their noise models say. About
-            0.2 for sharp edges, such as those of a checker board.
-        outline_px: standard deviation of where the object seems to end, in pixels of the depth sensor that looks, about
-            0.5. It is for sheets, which end where their mesh does, and holds them against sliding along themselves; 0,
-            for bodies whose outline is only where they turn away, lets outlines say nothing.
+        outlier_share: share ε of outliers (mixed pixels, occluders, deviations from the model); it bounds the cost of a
+            single measurement. The density is the larger of (1 − ε) times the noise model's and ε times the uniform
+            one, at most log 2 from their sum.
+        range_m: measuring range of a depth sensor; outliers are uniform over it.
+        misplacement_px: texture registration noise: standard deviation of the position of the appearance on the mesh,
+            in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges, such
+            as those of a checkerboard.
+        outline_px: standard deviation of the outline, in pixels of the depth sensor, about 0.5. For sheets, which end
+            at the rim of their mesh; it stops them from sliding along themselves. 0 disables the outline, for bodies
+            whose outline is a silhouette.
     """
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
@@ -51,7 +50,7 @@ class Settings:
         )
 
     def bounds(self, sensor: Sensor) -> Bounds:
-        """What a measurement costs that the sensor's noise does not explain."""
+        """Costs of the sensor's outlier model."""
         share = sensor.outlier_share or self.outlier_share
         range_m = sensor.range_m or self.range_m
         uniform = float(np.log(range_m)) if isinstance(sensor.noise, DepthNoise) else sensor.noise.uniform

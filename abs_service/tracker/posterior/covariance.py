@@ -1,20 +1,20 @@
-"""How well Θ is known, and every vertex.
+"""Covariance of Θ and of every vertex.
 
-**Θ.** At the Θ that was found, JᵀJ + P is the curvature of the cost, of the sensors' normalised residuals r with
-derivatives J and of the priors P, and Σ = (JᵀJ + P)⁻¹ is the covariance if every residual scatters as its noise model
-says. It does not: a colour is read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform quantisation)
-to its variance where the print is sharp, and on smooth print a cautious model says too much. What the residuals did is
-known, so the sandwich Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ takes their squares instead (White, Econometrica 50, 1982).
-The leverage h = diag(J Σ Jᵀ) is how much of its own noise each residual has lost to the fit (HC2 of MacKinnon and
-White, J. Econometrics 29, 1985): if the models are right, r² / (1 − h) is 1 on average and the sandwich Σ.
+**Θ.** At the optimum, JᵀJ + P is the curvature of the cost, with the Jacobian J of the sensors' normalised residuals r
+and the curvature P of the priors. Σ = (JᵀJ + P)⁻¹ is the covariance if the noise models are exact. They are not: a
+colour is read at the nearest pixel, which adds about (slope · pixel)² / 12 (uniform quantisation) to its variance on
+sharp print, and on smooth print a cautious model overestimates σ. The sandwich Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ uses
+the squared residuals instead (White, Econometrica 50, 1982). The leverage h = diag(J Σ Jᵀ) is the share of its own
+noise that each residual loses to the fit (HC2 of MacKinnon and White, J. Econometrics 29, 1985): if the noise models
+are exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
 
-**Vertices.** Every vertex is bound to the surface where the first frame's noise put it, off by σε along its normal n
-with ε standard normal, and keeps that offset in all frames. The sensors see the surface, not the vertex; so a search
-moves Θ until the mesh lies on the surface as well as Θ can make it, and only the rest of the offsets remains. With the
-derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals by ε, Θ answers by −Σ JᵀJE ε,
-so that a vertex errs by (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors,
-D Σ JᵀJ is the projection Π on what Θ can do, and σ²(I − Π) remains. That hardly changes with the frames, and is told
-once for a mesh, in the frame after the one that it was made from; its part along the normal goes with the vertices.
+**Vertices.** The noise of the first frame displaces every vertex by σε along its normal n, with ε standard normal; the
+vertex keeps this offset in all frames. The sensors measure the surface, not the vertex. The search therefore corrects
+the part of the offsets that Θ can represent, and only the rest remains. With the derivatives D of the vertices, the
+offsets E = σn, and the derivatives JE of the residuals with respect to ε, the response of Θ is −Σ JᵀJE ε, and the error
+of a vertex is (E − D Σ JᵀJE) ε besides D times the error of Θ. Where the sensors outweigh the priors, D Σ JᵀJ is the
+projection Π onto the range of D, and σ²(I − Π) remains. This variance hardly changes with the frames. It is computed
+once per mesh, in the second frame; its component along the normal is added to the covariance of the vertices.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ from abs_service.tracker.posterior.curvature import add_at
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
-#: Least share of its noise that a residual keeps: below, rounding decides.
+#: Lower bound of 1 − h; below it, rounding errors dominate.
 LEAST_KEPT = 1e-6
 
 
@@ -48,7 +48,7 @@ def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> N
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """D Σ Dᵀ (n, 3, 3) of every vertex, for its derivatives D and the covariance Σ (dim, dim) of Θ."""
+    """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
     result = np.empty((len(sparse_jacobian.local), 3, 3))
     for group, own in enumerate(sparse_jacobian.parameters):
         vertices = np.flatnonzero(sparse_jacobian.group == group)
@@ -101,7 +101,7 @@ def uncorrected_variance(
         normals: unit normals (n, 3).
         deviation: σ of the vertices along them (n,) [m].
         jacobian: D, derivatives (n, 3, dim) of the vertices.
-        response: −Σ JᵀJE, the change (dim, n) of Θ with which the search answers each vertex's error.
+        response: −Σ JᵀJE, the change (dim, n) of Θ that each vertex's error causes.
     """
     left = np.einsum("ni,nid->nd", normals, jacobian) @ response
     left.flat[:: len(left) + 1] += deviation

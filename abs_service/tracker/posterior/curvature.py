@@ -1,4 +1,4 @@
-"""The cost near one Θ as a quadratic: the coordinates in which a search is easy, the Newton step, the covariance."""
+"""Quadratic approximation of the cost near one Θ: preconditioner of the search, Newton step, covariance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
-#: What is wrong with a curvature that has no Cholesky factor.
+#: Message of the error for a curvature without a Cholesky factor.
 NOT_POSITIVE = "the curvature of the cost is not positive definite"
 
 
@@ -28,7 +28,7 @@ class Quadratic:
 
 
 def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
-    """The sum of linearised parts as a quadratic: gradient Jᵀr and curvature JᵀJ of all rows."""
+    """Gauss–Newton approximation of the cost: sums of the gradients Jᵀr and the curvatures JᵀJ of all parts."""
     gradient, curvature = np.zeros(dimension), np.zeros((dimension, dimension))
     for part in (part for part in parts if len(part.residual)):
         add_at(part.parameters, part.jacobian.T @ part.jacobian, curvature)
@@ -46,7 +46,7 @@ def add_at(parameters: NDArray[np.int64] | slice, square: NDArray[np.float64], t
 
 @kernel
 def _scatter(parameters: NDArray[np.int64], square: NDArray[np.float64], total: NDArray[np.float64]) -> None:
-    """Ten times as fast as an index of two arrays."""
+    """Scatter-add of a matrix; ten times as fast as indexing with two arrays."""
     for i in range(parameters.size):
         row = total[parameters[i]]
         for j in range(parameters.size):
@@ -54,21 +54,20 @@ def _scatter(parameters: NDArray[np.int64], square: NDArray[np.float64], total: 
 
 
 def search_metric(quadratic: Quadratic) -> NDArray[np.float64]:
-    """Matrix A (dim, dim) such that Θ = start + A ξ makes the curvature of the cost the identity.
+    """Preconditioner A (dim, dim): with Θ = start + A ξ, the curvature of the cost in ξ is the identity.
 
-    The search is invariant under such a change of coordinates in principle; in practice it saves CMA-ES the generations
-    that it would spend on learning them.
+    CMA-ES is invariant under this change of coordinates, but saves the generations for adapting its covariance.
     """
     return np.asarray(np.linalg.inv(np.linalg.cholesky(quadratic.curvature)).T, np.float64)
 
 
 def newton_step(quadratic: Quadratic, metric: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Change of Θ (dim,) that minimises the quadratic whose metric is given."""
+    """Newton step of Θ (dim,), from the gradient of the quadratic and its preconditioner."""
     return -metric @ (metric.T @ quadratic.gradient)
 
 
 def solved(curvature: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The δ (dim,) with curvature δ = right, of a positive definite curvature (dim, dim), in half the usual time.
+    """Solution δ (dim,) of curvature δ = right by Cholesky, for a positive definite curvature (dim, dim).
 
     Raises:
         LinAlgError: the curvature is not positive definite.

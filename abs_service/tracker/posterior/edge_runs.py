@@ -1,4 +1,4 @@
-"""Relative changes of the lengths of a mesh's edges, read in the order in which its vertices lie in memory."""
+"""Relative length changes of a mesh's edges, computed in the memory order of its vertices."""
 
 from bisect import bisect_left
 
@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from calib.jit import kernel, prange
 
-#: A run's length is a multiple of this, and the compiler knows it: two vectors of eight, so nothing is left over that
-#: would have to be computed one by one.
+#: A run's length is a multiple of this compile-time constant: two vectors of eight, without a scalar remainder.
 _LANES = 16
 
-#: So many lanes cost as much as about this many single edges, whose vertices are gathered one by one.
+#: A block of lanes takes as long as about this many single edges, whose vertices are gathered one by one.
 _LEAST_EDGES = 4
 
 
@@ -95,7 +94,7 @@ def _sum_squares(
     factor: float,
     out: NDArray[np.float64],
 ) -> None:
-    """What `_sum_of_squares` says of every member of a population, (population, 3, n) [m]."""
+    """`_sum_of_squares` for every candidate of a population, (population, 3, n) [m]."""
     for k in prange(vertices.shape[0]):
         out[k] = _sum_of_squares(vertices[k], runs, singles, inverse_lengths, factor)
 

@@ -14,8 +14,8 @@ from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 from abs_service.tracker.terms.linearization import Linearization
 
-#: A linearisation is reused within this many nats per parameter: the length of the last step of a descent, and half of
-#: what the noise of a frame sparse_jacobian the estimate.
+#: A linearisation is reused within this many nats per parameter: the length of the last step of a descent, and half the
+#: step that the noise of a frame causes.
 REUSED_WITHIN = 0.25
 
 

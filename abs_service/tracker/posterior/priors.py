@@ -1,4 +1,4 @@
-"""What is known about deformations before measuring; terms of the same likelihood, never weights by hand."""
+"""Priors of shape and motion: negative log-densities of theta, without hand-tuned weights."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
-#: No search gets farther from the prediction than so many deviations of the motion prior.
+#: Radius of the search around the prediction, in standard deviations of the motion prior.
 FARTHEST = 4.0
 
 #: Interval assumed before the first two frames, and the longest over which a motion is extrapolated [s].
@@ -26,7 +26,7 @@ class Settings:
         stretch: standard deviation of an edge's relative change of length. Paper: 0.01; rubber: 0.2.
         speed: standard deviation of a parameter's rate of change around the predicted one, expressed as the speed of
             the surface that it moves [m/s].
-        memory_s: time constant with which the last motion fades from the prediction [s].
+        memory_s: time constant of the exponential decay of the predicted velocity [s].
     """
 
     stretch: Annotated[float, Gt(0)] = 0.02
@@ -35,7 +35,7 @@ class Settings:
 
 
 class ShapePrior:
-    """What a model knows of Θ before any measurement, its `prior`: W (Θ − Θ⁰) is standard normal."""
+    """Shape prior of the model: W (Θ − Θ⁰) is standard normal, W being the model's `prior`."""
 
     def __init__(self, rest: NDArray[np.float64], prior: NDArray[np.float64]):
         self._rest = rest
@@ -53,11 +53,11 @@ class ShapePrior:
 
 
 class MotionPrior:
-    """Θ_t given the past is normal around the parameters that the last motion predicts.
+    """Motion prior: Θ_t is normal around its extrapolation from the past frames.
 
     Attributes:
-        predicted: predicted parameters (dim,) of the frame in hand.
-        reach_m: how far from there the surface may be [m].
+        predicted: predicted parameters (dim,) of the current frame.
+        reach_m: radius around the predicted surface within which the surface is searched [m].
     """
 
     def __init__(self, rest: NDArray[np.float64], scales: NDArray[np.float64], settings: Settings):
@@ -71,7 +71,7 @@ class MotionPrior:
         self._inverse_deviation = self._told()
 
     def predict(self, t_ns: int) -> None:
-        """Turns to the frame of time `t_ns` [ns]; the velocity fades with the age of the last estimate."""
+        """Predicts theta at time `t_ns` [ns]; the velocity decays with the age of the last estimate."""
         began = self._t_ns is not None
         elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
         self._elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
@@ -82,12 +82,12 @@ class MotionPrior:
         self.predicted = self._theta + travel * self._velocity
 
     def restart(self, theta: NDArray[np.float64]) -> None:
-        """Takes parameters (dim,) near which what was lost may be, as if it had not been seen for long."""
+        """Restarts at theta (dim,) with zero velocity and the deviation of the longest interval, for relocation."""
         self._theta, self._velocity = theta, np.zeros_like(theta)
         self._t_ns = (self._t_ns or 0) - round(LONGEST_INTERVAL_S * 1e9)
 
     def update(self, theta: NDArray[np.float64]) -> None:
-        """Takes the parameters found for the frame in hand."""
+        """Sets theta and velocity from the estimate of the current frame (dim,)."""
         self._velocity, self._theta = (theta - self._theta) / self._elapsed_s, theta
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -109,7 +109,7 @@ class MotionPrior:
 def _half_squares(
     thetas: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """What `_half_square` says of every member of a population."""
+    """`_half_square` for every candidate of a population."""
     for k in range(thetas.shape[0]):
         out[k] = _half_square(thetas[k], center, rows)
 
@@ -118,7 +118,7 @@ def _half_squares(
 def _half_squares_of_each(
     thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """What `_half_square_of_each` says of every member of a population."""
+    """`_half_square_of_each` for every candidate of a population."""
     for k in range(thetas.shape[0]):
         out[k] = _half_square_of_each(thetas[k], center, scales)
 

@@ -1,4 +1,4 @@
-"""Lays a mesh that was lost over what was found, roughly: near enough for a search to begin."""
+"""Relocation: coarse fit of the mesh to points of a lost object, as the start of a search."""
 
 from itertools import product
 
@@ -12,20 +12,20 @@ from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization
 
-#: Steps of the rough fit, how far vertices and found points may be apart after it [m], and how much edges may stretch.
+#: Steps of the coarse fit, σ of the distances between vertices and points [m], and σ of the relative edge stretch.
 _STEPS, _APART_M, _STRETCH = 15, 0.01, 0.02
 
-#: Found points that take part in it, at most.
+#: Maximum number of points in the fit.
 _POINTS = 500
 
 
 def laid_over(model: DeformationModel, last: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Parameters (dim,) with which the mesh lies on points (k, 3) [m] of a surface that are in sight.
+    """Parameters (dim,) that fit the mesh to points (k, 3) [m] of the visible surface.
 
-    The undeformed mesh is moved there by the principal axes of both, turned as little as possible against `last`
-    (dim,), the last parameters that were trusted: of what looks the same turned upside down, nothing else is known.
-    Then it bends: every vertex towards the nearest point and every point towards the nearest vertex, while edges keep
-    their lengths.
+    The undeformed mesh is aligned by the principal axes of both. Of the four alignments, the one with the smallest
+    rotation from `last` (dim,), the last trusted parameters, is taken, because a symmetric object does not define it.
+    Then theta is fitted as in non-rigid ICP: every vertex to the nearest point and every point to the nearest vertex,
+    under the stretch prior.
     """
     thinned = points[:: max(1, len(points) // _POINTS)]
     rest = model.mesh.vertices
@@ -45,7 +45,7 @@ def laid_over(model: DeformationModel, last: NDArray[np.float64], points: NDArra
 
 
 def _moved(rest: NDArray[np.float64], before: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The vertices at rest (n, 3), moved rigidly onto points (k, 3), turned as little as possible against `before`."""
+    """Rest vertices (n, 3) rigidly aligned with points (k, 3), with the smallest rotation from `before`."""
     center, own = _axes(rest)
     place, seen = _axes(points)
     left, _, right = np.linalg.svd((before - before.mean(axis=0)).T @ (rest - center))
@@ -64,7 +64,7 @@ def _axes(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.
 
 
 def _reached(model: DeformationModel, theta: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Parameters (dim,) whose vertices come nearest to a target (n, 3) [m]."""
+    """Least-squares parameters (dim,) for target vertices (n, 3) [m]."""
     everywhere = np.arange(len(target))
     for _ in range(_STEPS):
         vertices = model.deform(theta[None]).vertices[0].T.astype(np.float64)
@@ -78,14 +78,14 @@ def _towards(
     which: NDArray[np.intp],
     targets: NDArray[np.float64],
 ) -> Linearization:
-    """Rows that pull some vertices, each possibly often, to targets (m, 3)."""
+    """Linearised distances of vertices, possibly repeated, from targets (m, 3)."""
     residual = (vertices[which] - targets) / _APART_M
     jacobian = sparse_jacobian.dense[which] / _APART_M
     return Linearization(residual.reshape(-1), jacobian.reshape(-1, sparse_jacobian.dimension))
 
 
 def _stepped(theta: NDArray[np.float64], rows: list[Linearization]) -> NDArray[np.float64]:
-    """After a Gauss–Newton step, slightly damped: some parameters may move nothing."""
+    """Theta after a damped Gauss–Newton step; damping covers parameters without influence."""
     quadratic = gauss_newton(rows, len(theta))
     damping = 1e-3 * np.trace(quadratic.curvature) / len(theta)
     return theta - np.linalg.solve(quadratic.curvature + damping * np.eye(len(theta)), quadratic.gradient)

@@ -1,4 +1,4 @@
-"""What is known about how far a surface stretches: the prior of the lengths of a mesh's edges."""
+"""Stretch prior: relative length changes of the mesh's edges."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,7 @@ class StretchPrior:
 
 @kernel
 def _count_edges(edges: NDArray[np.int32], group: NDArray[np.int32], start: NDArray[np.int64]) -> None:
-    """Where the edges within each group begin when they are sorted, and those between; zeros (groups + 2,) before."""
+    """First index of the sorted edges within each group and of those between groups, into zeros (groups + 2,)."""
     for e in range(edges.shape[0]):
         own, other = group[edges[e, 0]], group[edges[e, 1]]
         start[own + 1 if own == other else start.size - 1] += 1
@@ -63,13 +63,13 @@ def _stretch_rows(
     rows: NDArray[np.float64],
     across: NDArray[np.float64],
 ) -> None:
-    """Length times scale of every edge, less what it is at rest, and its derivatives, sorted as `place` says.
+    """Normalised length change of every edge and its derivatives, sorted by group; `place` holds the first indices.
 
     Args:
         vertices, edges: (3, n) [m] and (edges, 2).
-        scales, rest: per length at rest (edges,) [1/m], and what that makes of the length at rest.
+        scales, rest: 1 / (σ length at rest) (edges,) [1/m], and 1 / σ, the scaled length at rest.
         local, group, parameters: as in `SparseJacobian`.
-        place: where the first edge within each group, and the first between groups, go.
+        place: index of the first edge within each group, and of the first between groups.
         residual: (edges,).
         rows: of the edges within a group, by its parameters.
         across: of those between groups by all parameters (edges, dim), zeros before.
