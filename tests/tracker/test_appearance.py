@@ -1,4 +1,4 @@
-"""What the vertices look like comes from the images of the moment in which the mesh is made, sensor by sensor."""
+"""Appearance of the vertices, sampled per sensor in the images from which the mesh is made."""
 
 import numpy as np
 import pytest

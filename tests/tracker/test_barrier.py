@@ -37,7 +37,7 @@ def term(camera: Camera, faces: np.ndarray, noise: LightBarrier = NOISE, bounds:
 
 
 def crossing(barrier: BarrierTerm, surface: Surface) -> list[bool]:
-    """What the term takes the mesh to do, from its cost of an interrupted beam: 0.02 for a miss, 0.1 for an alarm."""
+    """True for each mesh that crosses the beam, from the cost of an interruption: 0.02 for a miss, 0.1 for an alarm."""
     barrier.observe(BeamReading(True), surface)
     return (barrier.cost(surface) < 1).tolist()
 

@@ -89,7 +89,7 @@ def test_lambert_s_law_is_its_equation(seed):
 @settings(max_examples=10)
 @given(seeds, st.sampled_from(["grey", *BAYER_ORDERS]))
 def test_the_euclidean_cost_is_the_weighted_squares(seed, name):
-    """What is unknown, or differs by more than the cut-off, costs as much as a difference of the cut-off."""
+    """Unknown values, and differences above the cut-off, cost as much as a difference of the cut-off."""
     generator, (noise, pattern) = np.random.default_rng(seed), NOISES[name]
     mesh = sheet()
     mesh.colors[:] = generator.uniform(0, 255, mesh.colors.shape)

@@ -74,7 +74,7 @@ def test_a_mesh_without_order_costs_what_its_edges_do(seed, vertices, faces):
 @few
 @given(seeds, st.integers(2, 14), st.integers(2, 40))
 def test_runs_stay_within_the_mesh(seed, rows, columns):
-    """What they read beyond it would not change the cost."""
+    """Values read out of bounds would not change the cost."""
     mesh = grid_with_holes(np.random.default_rng(seed), rows, columns, 0.1)
     runs = runs_of(mesh).runs
     assert np.all(runs[:, 0] >= 0)

@@ -1,4 +1,4 @@
-"""Who searches a frame: the descent while it explains what is seen, CMA-ES when it does not."""
+"""Hybrid search: descent while it explains the measurements, CMA-ES otherwise."""
 
 import numpy as np
 import pytest

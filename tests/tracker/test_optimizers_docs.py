@@ -1,4 +1,4 @@
-"""What docs/optimizers.md says of the optimisers is so: their names, keys and defaults, and those of the budget."""
+"""docs/optimizers.md agrees with the code: names, keys and defaults of the optimisers and the budget."""
 
 import re
 import tomllib

@@ -1,4 +1,4 @@
-"""What the priors predict and what they cost."""
+"""Predictions and costs of the priors."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_stretch_rows_are_the_derivatives_of_the_edges_lengths(seed):
 
 
 def test_the_cost_is_that_of_a_speed():
-    """Where the surface moves 0.3 m/s off the prediction, whatever the parameter, it costs ½."""
+    """A deviation of 0.3 m/s of the surface from the prediction costs ½, for every parameter."""
     motion = prior()
     motion.predict(0)
     motion.update(np.zeros(2))

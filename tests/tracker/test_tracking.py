@@ -26,7 +26,7 @@ def tracking(**changes: object) -> TrackingSession:
 
 
 def without_sheet(k: int, frames: list[Frame]) -> list[Frame]:
-    """What the heads would see if there was only the wall."""
+    """Images of the heads with the wall alone."""
     changed = []
     for frame in frames:
         view = View(SHEET.scene, SHEET.heads[frame.sensor].camera)

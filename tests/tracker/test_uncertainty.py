@@ -1,4 +1,4 @@
-"""How well vertices are known: exact where everything is linear, calibrated where it is not."""
+"""Covariance of the vertices: exact for a linear model, calibrated otherwise."""
 
 import numpy as np
 import pytest

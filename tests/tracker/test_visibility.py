@@ -1,4 +1,4 @@
-"""What the predicted mesh hides from a sensor is neither rewarded nor punished."""
+"""Occluded vertices and pixels are ignored in the cost."""
 
 import numpy as np
 import pytest

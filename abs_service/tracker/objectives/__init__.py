@@ -1,1 +1,1 @@
-"""What the search minimises, one per file; a rig file names them with `type`."""
+"""Objectives: cost functions of the search, one per file; a rig file selects one by `type`."""

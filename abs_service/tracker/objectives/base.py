@@ -41,7 +41,7 @@ class Objective(Protocol):
         ...
 
     def fits(self, surface: Surface) -> list[SensorFit]:
-        """How every contributing sensor agrees with a population of one."""
+        """Agreement of every contributing sensor with a population of one."""
         ...
 
 
@@ -74,5 +74,5 @@ class TermSum:
         return [term.linearize(surface, sparse_jacobian) for term in self._active]
 
     def fits(self, surface: Surface) -> list[SensorFit]:
-        """How every contributing sensor agrees with a population of one."""
+        """Agreement of every contributing sensor with a population of one."""
         return [term.fit(surface) for term in self._active]
