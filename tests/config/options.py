@@ -121,7 +121,7 @@ OPTIONS = {
         _option("synthesis.dense", "step = 2", **LENS),
         _option("optimizer.cma", "generations = 5"),
         _option("optimizer.cma_es", "generations = 5, population = 12"),
-        _option("optimizer.hybrid", "steps = 2, far = 0.05"),
+        _option("optimizer.hybrid", "steps = 2, fallback_above = 0.05"),
         _option("objective.likelihood", "outlier_share = 0.1"),
         _option("objective.euclidean"),
         _option("region.nearest", "largest_step_m = 0.05"),

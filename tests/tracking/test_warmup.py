@@ -19,7 +19,7 @@ from numba.core.dispatcher import Dispatcher
 from pathlib import Path
 from abs_service import config, wiring
 from abs_service.config import plugins
-from abs_service.tracking.session import Tracking, streams
+from abs_service.tracking.session import TrackingSession, streams
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracking.warmup import warm_up
 from drivers.simulated import address
@@ -40,7 +40,7 @@ def forms():
 
 before = forms()
 rig = wiring.rig(settings, "sheet", {name: head.camera for name, head in simulation.heads.items()})
-tracking = Tracking(rig, plan)
+tracking = TrackingSession(rig, plan)
 synchroniser = Synchroniser(settings.reference("sheet"), streams(rig.sensors.values()), 10**7)
 for frames in exposures:
     for frame in frames:
