@@ -73,7 +73,7 @@ def test_the_report_says_how_well_the_reference_is_known(tmp_path: Path, board: 
     assert "in the images of color" in text
     assert not any("offset is not determined" in one["text"] for one in said["verdicts"])
     page = (tmp_path / "noise.html").read_text(encoding="utf-8")
-    assert "Where the board was" in page
+    assert "Board poses from the mean images of the sequences" in page
     assert "--target" in page
 
 

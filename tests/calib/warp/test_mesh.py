@@ -25,7 +25,8 @@ slopes = st.tuples(st.floats(-0.25, 0.25), st.floats(-0.25, 0.25))
 def test_a_plane_warped_is_the_plane_and_whole(view, slope, offset):
     """Within a face a plane is exact in a pinhole; in a bent image 1/z is off by what the lens bends a pixel."""
     plane = (Plane(np.array([*slope, 1.0]), offset),)
-    warped = MeshWarp(SOURCE, view).warp(image(SOURCE, plane))
+    # Neighbours along the diagonal of a steep plane differ by more than the default step.
+    warped = MeshWarp(SOURCE, view, largest_step_m=0.1).warp(image(SOURCE, plane))
     truth = image(view, plane)
     known = np.isfinite(warped.distance)
     np.testing.assert_allclose(warped.distance[known], truth[known], atol=2e-6 if view.lens.is_pinhole else 3e-4)

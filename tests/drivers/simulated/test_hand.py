@@ -45,7 +45,7 @@ def clearance(points: np.ndarray, capsules: np.ndarray) -> np.ndarray:
 def march(rays: np.ndarray, capsules: np.ndarray) -> np.ndarray:
     """Distance to the capsules by ray marching (reference); beyond 2 m for a miss."""
     distance = np.zeros(rays.shape[:-1])
-    for _ in range(200):
+    for _ in range(2000):  # a ray that grazes a capsule takes a thousand small steps
         distance = np.minimum(distance + clearance(rays * distance[..., None], capsules), 3.0)
     return distance
 
