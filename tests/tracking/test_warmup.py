@@ -83,7 +83,7 @@ def test_a_noise_map_that_is_smaller_than_the_nominal_image_does_no_harm(monkeyp
             statuses.append((estimate := super().track(frames, in_time)).status)
             return estimate
 
-    monkeypatch.setattr(warmup, "Tracking", Recorded)
+    monkeypatch.setattr(warmup, "TrackingSession", Recorded)
     settings = config.load_default()
     plan = wiring.plan(settings, "sheet")
     small = np.full((1, 1, 2, 2), 0.01)
