@@ -2,11 +2,11 @@
 
 import sys
 import threading
+from importlib.metadata import EntryPoint
 from types import ModuleType
 
 import pytest
 
-import drivers
 from drivers import opening
 from drivers.contract.device import DeviceError, DeviceInfo
 from drivers.contract.discovery import Availability, Found, choose
@@ -47,10 +47,11 @@ def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytes
 
     searches = {"breaks": breaks, "hangs": hangs, "works": lambda timeout_s: [ONE]}
     for name, discover in searches.items():
-        module = ModuleType(f"drivers.{name}")
+        module = ModuleType(f"external_{name}")
         module.discover = discover  # pyright: ignore[reportAttributeAccessIssue]
-        monkeypatch.setitem(sys.modules, f"drivers.{name}", module)
-        monkeypatch.setattr(drivers, name, module, raising=False)
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+    points = [EntryPoint(name, f"external_{name}", "drivers") for name in searches]
+    monkeypatch.setattr(opening, "entry_points", lambda group: points)
     monkeypatch.setattr(opening, "available", lambda: list(searches))
     monkeypatch.setattr(opening, "_GRACE_S", 0.0)
     broken, hanging, working = opening.discover(0.2)
