@@ -67,6 +67,7 @@ class DeviceSupervisor:
         self._health = health
         self._clock = clock
         self._stop = threading.Event()
+        self._abandoned = False
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
         self._previous: Counter[str] = Counter()  # counters of earlier openings
         self.finished = False
@@ -80,6 +81,7 @@ class DeviceSupervisor:
         """Stops and closes the device; a driver that does not return within `timeout_s` is abandoned."""
         self._stop.set()
         self._thread.join(timeout_s)
+        self._abandoned = self._thread.is_alive()
 
     def _run(self) -> None:
         backoff_s = FIRST_BACKOFF_S
@@ -114,12 +116,15 @@ class DeviceSupervisor:
         )
         try:
             self._check_serial(device)
+            if self._stop.is_set():
+                return False, "stopped"  # while it was opened; the bus may be closed by now
             try:
                 self._on_open(device)
             except DeviceError:
                 raise
             except Exception as error:
-                self.fatal_error = error
+                if not self._abandoned:
+                    self.fatal_error = error
                 return False, str(error)
             device.start(stall_detector)
             reason = self._watch(device, stall_detector)
@@ -166,6 +171,8 @@ class DeviceSupervisor:
             self._health.report(f"device {self._name} {condition}", Level.WARNING if message else Level.OK, text)
 
     def _report_state(self, state: DeviceState, reason: str) -> None:
+        if self._abandoned:
+            return
         self._health.label(f"device.{self._name}", state.value)
         level = _LEVELS[state]
         self._health.report(f"device {self._name}", level, f"{self._name}: {reason}" if level > Level.OK else "")

@@ -274,6 +274,41 @@ def test_a_device_that_does_not_fit_is_refused_and_closed(keep):
     assert device.closed.wait(5)
 
 
+def test_a_device_that_opens_after_the_end_is_closed_and_not_announced(keep):
+    asked_for, open_now, announced = threading.Event(), threading.Event(), []
+    device = FakeDevice()
+
+    def slow():
+        asked_for.set()
+        open_now.wait(5)
+        return device
+
+    supervisor, _, health = keep(slow, on_open=announced.append)
+    assert asked_for.wait(5)
+    supervisor.close(0.01)
+    open_now.set()
+    assert device.closed.wait(5)
+    assert not announced
+    assert supervisor.fatal_error is None
+    assert health.level == Level.OK
+
+
+def test_what_fails_after_the_end_is_no_error_of_the_rig(keep):
+    asked_for, fail_now, device = threading.Event(), threading.Event(), FakeDevice()
+
+    def announce(_):
+        asked_for.set()
+        fail_now.wait(5)
+        raise RuntimeError("session closed")
+
+    supervisor, _, _ = keep(lambda: device, on_open=announce)
+    assert asked_for.wait(5)
+    supervisor.close(0.01)
+    fail_now.set()
+    assert device.closed.wait(5)
+    assert supervisor.fatal_error is None
+
+
 RIG = """
 version = 1
 name = "demo"
