@@ -17,7 +17,6 @@ data or packages, with a message.
 
 import argparse
 import json
-import os
 import pkgutil
 import sys
 import time
@@ -30,7 +29,6 @@ from typing import Any
 
 from rich.console import Console
 
-from abs_service.cli import THREADS
 from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
 from abs_service.supervision.exit_codes import Exit, is_for_user
@@ -46,8 +44,6 @@ class EvaluateOptionError(Exception):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the selected experiments and returns the exit code."""
-    for variable in THREADS:
-        os.environ.setdefault(variable, "1")
     parser = argparse.ArgumentParser(
         prog="python -m evaluation", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
