@@ -14,7 +14,7 @@ import abs_service as a
 
 folder = Path(sys.argv[1])
 camera = a.Camera(640, 480, fx=528.0144, fy=528.0144, cx=320, cy=240)
-tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs(4, 4))
+tracker = a.Tracker(depth=camera, color=camera, model=a.Nurbs())
 for path in sorted(folder.glob("depth_*.png")):
     number = path.stem.removeprefix("depth_")
     depth_m = np.asarray(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)) * 0.0001

@@ -12,8 +12,8 @@ _DEFAULT = nurbs.Settings()
 
 
 def Nurbs(
-    long: int = _DEFAULT.control_points[0],
-    short: int = _DEFAULT.control_points[1],
+    long: int | None = None,
+    short: int | None = None,
     *,
     degree: int = _DEFAULT.degree,
     weights: tuple[tuple[float, ...], ...] = _DEFAULT.weights,
@@ -23,13 +23,18 @@ def Nurbs(
     """A NURBS surface of any smooth shape; theta lists x, y, z of its control points row by row [m].
 
     Args:
-        long, short: control points along the object's long and short side, 3 to 12.
+        long, short: control points along the object's long and short side, 3 to 12; without both of them, they are
+            derived from the object's proportions and the mesh.
         degree: polynomial degree of the splines, 1 to 4.
         weights: weight of every control point, a table of `long` rows and `short` columns; empty: all 1.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
         smoothing: weight of the bending of the rest surface when it is fitted to the vertices.
 
     Raises:
-        ValueError: weights of another shape.
+        ValueError: weights of another shape, or one of `long` and `short` without the other.
     """
+    if long is None and short is None:
+        return nurbs.Settings("auto", degree, weights, margin, smoothing)
+    if long is None or short is None:
+        raise ValueError("long and short belong together: give both, or neither")
     return nurbs.Settings((long, short), degree, weights, margin, smoothing)

@@ -2,13 +2,17 @@
 
 import difflib
 import json
-from collections.abc import Callable, Collection, Iterable
+import re
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import ValidationError
 
 Key = tuple[str | int, ...]
+
+#: Parts of pydantic's paths that are no keys: the alternatives of a union, and what is wrong about a key itself.
+_ALTERNATIVE = re.compile(r"\[key\]|literal\[.*\]|tuple\[.*\]|constrained-\w+")
 
 #: Marks "no value given", which differs from None.
 ABSENT: Any = object()
@@ -71,8 +75,12 @@ def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection
         allowed_at: the keys that the table at a path may hold.
     """
     found: list[Problem] = []
+    words = dict[Key, str]()  # what a key may be instead of numbers: "auto"
     for detail in error.errors(include_url=False):
-        key = tuple(part for part in detail["loc"] if part != "[key]")
+        key = tuple(part for part in detail["loc"] if not _ALTERNATIVE.fullmatch(str(part)))
+        if detail["type"] == "literal_error" and key != detail["loc"]:
+            words[key] = detail["ctx"]["expected"]
+            continue
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemsError):
             found += [problem.under(key) for problem in cause.problems]
@@ -85,7 +93,13 @@ def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection
             for subject in ("Input", "String", "Tuple", "List", "Object"):
                 message = message.replace(f"{subject} should", "must")
             found.append(Problem(key, message, detail["input"]))
-    return found
+    return [_or_word(problem, words) for problem in found]
+
+
+def _or_word(problem: Problem, words: Mapping[Key, str]) -> Problem:
+    """The problem of a value that may also be a word, with that word."""
+    word = words.get(problem.key)
+    return problem if word is None else replace(problem, message=f"{problem.message}, or {word}")
 
 
 def _shown(value: Any, limit: int = 60) -> str:

@@ -107,7 +107,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     """Tracks a simulated device with the default tracker; `sigma`: standard deviation of the colours [levels]."""
     simulation = simulate(uri)
     rig = with_noise(demo_rig(simulation), "color", GaussianColor(sigma))
-    found = track(rig, demo_plan(nurbs.Settings()), expose(simulation, range(frames)))
+    found = track(rig, demo_plan(nurbs.Settings((4, 4))), expose(simulation, range(frames)))
     rows, predicted, true = [], [], []
     for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
         error, known = points - estimate.vertices, estimate.covariance

@@ -10,6 +10,7 @@ from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
+from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.posterior.covariance import propagated, sandwich, uncorrected_variance
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
@@ -108,7 +109,7 @@ def test_the_search_answers_each_vertex_s_own_error_as_it_answers_a_motion_of_it
 
 def test_what_the_mesh_did_not_know_stays_with_its_vertices_when_they_are_sorted():
     mesh = sheet()
-    model = nurbs.Settings().of_mesh(mesh)
+    model = nurbs.Settings((4, 4)).of_mesh(mesh)
     assert model.mesh.deviation.shape == (len(mesh.vertices),)
     order = np.random.default_rng(0).permutation(len(mesh.vertices))
     known = type(mesh)(mesh.vertices, mesh.faces, mesh.colors, mesh.chart, deviation=mesh.vertices[:, 0])
@@ -139,12 +140,13 @@ def test_estimates_say_how_well_each_vertex_is_known():
     assert 0.5e-3 < np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean()) < 5e-3
 
 
-def test_without_color_it_is_unknown_where_along_the_sheet_a_vertex_is():
+def test_without_color_and_outline_it_is_unknown_where_along_the_sheet_a_vertex_is():
     def depth_only(k, frames):
         return [frame for frame in frames if frame.sensor == "tof"]
 
-    *_, both = drive(tracking(), SHEET, MOVING)
-    *_, alone = drive(tracking(), SHEET, MOVING, depth_only)
+    objective = likelihood.Settings(outline_px=0.0)
+    *_, both = drive(tracking(objective=objective), SHEET, MOVING)
+    *_, alone = drive(tracking(objective=objective), SHEET, MOVING, depth_only)
     spread = [np.linalg.eigvalsh(step.estimate.vertex_covariance).mean(axis=0) for step in (both, alone)]
     assert spread[1][2] > 4 * spread[0][2]
 

@@ -8,7 +8,9 @@ from abs_service.tracker.models.base import Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.sparse import SparseView
+from abs_service.tracker.synthesis.window import WHOLE
 from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
 from abs_service.tracker.terms.depth.visibility import classify
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -135,6 +137,31 @@ def test_a_hole_inside_the_outline_is_told_from_missing_returns_at_its_rim():
     assert seen.hole[30:42, 84:96].all()
     assert not seen.hole[:9].any()
     assert (seen.free_m == 0).all()
+
+
+def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_has_none():
+    """The sheet has moved 12 pixels (55 mm) to the left, so the prediction hangs over the empty background."""
+    first = board(STRAIGHT).astype(np.float32)
+    first[~EXPECTED] = np.nan
+    background = Background()
+    background.observe(np.isnan(first), EXPECTED, WHOLE, first.shape)
+    moved = np.roll(first, -12, axis=1)
+    moved[30:33, 60:64] = np.nan  # a hole in the sheet
+    missing = np.isnan(moved)
+    empty = background.observe(missing, EXPECTED, WHOLE, first.shape)
+    assert not empty[30:33, 60:64].any()
+    assert np.array_equal(empty, missing & ~np.pad(np.ones((3, 4), bool), ((30, 39), (60, 76))))
+    seen = classify(moved, PREDICTED, STRAIGHT.fx, empty)
+    row = seen.free_m[36]
+    assert np.all(row[97:102] > 0)
+    assert np.all(np.diff(row[97:102]) > 0)  # farther from the sheet, more to be pushed back
+    assert not row[40:90].any()
+    # Deeper than the object can move between two frames, a missing return is a hole all the same.
+    deep = first.copy()
+    deep[:, 70:] = np.nan
+    deep_seen = classify(deep, PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape))
+    assert deep_seen.hole[36, 80:92].all()
+    assert np.all(deep_seen.free_m[36, 99:102] > 0)
 
 
 def test_a_hole_goes_on_to_the_rim_that_it_reaches():

@@ -1,7 +1,7 @@
 """NURBS deformation: vertices bound to a spline surface whose control points are the parameters (eqs. 2–8)."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -15,6 +15,12 @@ from abs_service.tracker.models.parts import binding, spline
 from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
 
+#: Knot spans along the long side of an object for `control_points = "auto"`.
+SPANS = 4
+
+#: Least number of cells of the mesh's grid in a span; fewer vertices do not determine its control points.
+LEAST_CELLS = 3.0
+
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
 
 
@@ -24,6 +30,8 @@ class Settings:
 
     Attributes:
         control_points: numbers of control points along the object's long and short side; Θ has three values for each.
+            "auto": four knot spans along the long side, each of which bends by some 60° without stretching, as many
+            per length along the short side, fewer where the mesh is too coarse for them.
         degree: polynomial degree of the splines.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
         weights: weight of every control point, a table of as many rows and columns; a larger weight than that of the
@@ -32,13 +40,17 @@ class Settings:
             fit; it has an effect only where the object has no vertices.
     """
 
-    control_points: tuple[ControlPoints, ControlPoints] = (4, 4)
+    control_points: Literal["auto"] | tuple[ControlPoints, ControlPoints] = "auto"
     degree: Annotated[int, Interval(ge=1, le=4)] = 2
     weights: tuple[tuple[Annotated[float, Interval(gt=0, le=1000)], ...], ...] = ()
     margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
     smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
 
     def __post_init__(self) -> None:
+        if self.control_points == "auto":
+            if self.weights:
+                raise ValueError("weights need control_points = [long, short], the numbers of their rows and columns")
+            return
         rows, columns = self.control_points
         if self.weights and [len(row) for row in self.weights] != [columns] * rows:
             given = ", ".join(str(len(row)) for row in self.weights)
@@ -66,16 +78,40 @@ class Settings:
         Raises:
             ModelError: too few control points for the degree, or the mesh cannot be bound to such a surface.
         """
-        if min(self.control_points) <= self.degree:
+        shape = derived_shape(mesh, self.degree) if self.control_points == "auto" else self.control_points
+        if min(shape) <= self.degree:
             raise ModelError(
-                f"control_points = {list(self.control_points)} is too few for degree = {self.degree}: "
+                f"control_points = {list(shape)} is too few for degree = {self.degree}: "
                 f"each direction needs at least {self.degree + 1}"
             )
-        weights = np.array(self.weights) if self.weights else np.ones(self.control_points)
+        weights = np.array(self.weights) if self.weights else np.ones(shape)
         u, w = binding.chart_parameters(mesh, self.margin)
         control = binding.fit_control_points(mesh.vertices, u, w, weights, self.degree, self.smoothing)
         u, w, offset = binding.bind(mesh.vertices, control, weights, self.degree, u, w)
         return Nurbs(mesh, control, weights, self.degree, u, w, offset)
+
+
+def derived_shape(mesh: Mesh, degree: int) -> tuple[int, int]:
+    """Numbers of control points along the long and the short side of a mesh, for `control_points = "auto"`.
+
+    On a narrow strip, two spans across leave room for a twist.
+    """
+    cells = np.ptp(mesh.chart, axis=0)
+    lengths = _side_lengths(mesh)
+    wanted = np.clip(np.round(SPANS * lengths / lengths.max()), 2, SPANS)
+    spans = np.clip(np.floor(cells / LEAST_CELLS), 1, wanted).astype(int)
+    # Three control points are the least that a side may have.
+    return max(int(spans[0]) + degree, 3), max(int(spans[1]) + degree, 3)
+
+
+def _side_lengths(mesh: Mesh) -> NDArray[np.float64]:
+    """Lengths (2,) of the mesh along the axes of its chart, from the typical length of a unit of the chart [m]."""
+    edges = mesh.edges
+    steps = np.abs(mesh.chart[edges[:, 1]] - mesh.chart[edges[:, 0]])
+    lengths = np.linalg.norm(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], axis=1)
+    along = [steps[:, axis] > 10 * steps[:, 1 - axis] for axis in range(2)]
+    units = [np.median(lengths[own] / steps[own, axis]) if own.any() else 1.0 for axis, own in enumerate(along)]
+    return np.ptp(mesh.chart, axis=0) * units
 
 
 class Nurbs:

@@ -1,7 +1,7 @@
 """The negative log-likelihood of all measurements under the sensors' own noise models (eqs. 16–22); no weights."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Interval
@@ -14,6 +14,9 @@ from abs_service.tracker.terms.factory import make_term
 from abs_service.tracker.terms.photometric.texture_registration_noise import Misplacement
 from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
+
+#: Deviation of an outline in a depth image: it is known to a pixel, and its pixels mix object and background [px].
+OUTLINE_PX = 0.5
 
 
 @dataclass(frozen=True)
@@ -28,23 +31,25 @@ class Settings:
         misplacement_px: texture registration noise: standard deviation of the position of the appearance on the mesh,
             in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges, such
             as those of a checkerboard.
-        outline_px: standard deviation of the outline, in pixels of the depth sensor, about 0.5. For sheets, which end
-            at the rim of their mesh; it stops them from sliding along themselves. 0 disables the outline, for bodies
-            whose outline is a silhouette.
+        outline_px: standard deviation of the outline at the free edges of the object, in pixels of the depth sensor;
+            it stops a surface from sliding along itself. "auto" is half a pixel; 0 disables the outline. Edges in
+            contact with another surface, cut by a mask or the image's border, and silhouettes of bodies are found in
+            the first image and have no outline.
     """
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
     misplacement_px: Annotated[float, Ge(0)] = 0.0
-    outline_px: Annotated[float, Interval(ge=0, le=3)] = 0.0
+    outline_px: Literal["auto"] | Annotated[float, Interval(ge=0, le=3)] = "auto"
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
         misplacement = Misplacement(self.misplacement_px)
+        outline_px = OUTLINE_PX if self.outline_px == "auto" else self.outline_px
         return TermSum(
             synthesizer,
             [
-                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement, self.outline_px)
+                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement, outline_px)
                 for sensor in rig.sensors.values()
             ],
         )

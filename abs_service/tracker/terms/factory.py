@@ -8,7 +8,7 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.barrier import BarrierTerm
 from abs_service.tracker.terms.base import Bounds, Term
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.outline import Outline, RimOutline, Unknown
+from abs_service.tracker.terms.depth.outline import NoOutline, Outline, RimOutline
 from abs_service.tracker.terms.depth.rim import Rim
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
@@ -55,4 +55,4 @@ def make_term(
 
 
 def _outline(mesh: Mesh, deviation_px: float) -> Callable[[Camera], Outline]:
-    return partial(RimOutline, rim=Rim.of(mesh), deviation=deviation_px) if deviation_px else lambda camera: Unknown()
+    return partial(RimOutline, rim=Rim.of(mesh), deviation=deviation_px) if deviation_px else lambda camera: NoOutline()

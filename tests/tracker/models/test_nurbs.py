@@ -172,7 +172,7 @@ def test_the_surface_comes_closer_to_a_heavier_control_point():
     gaps = []
     for weight in (0.5, 1.0, 4.0):
         rows = tuple(tuple(weight if (i, j) == (1, 2) else 1.0 for j in range(4)) for i in range(4))
-        model = Settings(weights=rows).of_mesh(MESH)
+        model = Settings((4, 4), weights=rows).of_mesh(MESH)
         np.testing.assert_allclose(model.mesh.vertices[order_of(model.mesh)], MESH.vertices, atol=1e-6)
         theta = model.rest.copy().reshape(4, 4, 3)
         theta[1, 2, 2] -= 0.1
@@ -189,9 +189,29 @@ def test_equal_weights_are_no_weights():
     np.testing.assert_array_equal(weighted.mesh.vertices, plain.mesh.vertices)
 
 
+def test_weights_without_control_points_are_refused():
+    with pytest.raises(ValueError, match=r"weights need control_points = \[long, short\]"):
+        Settings(weights=((1.0,) * 4,) * 4)
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "size", "shape"),
+    [
+        (13, 19, (0.3, 0.2), (6, 5)),
+        (15, 15, (0.2, 0.2), (6, 6)),
+        (5, 25, (0.5, 0.1), (6, 3)),  # four cells across: one span, although a strip twists
+        (9, 46, (0.5, 0.1), (6, 4)),
+        (5, 6, (0.3, 0.2), (3, 3)),  # too coarse a mesh for more
+    ],
+)
+def test_control_points_follow_from_the_proportions_and_the_mesh(rows, columns, size, shape):
+    model = Settings().of_mesh(sheet(rows, columns, flat, size))
+    assert len(model.rest) == 3 * shape[0] * shape[1]
+
+
 @pytest.mark.parametrize("weights", [((1.0,) * 4,) * 3, ((1.0,) * 3,) * 4, ((1.0,) * 4, (1.0,) * 3) * 2])
 def test_weights_that_are_not_one_per_control_point_are_refused(weights):
     with pytest.raises(
         ValueError, match=r"4 rows of 4 numbers, one for each of control_points = \[4, 4\], not rows of"
     ):
-        Settings(weights=weights)
+        Settings((4, 4), weights=weights)

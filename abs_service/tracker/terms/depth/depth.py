@@ -10,6 +10,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
@@ -18,7 +19,7 @@ from abs_service.tracker.terms.depth.depth_cost import (
     usual_cost,
     write_constants,
 )
-from abs_service.tracker.terms.depth.outline import Outline, Unknown
+from abs_service.tracker.terms.depth.outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.visibility import Visibility, classify
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
 from abs_service.tracker.terms.linearization import PointLinearization, Together
@@ -44,7 +45,7 @@ class DepthTerm:
         vertices: int,
         noise: DepthNoise,
         bounds: Bounds,
-        outline: Callable[[Camera], Outline] = lambda camera: Unknown(),
+        outline: Callable[[Camera], Outline] = lambda camera: NoOutline(),
     ):
         self.sensor = sensor
         self._noise = noise
@@ -52,6 +53,7 @@ class DepthTerm:
         self._synthesizer = synthesizer
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
+        self._background = Background()
         # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
         beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
         self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
@@ -72,10 +74,12 @@ class DepthTerm:
         self._view.look(predicted)
         distance = np.empty(texels.shape[:2], np.float32)
         distances(texels, distance)
-        seen = classify(distance, self._view.render(predicted)[window], self._view.camera.fx)
-        doubtful = self._outline.observe(distance, seen, predicted, window)
-        self._window, self._distance, self._foreground = window, distance, seen.foreground
+        expected = self._view.render(predicted)[window]
         height, width = texture.shape[0] - 2, texture.shape[1] - 2
+        empty = self._background.observe(np.isnan(distance), np.isfinite(expected), window, (height, width))
+        seen = classify(distance, expected, self._view.camera.fx, empty)
+        doubtful = self._outline.observe(distance, seen, expected, predicted, window)
+        self._window, self._distance, self._foreground = window, distance, seen.foreground
         self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
         self._doubtful = placed(window, doubtful, height, width).ravel()
         self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)

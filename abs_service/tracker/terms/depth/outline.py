@@ -1,9 +1,11 @@
-"""Outline of a sheet: the rim of its mesh compared with the outline in a depth image.
+"""Outline of the object: the free edges of its mesh compared with the outline in a depth image.
 
-Distances do not constrain a smooth surface that slides along itself; its outline does. The rim belongs on the line
-between the pixels on the object and those beside it.
+Distances do not constrain a smooth surface that slides along itself; its outline does. A free edge belongs on the line
+between the pixels on the object and those beside it. Which stretches of the rim are free edges is found in the first
+image (`rim_classes`).
 """
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import cv2
@@ -15,6 +17,7 @@ from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, locate, outline_cost
+from abs_service.tracker.terms.depth.rim_classes import RimClass, classify_rim
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
@@ -22,8 +25,11 @@ from calib.camera import Camera
 #: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.
 GRACE = 3.0
 
-#: The object goes on beyond the outermost vertices by no more than so many times their distance from the next ones.
-MOST_BEYOND = 2.0
+#: An outer vertex is hidden if the mesh's own surface lies so far in front of it [m].
+HIDDEN_BEHIND_M = 0.01
+
+#: A free edge is off the outline if it is farther from it than so many pixels, and than the bound of its cost.
+OFF_PX = 3.0
 
 
 #: Outer and inner vertices and share of a rim, and what `projection.project` takes of a camera.
@@ -35,13 +41,19 @@ class Outline(Protocol):
     """Cost of the outline in one camera."""
 
     def observe(
-        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
         """Sets the outline from a window of a depth image.
 
         Args:
             distance: measured distances (rows, columns) [m] in the window.
             seen: their classification.
+            expected: distances of the predicted surface there, infinite beside it [m].
             predicted: predicted surface, a population of one.
             window: of the image.
 
@@ -58,12 +70,38 @@ class Outline(Protocol):
         """Normalised residuals of a population of one and their derivatives with respect to theta."""
         ...
 
+    def fit(self, surface: Surface) -> "RimFit":
+        """Agreement of the free edges of a population of one with the outline."""
+        ...
 
-class Unknown:
-    """Null object for bodies without an outline at the mesh's rim: zero cost."""
+
+@dataclass(frozen=True, slots=True)
+class RimFit:
+    """Numbers of outer vertices on the free edges of a mesh.
+
+    Attributes:
+        visible: not behind an occluder, in a hole or behind the mesh's own surface.
+        outside: of these, beside the object: the mesh hangs over the outline.
+        inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
+        occluded: those that are not visible.
+    """
+
+    visible: int = 0
+    outside: int = 0
+    inside: int = 0
+    occluded: int = 0
+
+
+class NoOutline:
+    """Null object for objects whose outline is not compared: zero cost."""
 
     def observe(
-        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
         """Empty mask."""
         return np.zeros(distance.shape, np.bool_)
@@ -76,9 +114,13 @@ class Unknown:
         """No rows."""
         return Linearization(np.zeros(0), np.zeros((0, sparse_jacobian.dimension)))
 
+    def fit(self, surface: Surface) -> RimFit:
+        """No free edges."""
+        return RimFit()
+
 
 class RimOutline:
-    """The rim's distances from the outline are normal with zero mean, and bounded as outliers are.
+    """The distances of the free edges from the outline are normal with zero mean, and bounded as outliers are.
 
     A mesh made from an image ends up to one cell inside the object. The gap is measured in the first image; from then
     on, the rim is that of the mesh extrapolated by this gap.
@@ -87,9 +129,13 @@ class RimOutline:
         camera: the camera.
         rim: outermost vertices.
         deviation: standard deviation of the position of the outline [px].
+
+    Attributes:
+        classes: `RimClass` (k,) of every outer vertex, from the first image; all FREE before it.
     """
 
     def __init__(self, camera: Camera, rim: Rim, deviation: float):
+        self.classes = np.full(len(rim.outer), RimClass.FREE, np.uint8)
         self._camera = camera
         self._projection = Projection(camera)
         self._rim = rim
@@ -97,16 +143,29 @@ class RimOutline:
         self._inwards = np.zeros((0, 0), np.float32)
         self._corner = np.zeros(2, np.float32)
         self._beyond = np.zeros(len(rim.outer), np.float32)
+        self._ends: Ends = (rim.outer, rim.inner, self._beyond)
+        self._hidden = 0
         self._begun = False
 
     def observe(
-        self, distance: NDArray[np.float32], seen: Visibility, predicted: Surface, window: Window = WHOLE
+        self,
+        distance: NDArray[np.float32],
+        seen: Visibility,
+        expected: NDArray[np.float32],
+        predicted: Surface,
+        window: Window = WHOLE,
     ) -> NDArray[np.bool_]:
         """Sets the outline from a window of a depth image; the mask of pixels that serve for the outline only."""
         part, self._inwards = inwards(distance, seen, int(np.ceil(FARTHEST * self._deviation)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
-            self._beyond, self._begun = self._measure(predicted), True
+            points, values, slopes = self._locate(predicted)
+            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, points, values, slopes)
+            self._begun = True
+        free = np.flatnonzero(self.classes == RimClass.FREE)
+        visible = free[~self._is_hidden(free, expected, predicted, window)]
+        self._ends = self._rim.outer[visible], self._rim.inner[visible], self._beyond[visible]
+        self._hidden = len(free) - len(visible)
         beside = np.zeros(distance.shape, np.bool_)
         beside[part] = (seen.free_m[part] > 0) & (self._inwards > -GRACE * self._deviation)
         return beside
@@ -118,39 +177,60 @@ class RimOutline:
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
-        """Normalised residuals of the rim near the outline, and their derivatives with respect to theta."""
+        """Normalised residuals of the free edges near the outline, and their derivatives with respect to theta."""
         points, values, slopes = self._locate(surface)
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
         by_place = project_with_slopes(self._camera, points[use].astype(np.float64))[1]
         rows = np.einsum("vi,vij->vj", slopes[use] / self._deviation, by_place)
-        ends = self._rim.outer[use], self._rim.inner[use], self._beyond[use]
+        outer, inner, beyond = (values[use] for values in self._ends)
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
-        chain(rows, *ends, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, jacobian)
+        of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
+        chain(rows, outer, inner, beyond, *of_points, jacobian)
         return Linearization(residual[use], jacobian)
+
+    def fit(self, surface: Surface) -> RimFit:
+        """Agreement of the free edges of a population of one with the outline."""
+        points = self._locate(surface)[0].astype(np.float64)
+        place = np.floor(self._camera.project(points) - self._corner + 0.5)
+        rows, columns = self._inwards.shape
+        near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
+        away = np.full(len(place), -np.inf)  # the part of the image ends beside the object
+        column, row = place[near].astype(np.intp).T
+        away[near] = self._inwards[row, column]
+        far = max(OFF_PX, FARTHEST * self._deviation)
+        known = ~np.isnan(away)
+        return RimFit(
+            visible=int(np.count_nonzero(known)),
+            outside=int(np.count_nonzero(away < -far)),
+            inside=int(np.count_nonzero(away > far)),
+            occluded=self._hidden + int(np.count_nonzero(~known)),
+        )
 
     @property
     def _arguments(self) -> tuple[*Ends, *Optics, NDArray[np.float32], NDArray[np.float32]]:
         """Arguments of `locate` between the vertices and the results."""
-        ends = self._rim.outer, self._rim.inner, self._beyond
-        return *ends, *self._projection.arguments, self._corner, self._inwards
+        return *self._ends, *self._projection.arguments, self._corner, self._inwards
 
     def _locate(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]:
         """Extrapolated rim (k, 3) [m], its distances inside the outline (k,) [px], and their image gradients (k, 2)."""
-        k = len(self._beyond)
+        k = len(self._ends[0])
         points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
         locate(surface.vertices, *self._arguments, points, values, slopes)
         return points[0].T, values, slopes
 
-    def _measure(self, predicted: Surface) -> NDArray[np.float32]:
-        """Gap (k,) between the mesh's rim and the end of the object, relative to the distance from the inner vertex."""
-        outer, away, slopes = self._locate(predicted)
-        inner = predicted.vertices[0].T[self._rim.inner]
-        steps = self._camera.project(outer.astype(np.float64)) - self._camera.project(inner.astype(np.float64))
-        per_step = -np.einsum("vi,vi->v", slopes, steps)
-        known = per_step > 0
-        beyond = np.where(known, np.clip(away / np.where(known, per_step, 1.0), 0.0, MOST_BEYOND), 0.0)
-        return beyond.astype(np.float32)
+    def _is_hidden(
+        self, which: NDArray[np.intp], expected: NDArray[np.float32], predicted: Surface, window: Window
+    ) -> NDArray[np.bool_]:
+        """True for outer vertices (m,) that lie behind the predicted surface (rows, columns) [m]."""
+        points = predicted.vertices[0].T[self._rim.outer[which]].astype(np.float64)
+        place = np.floor(np.nan_to_num(self._camera.project(points), nan=-1.0) + 0.5).astype(np.intp)
+        column, row = (place - corner(window)[::-1]).T
+        inside = (row >= 0) & (row < expected.shape[0]) & (column >= 0) & (column < expected.shape[1])
+        hidden = np.zeros(len(which), np.bool_)
+        distance = np.linalg.norm(points[inside] - self._camera.center, axis=1)
+        hidden[inside] = expected[row[inside], column[inside]] < distance - HIDDEN_BEHIND_M
+        return hidden
 
 
 def _around(mask: NDArray[np.bool_], reach: int) -> Window:

@@ -10,7 +10,7 @@ from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
 #: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
-FARTHEST = 4.0
+FARTHEST = 8.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

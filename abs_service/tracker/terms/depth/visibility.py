@@ -1,8 +1,8 @@
 """Classification of the pixels of a depth image near the prediction: object, occluder, hole or free space.
 
-A vertex may have no measurement for three reasons. An occluder or a missing return gives no information about the
-deformation. Free space does: the vertex cannot be there, and the distance to the nearest pixel of the object is its
-error.
+A vertex may have no measurement for three reasons. An occluder or a hole in the measurement gives no information about
+the deformation. Free space does: the vertex cannot be there, and the distance to the nearest pixel of the object is its
+error. A missing return is free space where the background gives no return, else a hole.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_segments import connected_surfaces
+from abs_service.tracker.terms.depth.background import DEEPEST_M
 from calib.jit import kernel
 
 #: Measurements this near to the predicted distance show the object; it may have moved by as much since [m].
@@ -39,7 +40,7 @@ class Visibility:
         foreground: shows something before the object.
         hole: no return where the object should be.
         free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
-            the object; 0 elsewhere.
+            the object to a background, measured or without return; 0 elsewhere.
     """
 
     object: NDArray[np.bool_]
@@ -48,7 +49,12 @@ class Visibility:
     free_m: NDArray[np.float32]
 
 
-def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], focal: float) -> Visibility:
+def classify(
+    distance: NDArray[np.float32],
+    predicted: NDArray[np.float32],
+    focal: float,
+    empty: NDArray[np.bool_] | np.bool_ = np.False_,
+) -> Visibility:
     """Classifies the pixels of one depth image by connected surfaces.
 
     If no surface agrees with the prediction, it is the prediction that is wrong, and nothing is classified.
@@ -57,6 +63,7 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
         distance: measured radial distances (height, width) [m], NaN without return.
         predicted: radial distances of the predicted mesh [m], infinite beside it.
         focal: focal length of the camera [px].
+        empty: missing returns (height, width) that show the background, see `Background`.
     """
     distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
     labels, count = connected_surfaces(distance, LARGEST_STEP_M)
@@ -69,9 +76,11 @@ def classify(distance: NDArray[np.float32], predicted: NDArray[np.float32], foca
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
-    hole = _inside(missing, np.isfinite(predicted), near / focal) if missing.any() else nothing
+    hole, past = nothing, nothing
+    if missing.any():
+        hole, past = _holes(missing, np.isfinite(predicted), near / focal, empty)
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, np.where(behind, away, np.float32(0)))
+    return Visibility(shown, foreground, hole, np.where(behind | past, away, np.float32(0)))
 
 
 @kernel
@@ -117,13 +126,26 @@ def _compare(
             missing[row, column] = not np.isfinite(distance[row, column])
 
 
-def _inside(missing: NDArray[np.bool_], expected: NDArray[np.bool_], metres: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Missing returns within the expected outline, and around these, for pixels of a width (height, width) [m]."""
+def _holes(
+    missing: NDArray[np.bool_],
+    expected: NDArray[np.bool_],
+    metres: NDArray[np.float32],
+    empty: NDArray[np.bool_] | np.bool_,
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Missing returns that are holes in the measurement, and those that show the background.
+
+    Args:
+        missing: pixels without return (height, width).
+        expected: pixels inside the expected outline.
+        metres: width of a pixel on the object [m].
+        empty: missing returns that show the background unless they are too deep inside the expected outline.
+    """
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
-        hole = missing & (_depth_inside(expected) * metres > RIM_M)
-        if hole.any():
-            hole |= missing & (_depth_inside(~hole) * metres < 2 * RIM_M)
-    return hole
+        depth = _depth_inside(expected) * metres
+    hole = missing & (depth > np.where(empty, np.float32(DEEPEST_M), np.float32(RIM_M)))
+    if hole.any():
+        hole |= missing & ~empty & (_depth_inside(~hole) * metres < 2 * RIM_M)
+    return hole, empty & ~hole
 
 
 def _extended(predicted: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -1,0 +1,53 @@
+"""Missing returns beside the object: where the background gives no return, a missing return is free space.
+
+A vertex without a measurement is not evidence by itself: the surface may absorb the light. But where the background of
+the first image had no return either, a missing return beside the object shows that background, not a hole.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.window import Window
+
+#: A connected area of missing returns is background if it shares so many pixels with that of the first image.
+LEAST_PIXELS = 10
+
+#: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between
+#: two frames [m].
+DEEPEST_M = 0.03
+
+#: Returns are missing beside the object's edge in any case; so many pixels around it are no background.
+MARGIN_PX = 3
+
+
+class Background:
+    """Where the background gives no return, learnt from the first depth image."""
+
+    def __init__(self) -> None:
+        self._empty = np.zeros((0, 0), np.bool_)
+        self._begun = False
+
+    def observe(
+        self, missing: NDArray[np.bool_], expected: NDArray[np.bool_], window: Window, shape: tuple[int, ...]
+    ) -> NDArray[np.bool_]:
+        """Missing returns (rows, columns) that show the background; the first call learns.
+
+        Args:
+            missing: pixels without return (rows, columns) in the window.
+            expected: silhouette of the predicted mesh there.
+            window: of the image; the first one should be the whole image.
+            shape: of the image (height, width).
+        """
+        if not missing.any():
+            return missing
+        if not self._begun:
+            self._begun = True
+            near = cv2.dilate(expected.view(np.uint8), np.ones((2 * MARGIN_PX + 1, 2 * MARGIN_PX + 1)))
+            self._empty = np.zeros(shape[:2], np.bool_)
+            self._empty[window] = missing & (near == 0)
+        usual = self._empty[window]
+        count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
+        shared = np.bincount(labels[usual & missing], minlength=count)
+        shared[0] = 0
+        return (shared >= LEAST_PIXELS)[labels]

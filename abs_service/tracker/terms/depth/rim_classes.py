@@ -1,0 +1,74 @@
+"""Classes of a mesh's rim in the first depth image: where the object ends, and where only the mesh does."""
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.terms.depth.rim import Rim
+from calib.camera import Camera
+
+#: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
+MOST_BEYOND = 2.0
+
+#: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
+#: wanders over a body as it turns, not the end of a sheet.
+LEAST_COSINE = 0.25
+
+#: Vertices within so many pixels of the image's border may continue beyond it.
+BORDER_PX = 2.0
+
+
+class RimClass(IntEnum):
+    """Reason why the mesh ends at a vertex."""
+
+    FREE = 0  # the object ends: beside it there is a background, or no return
+    CONTACT = 1  # measured surface goes on: another object, or a mask cuts this one
+    SILHOUETTE = 2  # the surface turns away from the sensor
+    OCCLUDED = 3  # an occluder lies before it, or the measurement has a hole
+    BORDER = 4  # the image ends
+
+
+def classify_rim(
+    camera: Camera,
+    rim: Rim,
+    surface: Surface,
+    points: NDArray[np.float32],
+    inside: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
+
+    The gap is relative to the distance from the inner vertex; 0 unless the class is FREE.
+
+    Args:
+        camera: the depth camera.
+        rim: outermost vertices.
+        surface: the mesh in the first image, a population of one.
+        points: outermost vertices (k, 3) [m].
+        inside: their distances inside the outline (k,) [px], huge where unknown.
+        slopes: image gradients of these distances (k, 2).
+    """
+    inner = surface.vertices[0].T[rim.inner].astype(np.float64)
+    # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
+    end_cosine = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner)
+    place = camera.project(points.astype(np.float64))
+    per_step = -np.einsum("ki,ki->k", slopes, place - camera.project(inner))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        beyond = np.where(per_step > 0, inside / per_step, np.inf)
+    classes = np.full(len(beyond), RimClass.FREE, np.uint8)
+    classes[~(beyond <= MOST_BEYOND)] = RimClass.CONTACT
+    classes[end_cosine < LEAST_COSINE] = RimClass.SILHOUETTE
+    classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
+    last = np.array([camera.width, camera.height]) - 1
+    classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
+    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, MOST_BEYOND), 0.0)
+    return classes, gap.astype(np.float32)
+
+
+def _cosine(camera: Camera, surface: Surface, which: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Cosine (k,) between line of sight and normal of vertices."""
+    sight = surface.vertices[0].T[which].astype(np.float64) - camera.center
+    along = np.einsum("ki,ki->k", surface.normals[0].T[which].astype(np.float64), sight)
+    return np.abs(along) / np.linalg.norm(sight, axis=1)
