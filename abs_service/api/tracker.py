@@ -16,6 +16,7 @@ from abs_service.api.arrays import FrameBuilder, object_mask
 from abs_service.api.errors import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
 from abs_service.pairing.observation import ObservationError
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
@@ -213,6 +214,6 @@ class _RegionOrMask:
     def build(self) -> Region:
         return self
 
-    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
+    def select(self, view: DepthView) -> NDArray[np.bool_]:
         region = self._region if self.mask is None else Mask(self.mask)
-        return region.select(points_r, distance)
+        return region.select(view)

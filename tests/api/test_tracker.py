@@ -93,8 +93,9 @@ def test_a_colour_camera_with_a_pose_sees_a_sheet_slide():
     """Depth does not: the sheet fills the image."""
     color = a.Camera(320, 240, fx=300, fy=300, cx=160, cy=120, T_rs=turned(0.1, [0.06, 0.01, 0]))
     sheets = [Sheet(right=0.002 * k, width=1.0, height=0.8) for k in range(6)]
-    depth_only = a.Tracker(CAMERA, a.Rigid(), noise=NOISE)
-    both = a.Tracker(CAMERA, a.Rigid(), noise=NOISE, color=color)
+    region = {"type": "seed", "pixel": [80, 60]}  # for `nearest`, what fills the image is the scene
+    depth_only = a.Tracker(CAMERA, a.Rigid(), noise=NOISE, region=region)
+    both = a.Tracker(CAMERA, a.Rigid(), noise=NOISE, region=region, color=color)
     slid = follow(both, sheets, image=lambda sheet: sheet.image(color))[-1]
     assert (slid.vertices - slid.undeformed)[:, 0].mean() == pytest.approx(0.010, abs=0.001)
     assert set(slid.residuals) == {"depth", "color"}

@@ -66,11 +66,18 @@ def test_objects_of_another_size_are_rejected():
 
 
 def without_object(k: int, frames: list[Frame]) -> list[Frame]:
-    """Nothing but a wall from exposure 20 to 50, and grey light."""
+    """Nothing but a wall with a large opening from exposure 20 to 50, and grey light."""
     if not 20 <= k < 50:
         return frames
-    plain = {Kind.DEPTH: round(1.6 / 5 * 2**14), Kind.AMPLITUDE: 2000, Kind.COLOR: 90}
-    return [dataclasses.replace(frame, data=np.full_like(frame.data, plain[frame.kind])) for frame in frames]
+    return [dataclasses.replace(frame, data=_empty(frame)) for frame in frames]
+
+
+def _empty(frame: Frame) -> np.ndarray:
+    wall, opening = (round(z / 5 * 2**14) for z in (1.6, 3.2))
+    data = np.full_like(frame.data, {Kind.DEPTH: wall, Kind.AMPLITUDE: 2000, Kind.COLOR: 90}[frame.kind])
+    if frame.kind == Kind.DEPTH:
+        data[:, : data.shape[1] * 11 // 20] = opening
+    return data
 
 
 def test_a_returning_object_is_reinitialized_with_a_new_mesh():

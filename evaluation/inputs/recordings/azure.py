@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.report.content import Column, Section, Table
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.models import nurbs
 from abs_service.tracking.session import TrackingSession
@@ -98,7 +99,7 @@ def findings(folder: Path) -> Findings:
     if tracking.mesh is None:
         raise RuntimeError(", ".join(estimate.reasons))
     camera = exposure.cameras["depth"]
-    mask = nearest.Settings(least_pixels=3000).select(camera.unproject(exposure.distance), exposure.distance)
+    mask = plan.region.build().select(DepthView.of(exposure.distance, camera))
     found = agreement(estimate.vertices, tracking.mesh.faces, exposure.distance, mask, camera)
     columns = (Column("nearest surface"), Column("pixels", format="d"), Column("forward", "mm", ".2f"))
     columns += (Column("backward", "mm", ".2f"), Column("covered", "%", ".1f"), Column("status"))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_segments import connected_surfaces
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.synthesis.rasterization.raster import Raster
@@ -77,8 +78,8 @@ class _Surface:
     def build(self) -> "_Surface":
         return self
 
-    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
-        labels, _ = connected_surfaces(distance, LARGEST_STEP_M)
+    def select(self, view: DepthView) -> NDArray[np.bool_]:
+        labels, _ = connected_surfaces(view.distance, LARGEST_STEP_M)
         return labels == self.label
 
 

@@ -127,13 +127,13 @@ def test_an_object_of_a_single_pixel_is_an_error():
 def test_nothing_in_sight_is_an_error():
     nothing = observation(tof=depth_image(np.full((144, 176), np.nan)))
     with pytest.raises(DetectionError, match="no connected surface"):
-        detect_object(nothing, RIG, "tof", nearest.Settings(), 300)
+        detect_object(nothing, RIG, "tof", nearest.Settings().build(), 300)
 
 
 def test_without_a_depth_image_there_is_no_mesh_yet():
     for seen in (observation(), observation(color=gradient_image())):
         with pytest.raises(DetectionError, match="no depth image from tof yet"):
-            detect_object(seen, RIG, "tof", nearest.Settings(), 300)
+            detect_object(seen, RIG, "tof", nearest.Settings().build(), 300)
 
 
 def gradient_image() -> ColorImage:

@@ -1,13 +1,17 @@
-"""Regions select the pixels of the object."""
+"""The regions nearest, box and mask select the pixels of the object."""
 
 import cv2
 import numpy as np
 import pytest
 
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions import box, mask, nearest
+from calib import pose
+from calib.camera import Camera
 
 SHAPE = (48, 64)
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
 
 
 def scene(*parts: tuple[slice, slice, float], background: float = 2.0) -> np.ndarray:
@@ -18,7 +22,12 @@ def scene(*parts: tuple[slice, slice, float], background: float = 2.0) -> np.nda
 
 
 def selected(region, distance):
-    return region.build().select(np.zeros((*SHAPE, 3)), distance)
+    return region.build().select(DepthView.of(distance, CAMERA))
+
+
+def selected_of(region, points):
+    """The pixels that a region selects of points in the rig."""
+    return region.build().select(DepthView(points, np.ones(SHAPE, np.float32), CAMERA))
 
 
 NEAR = (slice(10, 30), slice(5, 25), 1.0)
@@ -57,6 +66,26 @@ def test_the_largest_step_decides_what_is_connected():
     assert not selected(nearest.Settings(largest_step_m=0.02), stair)[20, 40]
 
 
+@pytest.mark.parametrize("rows", [slice(0, 48), slice(20, 48), slice(3, 45)])
+def test_a_surface_that_spans_most_of_the_image_is_the_scene(rows):
+    table = scene((rows, slice(0, 60), 1.0))  # no returns in the last columns
+    table[:, 60:] = np.nan
+    with pytest.raises(DetectionError, match=r'the scene, not an object .* region.type to "above_plane" .* "seed"'):
+        selected(nearest.Settings(), table)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        (slice(4, 44), slice(7, 58), 1.0),  # a sheet that fills two thirds of the image
+        (slice(17, 31), slice(0, 64), 1.0),  # a band across the image
+    ],
+)
+@pytest.mark.parametrize("background", [2.0, np.nan])
+def test_a_large_object_is_no_scene(part, background):
+    assert selected(nearest.Settings(), scene(part, background=background))[25, 30]
+
+
 def test_an_empty_image_has_no_surface():
     with pytest.raises(DetectionError, match="least_pixels = 200"):
         selected(nearest.Settings(), np.full(SHAPE, np.nan, np.float32))
@@ -70,8 +99,7 @@ def grid_points() -> np.ndarray:
 def test_a_box_selects_the_points_in_it():
     points = grid_points()
     points[20, 20] = np.nan
-    region = box.Settings((0.25, 0.25, 0.9), (0.5, 0.75, 1.1)).build()
-    inside = region.select(points, np.ones(SHAPE, np.float32))
+    inside = selected_of(box.Settings((0.25, 0.25, 0.9), (0.5, 0.75, 1.1)), points)
     expected = np.zeros(SHAPE, bool)
     expected[12:37, 16:33] = True
     expected[20, 20] = False
@@ -81,7 +109,24 @@ def test_a_box_selects_the_points_in_it():
 def test_an_empty_box_is_an_error():
     region = box.Settings((0.25, 0.25, 2.0), (0.5, 0.75, 3.0))
     with pytest.raises(DetectionError, match=r"\[0.25, 0.25, 2.0\] … \[0.5, 0.75, 3.0\] holds no surface"):
-        region.select(grid_points(), np.ones(SHAPE, np.float32))
+        selected_of(region, grid_points())
+
+
+def test_a_box_is_turned_about_its_centre():
+    points = grid_points()
+    center, turn = np.array([0.5, 0.5, 1.0]), [0.1, -0.2, 0.6]
+    inside = selected_of(box.Settings((0.3, 0.4, 0.8), (0.7, 0.6, 1.2), rotation=(0.1, -0.2, 0.6)), points)
+    across = (points - center) @ pose.from_rotation_vector(turn, [0, 0, 0])[:3, :3]
+    np.testing.assert_array_equal(inside, np.all(np.abs(across) <= (0.2, 0.1, 0.2), axis=-1))
+    assert inside[24, 32]
+    assert inside[24 + 5, 32 + 9]  # along the turned long side
+    assert not inside[24 - 5, 32 + 9]
+
+
+def test_an_empty_turned_box_says_how_it_is_turned():
+    region = box.Settings((0.25, 0.25, 2.0), (0.5, 0.75, 3.0), rotation=(0.0, 0.0, 0.5))
+    with pytest.raises(DetectionError, match=r"turned by \[0.0, 0.0, 0.5\] rad holds no surface"):
+        selected_of(region, grid_points())
 
 
 @pytest.mark.parametrize("highest", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0)])
@@ -116,7 +161,7 @@ def test_a_mask_selects_what_was_drawn_and_returned(tmp_path, channels):
 def test_a_mask_of_another_size_is_an_error(tmp_path):
     path, _ = drawn(tmp_path, 1)
     with pytest.raises(DetectionError, match=r"mask is \(64, 48\) pixels, the depth image \(32, 24\)"):
-        mask.Settings(path).build().select(np.zeros((24, 32, 3)), np.ones((24, 32), np.float32))
+        mask.Settings(path).build().select(DepthView.of(np.ones((24, 32), np.float32), Camera(32, 24, 30, 30, 16, 12)))
 
 
 def test_a_mask_over_nothing_is_an_error(tmp_path):

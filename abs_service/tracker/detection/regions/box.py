@@ -1,11 +1,15 @@
 """A box in rig coordinates."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.within import Restricted, restricted
+from calib import pose
 
 LEAST_PIXELS = 16
 
@@ -15,11 +19,15 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        lowest, highest: opposite corners (x, y, z) of the box in the rig's frame [m].
+        lowest, highest: opposite corners (x, y, z) of the box in the rig's frame before it is turned [m].
+        rotation: rotation vector that turns the box about its centre, in the rig's frame [rad].
+        within: mask image as of the region `mask`; pixels outside are ignored.
     """
 
     lowest: tuple[float, float, float]
     highest: tuple[float, float, float]
+    rotation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    within: Path | None = None
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.lowest, self.highest)):
@@ -27,14 +35,18 @@ class Settings:
                 f"lowest = {list(self.lowest)} must be below highest = {list(self.highest)} on every axis"
             )
 
-    def build(self) -> "Settings":
-        """The region itself: its TOML keys are its fields."""
-        return self
+    def build(self) -> Restricted:
+        """The region; DetectionError if `within` is missing or no image."""
+        return restricted(self._inside, self.within)
 
-    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Pixels (height, width) whose points lie inside the box."""
+    def _inside(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) whose points lie inside the box; DetectionError if there are too few."""
+        lowest, highest = np.array(self.lowest), np.array(self.highest)
+        T_rb = pose.from_rotation_vector(self.rotation, (lowest + highest) / 2)  # b: the box, origin in its centre
         with np.errstate(invalid="ignore"):
-            inside = np.all((points_r >= self.lowest) & (points_r <= self.highest), axis=-1)
+            points_b = pose.transform(pose.inverse(T_rb), view.points_r)
+            inside = np.all(np.abs(points_b) <= (highest - lowest) / 2, axis=-1) & view.measured
         if np.count_nonzero(inside) < LEAST_PIXELS:
-            raise DetectionError(f"the box {list(self.lowest)} … {list(self.highest)} holds no surface")
+            turned = f" turned by {list(self.rotation)} rad" if any(self.rotation) else ""
+            raise DetectionError(f"the box {list(self.lowest)} … {list(self.highest)}{turned} holds no surface")
         return inside

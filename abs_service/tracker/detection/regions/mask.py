@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.within import load_mask
 
 LEAST_PIXELS = 16
 
@@ -29,12 +30,7 @@ class Settings:
         Raises:
             DetectionError: the file is missing or no image.
         """
-        image = cv2.imread(str(self.file), cv2.IMREAD_UNCHANGED)
-        if image is None:
-            raise DetectionError(f"file = {str(self.file)!r} is missing or no image")
-        if image.ndim == 3:
-            image = image[..., 3] if image.shape[2] == 4 else image.max(axis=2)
-        return Mask(image > 0)
+        return Mask(load_mask(self.file, "file"))
 
 
 class Mask:
@@ -43,11 +39,13 @@ class Mask:
     def __init__(self, mask: NDArray[np.bool_]):
         self._mask = mask
 
-    def select(self, points_r: NDArray[np.float64], distance: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Pixels (height, width) of the mask that have a return."""
-        if self._mask.shape != distance.shape:
-            raise DetectionError(f"the mask is {self._mask.shape[::-1]} pixels, the depth image {distance.shape[::-1]}")
-        inside = self._mask & np.isfinite(distance)
+    def select(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the mask that have a return.
+
+        Raises:
+            DetectionError: the mask has another size than the image, or no return.
+        """
+        inside = limited(view, self._mask).measured
         if np.count_nonzero(inside) < LEAST_PIXELS:
             raise DetectionError("the mask holds no surface")
         return inside

@@ -1,0 +1,93 @@
+"""What lies or stands on the dominant plane: objects on a table, or before a wall."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.depth_segments import large_surfaces, surface_at
+from abs_service.tracker.detection.depth_view import DepthView, limited
+from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.within import Restricted, restricted
+from calib.noise.base import NoiseError
+from calib.sequences import plane
+
+#: Minimum share of the returns on a plane for it to be what the object lies on.
+LEAST_SHARE = 0.2
+
+#: Number of pixels of the subsampled image in which the plane is found; more are slower but not more accurate.
+MOST_PIXELS = 20_000
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the region.
+
+    Attributes:
+        clearance_m: height above the plane up to which a pixel belongs to it [m]; several standard deviations of the
+            distances there.
+        seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface.
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
+    """
+
+    clearance_m: Annotated[float, Gt(0)] = 0.01
+    seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
+    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    least_pixels: Annotated[int, Ge(16)] = 200
+    within: Path | None = None
+
+    def build(self) -> Restricted:
+        """The region; DetectionError if `within` is missing or no image."""
+        return Restricted(self._above, restricted(self._selected, self.within).select)
+
+    def _above(self, view: DepthView) -> DepthView:
+        """The view without the plane and what is beyond it; DetectionError if there is no plane."""
+        q = _dominant_plane(view, self.clearance_m)
+        height = _height(view, q)
+        with np.errstate(invalid="ignore"):
+            share = np.count_nonzero(np.abs(height) <= self.clearance_m) / np.count_nonzero(view.measured)
+            above = height > self.clearance_m
+        if share < LEAST_SHARE:
+            raise DetectionError(
+                f"no plane: the largest has {share:.0%} of the returns within clearance_m = {self.clearance_m:g} m, "
+                f"{LEAST_SHARE:.0%} needed"
+            )
+        return limited(view, above)
+
+    def _selected(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the object among those above the plane; DetectionError if there is none."""
+        try:
+            if self.seed is not None:
+                return surface_at(self.seed, view.distance, self.largest_step_m, self.least_pixels)
+            labels, large = large_surfaces(view.distance, self.largest_step_m, self.least_pixels)
+        except DetectionError as error:
+            raise DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}") from None
+        return labels == large[0]
+
+
+def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:
+    """The plane q (3,) [1/m] with the most pixels within a tolerance [m]: q · X = 1 in the sensor's frame.
+
+    The generator is seeded, so that the same image has the same plane.
+
+    Raises:
+        DetectionError: there is no plane.
+    """
+    step = int(np.ceil(np.sqrt(view.distance.size / MOST_PIXELS)))
+    distance, rays = view.distance[::step, ::step], view.camera.rays()[::step, ::step]
+    tolerances = np.full(distance.shape, tolerance)
+    try:
+        return plane.find(distance, rays, np.isfinite(distance), tolerances, np.random.default_rng(0))[0]
+    except NoiseError:
+        raise DetectionError(f"no plane: too few returns within clearance_m = {tolerance:g} m of one") from None
+
+
+def _height(view: DepthView, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Height (height, width) [m] of every pixel above a plane, positive on the camera's side; NaN without return."""
+    points_s = view.camera.rays() * view.distance[..., None]
+    return (1 - points_s @ q) / np.linalg.norm(q)

@@ -1,0 +1,50 @@
+"""The largest connected surface within a range of distances."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from annotated_types import Ge, Gt
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.depth_segments import large_surfaces
+from abs_service.tracker.detection.depth_view import DepthView, limited
+from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.within import Restricted, restricted
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the region.
+
+    Attributes:
+        farthest_m, nearest_m: range of the radial distances of the object [m].
+        largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
+        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        within: mask image as of the region `mask`; pixels outside are ignored.
+    """
+
+    farthest_m: Annotated[float, Gt(0)]
+    nearest_m: Annotated[float, Ge(0)] = 0.0
+    largest_step_m: Annotated[float, Gt(0)] = 0.04
+    least_pixels: Annotated[int, Ge(16)] = 200
+    within: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not self.nearest_m < self.farthest_m:
+            raise DetectionError(f"nearest_m = {self.nearest_m} must be below farthest_m = {self.farthest_m}")
+
+    def build(self) -> Restricted:
+        """The region; DetectionError if `within` is missing or no image."""
+        return restricted(self._largest, self.within)
+
+    def _largest(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the largest connected surface in the range; DetectionError if there is none."""
+        with np.errstate(invalid="ignore"):
+            in_range = (view.distance >= self.nearest_m) & (view.distance <= self.farthest_m)
+        try:
+            labels, large = large_surfaces(limited(view, in_range).distance, self.largest_step_m, self.least_pixels)
+        except DetectionError as error:
+            raise DetectionError(f"from {self.nearest_m:g} to {self.farthest_m:g} m: {error}") from None
+        return labels == large[0]

@@ -1,0 +1,61 @@
+"""Mask images, and regions that are limited to one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.depth_view import DepthView, limited
+from abs_service.tracker.detection.initial_detection import DetectionError
+
+#: Pixels (height, width) of the object in a view.
+Select = Callable[[DepthView], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True, eq=False)
+class Restricted:
+    """A region made of two steps: the view is limited, then the object's pixels are selected from what is left."""
+
+    limit: Callable[[DepthView], DepthView]
+    selection: Select
+
+    def select(self, view: DepthView) -> NDArray[np.bool_]:
+        """Pixels (height, width) of the object; DetectionError if there is none."""
+        return self.selection(self.limit(view))
+
+
+def restricted(selection: Select, within: Path | None) -> Restricted:
+    """The region of a selection that ignores all pixels outside a mask image.
+
+    Args:
+        selection: selects the object's pixels in a limited view.
+        within: the mask image, see `load_mask`; None for the entire view.
+
+    Raises:
+        DetectionError: the file is missing or no image.
+    """
+    if within is None:
+        return Restricted(lambda view: view, selection)
+    mask = load_mask(within, "within")
+    return Restricted(lambda view: limited(view, mask), selection)
+
+
+def load_mask(file: Path, key: str) -> NDArray[np.bool_]:
+    """Pixels (height, width) where an image's alpha channel, or without one its brightness, is not zero.
+
+    Args:
+        file: the image.
+        key: TOML key that names it, for messages.
+
+    Raises:
+        DetectionError: the file is missing or no image.
+    """
+    image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise DetectionError(f"{key} = {str(file)!r} is missing or no image")
+    if image.ndim == 3:
+        image = image[..., 3] if image.shape[2] == 4 else image.max(axis=2)
+    return np.asarray(image > 0)
