@@ -42,6 +42,12 @@ class ReferenceFrame:
     mask: NDArray[np.bool_]
     edges: NDArray[np.uint8]
 
+    @property
+    def grey(self) -> NDArray[np.uint8]:
+        """Brightness (height, width) of the colour image."""
+        color = next(frame for frame in self.frames.frames.values() if frame.kind == Kind.COLOR)
+        return np.asarray(cv2.cvtColor(np.ascontiguousarray(color.data, np.uint8), cv2.COLOR_BGR2GRAY), np.uint8)
+
 
 @dataclass(frozen=True, eq=False)
 class TrackedFrame:
@@ -49,12 +55,14 @@ class TrackedFrame:
 
     Attributes:
         index: of the frame set.
+        rest: vertices of the undeformed mesh (n, 3) [m].
         solve_ms: time that the tracker took [ms].
     """
 
     index: int
     estimate: Estimate
     faces: NDArray[np.int32]
+    rest: NDArray[np.float64]
     agreement: Agreement
     solve_ms: float
 
@@ -68,12 +76,14 @@ class Toy:
     """The sequence in memory.
 
     Args:
-        folder: with depth_mm_*.png, color_*.png and seg_*.png, the object's mask: the toy and the hand on it.
+        folder: with depth_mm_*.png, color_*.png and masks.
         frames: how many frames, from the first one on.
+        mask: name of the object's masks: seg_*.png, the toy and the hand on it, or sponge_*.png, the sponge alone.
     """
 
-    def __init__(self, folder: Path, frames: int):
-        depth, color, masks = (by_number(folder, f"{name}_*.png", RATE_HZ)[:frames] for name in _NAMES)
+    def __init__(self, folder: Path, frames: int, mask: str = "seg"):
+        names = ("depth_mm", "color", mask)
+        depth, color, masks = (by_number(folder, f"{name}_*.png", RATE_HZ)[:frames] for name in names)
         images = ImageFolder({"depth": DepthImages(depth, CAMERA, 0.001), "color": ColorImages(color, CAMERA)})
         text = resources.files(__name__.rpartition(".")[0]).joinpath("toy.toml").read_text(encoding="utf-8")
         self._settings = config.loads(text.replace("mask.png", masks[0].path.resolve().as_posix()), "toy.toml", folder)
@@ -113,12 +123,9 @@ class Toy:
             solve_ms = (clock() - begin_ns) * 1e-6
             if tracking.mesh is None:
                 raise RuntimeError(f"frame {index}: {', '.join(estimate.reasons)}")
-            faces = tracking.mesh.faces
-            found = agreement(estimate.vertices, faces, reference.distance, reference.mask, CAMERA)
-            yield TrackedFrame(index, estimate, faces, found, solve_ms)
-
-
-_NAMES = ("depth_mm", "color", "seg")
+            mesh = tracking.mesh
+            found = agreement(estimate.vertices, mesh.faces, reference.distance, reference.mask, CAMERA)
+            yield TrackedFrame(index, estimate, mesh.faces, mesh.vertices, found, solve_ms)
 
 
 def medians(frames: Sequence[TrackedFrame]) -> Agreement:
@@ -154,4 +161,4 @@ def _mask(path: Path) -> NDArray[np.bool_]:
     image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise FileNotFoundError(path)
-    return np.asarray(image)[..., 3] > 0
+    return (np.asarray(image)[..., 3] if image.ndim == 3 else np.asarray(image)) > 0

@@ -1,4 +1,4 @@
-"""Real recordings: a toy that a hand squeezes, an O3R's own σ, an Azure Kinect; and what the figures are made of."""
+"""Real recordings: a toy, a sponge, a sheet, an O3R's own σ, an Azure Kinect; and what the figures are made of."""
 
 import time
 import tomllib
@@ -11,7 +11,16 @@ import pytest
 from calib.camera import Camera
 from evaluation.experiment import Context, UnavailableError
 from evaluation.inputs import recordings
-from evaluation.inputs.recordings import azure, dropouts, sigma_image, sigma_report, toy
+from evaluation.inputs.recordings import (
+    azure,
+    dropouts,
+    kinect_paper,
+    kinect_paper_report,
+    sigma_image,
+    sigma_report,
+    sponge_report,
+    toy,
+)
 from evaluation.inputs.recordings.agreement import agreement
 
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
@@ -67,6 +76,25 @@ def test_a_real_toy_is_tracked_within_the_goals(shared_data: Path) -> None:
     assert max(least.forward_mm, least.backward_mm) < 2
     assert usual.covered > 0.85
     assert least.inside > 0.95
+
+
+@pytest.mark.slow
+def test_a_real_sponge_keeps_its_mesh(shared_data: Path) -> None:
+    found = sponge_report.findings(folder(shared_data, toy.FOLDER), 6, lambda text: None).values["sponge"]
+    assert max(*found["forward_mm"], *found["backward_mm"]) < 1
+    assert max(found["off"]) == 0
+    assert found["drift_px"][0] == pytest.approx(0, abs=1e-3)  # corners are bound where they are seen
+    assert max(found["drift_px"]) < 0.5
+    assert min(found["corners"]) >= 10
+
+
+@pytest.mark.slow
+def test_real_paper_is_where_it_was_measured(shared_data: Path) -> None:
+    found = kinect_paper_report.findings(folder(shared_data, kinect_paper.FOLDER), 3, 1, lambda text: None)
+    run = found.values["kinect_paper"][kinect_paper.CELLS[0].name]
+    assert run["number"] == [16, 24]
+    assert run["status"] == ["TRACKING", "TRACKING"]
+    assert max(run["median_mm"]) < 3
 
 
 @pytest.mark.slow

@@ -1,0 +1,209 @@
+"""A real sheet of paper that two hands bend before a Kinect v1, with material points that were measured beside it.
+
+The images have no licence, so neither they nor parts of them are in this repository, and pictures show their edges
+only.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+import abs_service as a
+from evaluation.inputs.recordings.binding import Binding, Points, bind
+
+FOLDER = "sl_kinect_paper"
+
+#: From the data's own description; colour and depth images have the same camera.
+CAMERA = a.Camera(640, 480, fx=528.0144, fy=528.0144, cx=320.0, cy=240.0)
+RATE_HZ = 30.0
+
+#: z of a wall behind the sheet [m], where the data has no background.
+WALL_M = 0.85
+
+#: χ² of three degrees of freedom that holds 95 %.
+CHI2_95 = 7.815
+
+#: A frame is wrong if its median error is above this many of its own claimed σ, and above this [mm].
+WRONG_SIGMA, WRONG_MM = 3.0, 5.0
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One way of tracking the sheet: with colours or without, before a wall or nothing, with which model."""
+
+    color: bool
+    wall: bool
+    model: str
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{'colour + depth' if self.color else 'depth only'}, {'wall' if self.wall else 'no wall'}, {self.model}"
+
+    def tracker(self) -> a.Tracker:
+        """A tracker with the defaults of a user, of whom only cameras and model are asked."""
+        model = a.Nurbs(4, 4) if self.model == "nurbs" else a.FlexPad()
+        return a.Tracker(depth=CAMERA, color=CAMERA if self.color else None, model=model)
+
+
+CELLS = tuple(Cell(*one) for one in product((True, False), (True, False), ("nurbs", "flexpad")))
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """Measured material points (frames, n, 3) [m] in the frames of these numbers, and σ of every coordinate [m]."""
+
+    numbers: tuple[int, ...]
+    points: Points
+    sigma: float
+
+
+@dataclass(frozen=True)
+class MaterialErrors:
+    """Errors of the bound points in one frame with a truth; NaN if the tracker has lost its mesh.
+
+    Attributes:
+        number: of the frame.
+        status: of the estimate.
+        median_mm, p95_mm, largest_mm: distance of the points from the measured ones [mm].
+        across_mm: median distance along the normal of the mesh [mm]: what is not sliding.
+        claimed_mm: σ of a coordinate by the estimate's covariances, root mean square [mm].
+        inside: share of the points in their own 95 % region, by the claimed covariance and the truth's σ.
+        inside_twice: the same with the truth's σ twice, since the points were bound to measured places, too.
+    """
+
+    number: int
+    status: a.Status
+    median_mm: float
+    p95_mm: float
+    largest_mm: float
+    across_mm: float
+    claimed_mm: float
+    inside: float
+    inside_twice: float
+
+    @property
+    def wrong(self) -> bool:
+        """True if the error is above what the estimate claims, and it is said to be TRACKING."""
+        bound = np.fmax(WRONG_SIGMA * self.claimed_mm, WRONG_MM)
+        return self.status == a.Status.TRACKING and bool(self.median_mm > bound)
+
+
+@dataclass(frozen=True, eq=False)
+class PaperRun:
+    """One cell, tracked.
+
+    Attributes:
+        errors: in every frame with a truth after the first, in which the points are bound.
+        bound, beyond: how many of the measured points are bound, and how many are beyond the mesh.
+        tracking: share of all frames that are TRACKING.
+        solve_ms: CPU time of every frame but the first [ms].
+        shown: estimates of the first and the last frame with a truth.
+    """
+
+    cell: Cell
+    errors: tuple[MaterialErrors, ...]
+    bound: int
+    beyond: int
+    tracking: float
+    solve_ms: NDArray[np.float64]
+    shown: tuple[a.Estimate, a.Estimate]
+
+
+class UnboundError(RuntimeError):
+    """The sheet is not found in the first frame."""
+
+
+def truth(folder: Path, frames: int) -> Truth:
+    """The measured points of the first frames that have some."""
+    with np.load(folder / "truth.npz") as stored:
+        numbers, points = stored["frames"][:frames], stored["points_mm"][:frames] * 1e-3
+        return Truth(tuple(int(number) for number in numbers), points, float(stored["sigma_mm"]) * 1e-3)
+
+
+def images(folder: Path, cell: Cell, last: int) -> Iterator[tuple[int, Points, NDArray[np.uint8] | None]]:
+    """Number, z (height, width) [m] and colours (height, width, 3) of every frame up to a number."""
+    for path in sorted(folder.glob("depth_*.png")):
+        number = int(path.stem.removeprefix("depth_"))
+        if number <= last:
+            depth_m = _image(path, cv2.IMREAD_UNCHANGED) * 0.0001
+            if cell.wall:
+                depth_m[depth_m == 0] = WALL_M  # nothing is missing within the sheet
+            yield number, depth_m, color(folder, number) if cell.color else None
+
+
+def color(folder: Path, number: int) -> NDArray[np.uint8]:
+    """Red, green, blue (height, width, 3) of a frame."""
+    return np.asarray(_image(folder / f"color_{number:06d}.jpg", cv2.IMREAD_COLOR_RGB), np.uint8)
+
+
+def follow(folder: Path, cell: Cell, known: Truth, clock: Callable[[], int] = time.process_time_ns) -> PaperRun:
+    """Tracks the sheet and compares it with the truth.
+
+    Raises:
+        UnboundError: the sheet is not found in the first frame.
+    """
+    tracker = cell.tracker()
+    tracker.warm_up()
+    estimates: dict[int, a.Estimate] = {}
+    solve_ms = []
+    for number, depth_m, image in images(folder, cell, known.numbers[-1]):
+        begin_ns = clock()
+        estimates[number] = tracker.track(depth_m, time_s=number / RATE_HZ, image=image)
+        solve_ms.append((clock() - begin_ns) * 1e-6)
+    first, last = (estimates[known.numbers[k]] for k in (0, -1))
+    if not len(first.faces):
+        raise UnboundError(f"{cell.name}: {', '.join(first.reasons)}")
+    binding = bind(known.points[0], first.vertices, first.faces)
+    errors = tuple(
+        _errors(number, binding, estimates[number], points, known.sigma, first.mesh_version)
+        for number, points in zip(known.numbers[1:], known.points[1:], strict=True)
+    )
+    bound, tracking = int(binding.bound.sum()), [one.status == a.Status.TRACKING for one in estimates.values()]
+    beyond, times = len(binding.bound) - bound, np.array(solve_ms[1:])
+    return PaperRun(cell, errors, bound, beyond, float(np.mean(tracking)), times, (first, last))
+
+
+def _errors(
+    number: int, binding: Binding, estimate: a.Estimate, points: Points, sigma: float, version: int
+) -> MaterialErrors:
+    if estimate.mesh_version != version or not np.isfinite(estimate.vertices).all():
+        nan = float("nan")
+        return MaterialErrors(number, estimate.status, nan, nan, nan, nan, nan, 0.0, 0.0)
+    found = binding.points(estimate.vertices)
+    covariance = binding.covariance(estimate.vertex_covariance)
+    error = found - points[binding.bound]
+    size = np.linalg.norm(error, axis=1) * 1e3
+    across = np.einsum("ki,ki->k", error, binding.normals(estimate.vertices))
+    return MaterialErrors(
+        number=number,
+        status=estimate.status,
+        median_mm=float(np.median(size)),
+        p95_mm=float(np.quantile(size, 0.95)),
+        largest_mm=float(size.max()),
+        across_mm=float(np.median(np.abs(across)) * 1e3),
+        claimed_mm=float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3) * 1e3),
+        inside=share_inside(error, covariance + sigma**2 * np.eye(3)),
+        inside_twice=share_inside(error, covariance + 2 * sigma**2 * np.eye(3)),
+    )
+
+
+def share_inside(error: Points, covariance: Points) -> float:
+    """Share of the errors (n, 3) that are in the 95 % region of their covariances (n, 3, 3); NaN is outside."""
+    known = np.isfinite(covariance).all(axis=(1, 2))
+    squared = np.einsum("ki,ki->k", error[known], np.linalg.solve(covariance[known], error[known][..., None])[..., 0])
+    return float((squared <= CHI2_95).sum() / len(error))
+
+
+def _image(path: Path, flags: int) -> NDArray[Any]:
+    image = cv2.imread(str(path), flags)
+    if image is None:
+        raise FileNotFoundError(path)
+    return np.asarray(image)
