@@ -16,21 +16,27 @@ WINDOW_PX, LEVELS = 11, 2
 RETURN_PX = 0.5
 
 
-def tracks(images: Sequence[NDArray[np.uint8]], masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.float64]:
-    """Positions (frames, n, 2) [px] of the corners that the object shows in the first image; NaN once one is lost.
+def corners(image: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Corners (n, 2) [px] of an image (height, width) inside an object's mask (height, width), not at its rim."""
+    within = cv2.erode(mask.astype(np.uint8), np.ones((2 * RIM_PX + 1,) * 2, np.uint8))
+    found = cv2.goodFeaturesToTrack(image, CORNERS, QUALITY, APART_PX, mask=within)
+    return np.zeros((0, 2), np.float32) if found is None else np.asarray(found, np.float32).reshape(-1, 2)
 
-    Optical flow (Lucas and Kanade) from every image to the next and back. A corner that leaves the object's mask is
-    lost: something covers it, or it has slid.
+
+def tracks(
+    images: Sequence[NDArray[np.uint8]], masks: Sequence[NDArray[np.bool_]], places: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Positions (frames, n, 2) [px] of what is at some places (n, 2) [px] of the first image; NaN once it is lost.
+
+    Optical flow (Lucas and Kanade) from every image to the next and back. What leaves the object's mask is lost:
+    something covers it, or it has slid.
 
     Args:
         images: brightness (height, width) of every frame.
         masks: the object's pixels (height, width) in every frame.
+        places: corners, or other places that differ from their surroundings.
     """
-    within = cv2.erode(masks[0].astype(np.uint8), np.ones((2 * RIM_PX + 1,) * 2, np.uint8))
-    corners = cv2.goodFeaturesToTrack(images[0], CORNERS, QUALITY, APART_PX, mask=within)
-    if corners is None:
-        return np.zeros((len(images), 0, 2))
-    found = [np.asarray(corners, np.float32).reshape(-1, 2)]
+    found = [np.asarray(places, np.float32)]
     for before, after, mask in zip(images[:-1], images[1:], masks[1:], strict=True):
         found.append(_tracked(before, after, mask, found[-1]))
     return np.array(found, np.float64)

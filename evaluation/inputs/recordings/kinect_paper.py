@@ -7,7 +7,7 @@ only.
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import abs_service as a
+from evaluation.inputs.recordings import features
 from evaluation.inputs.recordings.binding import Binding, Points, bind
 
 FOLDER = "sl_kinect_paper"
@@ -67,14 +68,14 @@ class Truth:
 
 @dataclass(frozen=True)
 class MaterialErrors:
-    """Errors of the bound points in one frame with a truth; NaN if the tracker has lost its mesh.
+    """Errors of the bound points in one frame with a truth; NaN if the tracker has made another mesh.
 
     Attributes:
         number: of the frame.
         status: of the estimate.
         median_mm, p95_mm, largest_mm: distance of the points from the measured ones [mm].
         across_mm: median distance along the normal of the mesh [mm]: what is not sliding.
-        claimed_mm: σ of a coordinate by the estimate's covariances, root mean square [mm].
+        claimed_mm: σ of a coordinate by the estimate's covariances, root mean square [mm]; NaN while LOST.
         inside: share of the points in their own 95 % region, by the claimed covariance and the truth's σ.
         inside_twice: the same with the truth's σ twice, since the points were bound to measured places, too.
     """
@@ -126,6 +127,22 @@ def truth(folder: Path, frames: int) -> Truth:
     with np.load(folder / "truth.npz") as stored:
         numbers, points = stored["frames"][:frames], stored["points_mm"][:frames] * 1e-3
         return Truth(tuple(int(number) for number in numbers), points, float(stored["sigma_mm"]) * 1e-3)
+
+
+def beside_flow(folder: Path, known: Truth) -> NDArray[np.float64]:
+    """Median distance (frames − 1,) [px] of measured points from where the images show them to have gone.
+
+    That is, from where optical flow takes them since the frame with a truth before; without the tracker.
+    """
+    result = []
+    for k, (first, last) in enumerate(pairwise(known.numbers)):
+        shown = [cv2.cvtColor(color(folder, number), cv2.COLOR_RGB2GRAY) for number in range(first, last + 1)]
+        grey = [np.asarray(image, np.uint8) for image in shown]
+        everywhere = [np.ones(image.shape, bool) for image in grey]
+        there = features.tracks(grey, everywhere, CAMERA.project(known.points[k]))[-1]
+        miss = np.linalg.norm(CAMERA.project(known.points[k + 1]) - there, axis=1)
+        result.append(np.nanmedian(miss) if np.isfinite(miss).any() else np.nan)
+    return np.array(result)
 
 
 def images(folder: Path, cell: Cell, last: int) -> Iterator[tuple[int, Points, NDArray[np.uint8] | None]]:

@@ -42,7 +42,8 @@ class MeshState:
 def states(references: Sequence[ReferenceFrame], frames: Sequence[TrackedFrame]) -> list[MeshState]:
     """What every frame of a sequence without gaps, tracked with one mesh, shows of it."""
     first = frames[0]
-    mesh, found = first.estimate.vertices, features.tracks(*zip(*((one.grey, one.mask) for one in references)))
+    mesh, images, masks = first.estimate.vertices, [one.grey for one in references], [one.mask for one in references]
+    found = features.tracks(images, masks, features.corners(images[0], masks[0]))
     binding = bind_rays(CAMERA.directions(found[0]), mesh, first.faces)
     result = []
     for reference, frame, places in zip(references, frames, found[:, binding.bound], strict=True):

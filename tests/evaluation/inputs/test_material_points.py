@@ -126,7 +126,7 @@ def test_corners_follow_an_image_that_moves_and_are_lost_where_they_are_covered(
     for k, mask in enumerate(masks):
         mask[30:90, 40 + k : 110 + k] = True
     masks[3][30:60] = False
-    found = features.tracks(images, masks)
+    found = features.tracks(images, masks, features.corners(images[0], masks[0]))
     assert found.shape[1] > 20
     kept = np.isfinite(found[-1, :, 0])
     assert kept == pytest.approx(found[0, :, 1] > 59.5)
