@@ -79,7 +79,7 @@ def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection
     for detail in error.errors(include_url=False):
         key = tuple(part for part in detail["loc"] if not _ALTERNATIVE.fullmatch(str(part)))
         if detail["type"] == "literal_error" and key != detail["loc"]:
-            words[key] = detail["ctx"]["expected"]
+            words[key] = detail.get("ctx", {}).get("expected", "")
             continue
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, ProblemsError):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.observation import Source
 from abs_service.tracker.optimizers.base import Stop
+from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import SensorFit
 
 
@@ -31,11 +32,11 @@ class Estimate:
         status: reliability of the estimate.
         reasons: why it is not TRACKING, in plain words.
         theta: parameters (dim,) of the model; empty while INITIALIZING.
-        covariance: of theta (dim, dim), the inverse curvature of the cost at theta; an approximation that assumes exact
-            noise models and a single minimum.
+        covariance: of theta (dim, dim), with respect to the first frame: from the curvature of the cost, the size and
+            correlation of the residuals, and the covariance of the frame before.
         vertices: deformed mesh (n, 3) [m] in the rig's frame.
         vertex_covariance: of every vertex around its material point (n, 3, 3) [m²], due to the errors of theta and of
-            the initial mesh.
+            the initial mesh, and to the misfit of the model.
         cost: negative logarithm of likelihood times priors at theta, up to constants.
         deviation: step size of the search when it ended, in deviations of the posterior; 0 after a descent.
         searcher: algorithm that found theta: "levenberg_marquardt", "cma", "cma_es"; "" while INITIALIZING.
@@ -44,6 +45,7 @@ class Estimate:
         budget: maximum number of evaluations.
         inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
         fits: agreement of every sensor.
+        shape: what the deformed mesh shows by itself.
         sources: exposure of every sensor that contributed.
         missing: sensors that did not contribute.
     """
@@ -65,5 +67,6 @@ class Estimate:
     budget: int
     inlier_share: float
     fits: tuple[SensorFit, ...]
+    shape: ShapeQuality
     sources: Mapping[str, Source]
     missing: tuple[str, ...]

@@ -1,13 +1,17 @@
-"""Status of an estimate, from its agreement with the measurements."""
+"""Status of an estimate: its agreement with the measurements, with the outline, and with itself."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from annotated_types import Interval
+from annotated_types import Gt, Interval
 
 from abs_service.tracker.estimate import Status
+from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import SensorFit, inlier_share, occluded_share
+
+#: With fewer visible vertices on the free edges, their shares say nothing.
+LEAST_RIM = 8
 
 
 @dataclass(frozen=True)
@@ -18,27 +22,52 @@ class Settings:
         degraded_below: inlier share below which an estimate is DEGRADED.
         lost_below: inlier share below which the object is LOST.
         degraded_occluded: occluded share above which an estimate is DEGRADED, in the sensor that sees most.
+        degraded_rim: share of the visible free edges that lie off the outline above which an estimate is DEGRADED.
+        degraded_folded: share of folded faces above which an estimate is DEGRADED.
+        degraded_deviation_m: standard deviation of the position of a vertex, median over the mesh, above which an
+            estimate is DEGRADED [m].
     """
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6
     lost_below: Annotated[float, Interval(gt=0, lt=1)] = 0.3
     degraded_occluded: Annotated[float, Interval(gt=0, le=1)] = 0.5
+    degraded_rim: Annotated[float, Interval(gt=0, le=1)] = 0.3
+    degraded_folded: Annotated[float, Interval(gt=0, le=1)] = 0.05
+    degraded_deviation_m: Annotated[float, Gt(0)] = 0.015
 
 
-def judge(fits: Sequence[SensorFit], missing: Sequence[str], limits: Settings) -> tuple[Status, tuple[str, ...]]:
+def judge(
+    fits: Sequence[SensorFit], missing: Sequence[str], shape: ShapeQuality, limits: Settings
+) -> tuple[Status, tuple[str, ...]]:
     """Status, and the reasons for any other than TRACKING.
 
     Args:
         fits: agreement of every contributing sensor.
         missing: sensors without a frame.
+        shape: what the deformed mesh shows by itself.
         limits: thresholds.
     """
-    inliers, occluded = inlier_share(fits), occluded_share(fits)
+    inliers, occluded, rim = inlier_share(fits), occluded_share(fits), rim_share(fits)
     reasons = [f"no frame from {name}" for name in missing]
     if inliers < limits.degraded_below:
         reasons.append(f"only {inliers:.0%} of the visible vertices agree with a measurement")
     if occluded > limits.degraded_occluded:
         reasons.append(f"{occluded:.0%} of the vertices are occluded in the sensor that sees most of them")
+    if rim > limits.degraded_rim:
+        reasons.append(f"{rim:.0%} of the free edges lie off the object's outline: the mesh has slid or turned on it")
+    if shape.folded_share > limits.degraded_folded:
+        reasons.append(f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape")
+    if shape.deviation_m > limits.degraded_deviation_m:
+        reasons.append(
+            f"vertices are known to {shape.deviation_m * 1e3:.0f} mm only: nothing holds the surface along itself; "
+            "it needs a print that a colour camera sees, or a free edge in sight"
+        )
     if inliers < limits.lost_below:
         return Status.LOST, tuple(reasons)
     return (Status.DEGRADED if reasons else Status.TRACKING), tuple(reasons)
+
+
+def rim_share(fits: Sequence[SensorFit]) -> float:
+    """Share of the visible vertices on free edges that lie off the outline; the smallest of the sensors, 0 without."""
+    shares = [(fit.rim.outside + fit.rim.inside) / fit.rim.visible for fit in fits if fit.rim.visible >= LEAST_RIM]
+    return min(shares, default=0.0)

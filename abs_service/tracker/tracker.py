@@ -14,11 +14,15 @@ from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
-from abs_service.tracker.posterior.covariance import along_normals, propagated, sandwich
+from abs_service.tracker.posterior.correlation import DesignEffects
+from abs_service.tracker.posterior.covariance import along_normals, isotropic, propagated, score_covariance
 from abs_service.tracker.posterior.curvature import posterior_covariance
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
+from abs_service.tracker.posterior.misfit import NeighborMean
 from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
+from abs_service.tracker.posterior.propagation import ErrorPropagation
 from abs_service.tracker.posterior.relocation import laid_over
+from abs_service.tracker.shape_quality import ShapeJudge
 from abs_service.tracker.terms.base import inlier_share
 
 
@@ -50,6 +54,10 @@ class Tracker:
         self._evaluations = evaluations
         self._limits = limits
         self._mesh_noise = MeshNoise(model)
+        self._effects = DesignEffects(model.mesh)
+        self._errors = ErrorPropagation(model.scales)
+        self._neighbor_mean = NeighborMean(model.mesh)
+        self._shape_judge = ShapeJudge(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest
 
@@ -75,6 +83,7 @@ class Tracker:
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
         self._posterior.motion.restart(laid_over(self.model, self._last_tracked, points))
+        self._errors.restart(self._posterior.motion.deviation)
         self._is_warm = False
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
@@ -93,12 +102,18 @@ class Tracker:
         """Posterior covariance, agreement of the sensors and status at the optimum."""
         theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
         near = frame.linearized_near(theta)
-        covariance = sandwich(posterior_covariance(near.quadratic), near.sensed)
-        vertex_covariance = propagated(near.sparse_jacobian, covariance) + along_normals(
-            surface, self._mesh_noise.variance
+        inverse = posterior_covariance(near.quadratic)
+        effects = self._effects.update(inverse, near.sensed)
+        scores = score_covariance(near.quadratic.curvature, inverse, near.sensed, effects)
+        covariance = self._errors.update(theta, inverse, scores, self._posterior.motion.precision)
+        vertices = np.ascontiguousarray(surface.vertices[0].T)
+        vertex_covariance = (
+            propagated(near.sparse_jacobian, covariance)
+            + along_normals(surface, self._mesh_noise.variance)
+            + isotropic(self._neighbor_mean(frame.misfit(surface)))
         )
-        fits = frame.fits(theta)
-        verdict, reasons = status.judge(fits, observation.missing, self._limits)
+        fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, vertex_covariance)
+        verdict, reasons = status.judge(fits, observation.missing, shape, self._limits)
         if verdict == Status.TRACKING:
             self._last_tracked = theta
         return Estimate(
@@ -108,7 +123,7 @@ class Tracker:
             reasons=reasons,
             theta=theta,
             covariance=covariance,
-            vertices=np.ascontiguousarray(surface.vertices[0].T),
+            vertices=vertices,
             vertex_covariance=vertex_covariance,
             cost=outcome.cost,
             deviation=outcome.deviation,
@@ -119,6 +134,7 @@ class Tracker:
             budget=self._evaluations,
             inlier_share=inlier_share(fits),
             fits=fits,
+            shape=shape,
             sources=observation.sources,
             missing=observation.missing,
         )

@@ -22,6 +22,8 @@ class Settings:
         confirm: number of consecutive good estimates from which on the status is TRACKING; before, it is DEGRADED.
         size_ratio: largest ratio between the areas of the detected and the lost object; others are rejected, because
             an empty scene has surfaces, too.
+        grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
+            before a new, larger mesh is made [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -29,6 +31,7 @@ class Settings:
     every_s: Annotated[float, Gt(0)] = 0.2
     confirm: Annotated[int, Ge(1)] = 3
     size_ratio: Annotated[float, Gt(1)] = 2.0
+    grow_s: Annotated[float, Ge(0)] = 2.0
 
 
 class LossMonitor:
@@ -39,6 +42,7 @@ class LossMonitor:
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
         self._good = settings.confirm
+        self._event = "found again"
 
     def attempt_due(self, t_ns: int) -> bool:
         """True if an attempt is due at `t_ns` [ns]; it then counts as made."""
@@ -57,14 +61,18 @@ class LossMonitor:
         """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
-            self._good = 0
+            self._good, self._event = 0, "found again"
             return estimate
         self._lost_ns = self._tried_ns = None
         self._good += 1
         if self._good >= self._settings.confirm:
             return estimate
-        reason = f"found again {self._good} of {self._settings.confirm} estimates ago"
+        reason = f"{self._event} {self._good} of {self._settings.confirm} estimates ago"
         return replace(estimate, status=Status.DEGRADED, reasons=(*estimate.reasons, reason))
+
+    def restart(self, event: str) -> None:
+        """Makes the next estimates DEGRADED as after a loss, because of an event such as "a larger mesh was made"."""
+        self._good, self._event = 0, event
 
     def differs_in_size(self, found: Mesh, lost: Mesh) -> bool:
         """True if the areas of the detected and the lost object differ by more than `size_ratio`."""

@@ -13,8 +13,10 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.optimizers.base import Stop
+from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
+from abs_service.tracking.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.plan import Plan, make_tracker
 from abs_service.tracking.vertex_offsets import FixedOffsets, VertexOffsets
 from calib.rig import ImageNoise, Rig, Sensor
@@ -41,6 +43,8 @@ class TrackingSession:
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization)
+        self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
+        self._growth_due = False
         self._reinitialize_requested = False
         self._without_appearance: frozenset[str] = frozenset()
 
@@ -64,6 +68,7 @@ class TrackingSession:
     def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for an observation, see `track`."""
         requested, self._reinitialize_requested = self._reinitialize_requested, False
+        grow, self._growth_due = self._growth_due, False
         errors: tuple[str, ...] = ()
         try:
             if self._tracker is None:
@@ -74,11 +79,15 @@ class TrackingSession:
                 or self._without_appearance.difference(observation.missing)
             ):
                 self._detect_again(self._tracker, requested, observation)
+            elif grow:
+                self._grow(self._tracker.model.mesh, observation)
         except (DetectionError, ModelError) as error:
             errors = (str(error),)
         if self._tracker is None:
             return _initializing(observation, errors)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
+        if estimate.status == Status.TRACKING and self._growth_monitor.due(estimate.fits, observation.t_host_ns):
+            self._growth_due = True
         if estimate.status == Status.TRACKING:
             surface = self._tracker.model.deform(estimate.theta[None])
             self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
@@ -100,12 +109,20 @@ class TrackingSession:
             raise DetectionError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
         self._adopt(begun, mesh, observation)
 
+    def _grow(self, old: Mesh, observation: Observation) -> None:
+        """Replaces the mesh if much more of the object is in sight; DetectionError or ModelError if that fails."""
+        begun, mesh = self._begin(observation)
+        if mesh.area > LEAST_GROWTH * old.area:
+            self._adopt(begun, mesh, observation)
+            self._loss_monitor.restart("a larger mesh was made")
+
     def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
         self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
         self._vertex_offsets = self._plan.vertex_offsets.build(tracker.model, self._rig.sensors[self._plan.reference])
         # Their appearance is unknown: once one of them delivers images, mesh and appearance are built again.
         sensors = self._rig.sensors
         self._without_appearance = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
+        self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)
         self.mesh_version += 1
 
     def _detect(self, observation: Observation) -> InitialDetection:
@@ -139,6 +156,7 @@ def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimat
         budget=0,
         inlier_share=0.0,
         fits=(),
+        shape=ShapeQuality(),
         sources=observation.sources,
         missing=observation.missing,
     )

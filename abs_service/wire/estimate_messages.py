@@ -109,6 +109,9 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         samples=sum(fit.samples for fit in estimate.fits),
         clock_sigma_ns=max((source.t_sigma_ns for source in estimate.sources.values()), default=0),
         sensors=_sensors(estimate, effort.dropped),
+        stretch=estimate.shape.stretch,
+        folded_share=estimate.shape.folded_share,
+        deviation_m=estimate.shape.deviation_m,
     )
 
 
@@ -126,6 +129,10 @@ def _sensors(estimate: Estimate, dropped: Mapping[str, int]) -> Iterator[State.S
             mean_log_likelihood=fit.mean_log_likelihood,
             normalized_residual=fit.normalized_residual,
             dropped=dropped.get(fit.sensor, 0),
+            rim_visible=fit.rim.visible,
+            rim_outside=fit.rim.outside,
+            rim_inside=fit.rim.inside,
+            rim_occluded=fit.rim.occluded,
         )
     for sensor in estimate.missing:
         yield State.Sensor(sensor=sensor, missing=True, dropped=dropped.get(sensor, 0))

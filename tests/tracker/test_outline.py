@@ -13,7 +13,8 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.outline import RimOutline, inwards
+from abs_service.tracker.terms.depth.outline import RimOutline
+from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import Rim, look_up
 from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracker.terms.depth.visibility import classify

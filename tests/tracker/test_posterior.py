@@ -21,7 +21,8 @@ def test_a_linearisation_is_moved_to_a_near_theta_and_made_anew_for_a_far_one():
     small, large = (size * direction * np.sqrt(2 * REUSED_WITHIN * len(theta)) for size in (0.99, 1.01))
     near = frame.linearized_near(theta + small)
     assert near.quadratic is at
-    before, after = (stack(parts, len(theta)) for parts in (frame.linearized_near(theta).sensed, near.sensed))
+    sources = frame.linearized_near(theta).sensed, near.sensed
+    before, after = (stack([part for parts in source for part in parts], len(theta)) for source in sources)
     np.testing.assert_array_equal(after.jacobian, before.jacobian)
     np.testing.assert_allclose(after.residual, before.residual + before.jacobian @ small, atol=1e-9)
     far = frame.linearized_near(theta + large)

@@ -1,12 +1,16 @@
 """When an estimate is to be trusted."""
 
+from dataclasses import replace
+
 import pytest
 
 from abs_service.tracker.estimate import Status
+from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.status import Settings, judge
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.terms.base import RimFit, SensorFit
 
 SETTINGS = Settings(degraded_below=0.6, lost_below=0.3)
+SHAPE = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3)
 
 
 def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
@@ -29,16 +33,40 @@ def fit(inliers: float, occluded: float = 0.0) -> SensorFit:
     ],
 )
 def test_status_and_reasons(share, missing, status, reasons):
-    assert judge([fit(share)], missing, SETTINGS) == (status, reasons)
+    assert judge([fit(share)], missing, SHAPE, SETTINGS) == (status, reasons)
 
 
 def test_a_lost_object_names_every_reason():
-    status, reasons = judge([fit(0.1)], ("color",), SETTINGS)
+    status, reasons = judge([fit(0.1)], ("color",), SHAPE, SETTINGS)
     assert status == Status.LOST
     assert len(reasons) == 2
 
 
 def test_a_mostly_hidden_object_is_degraded_even_if_the_rest_agrees():
-    assert judge([fit(1.0, 0.5)], (), SETTINGS) == (Status.TRACKING, ())
+    assert judge([fit(1.0, 0.5)], (), SHAPE, SETTINGS) == (Status.TRACKING, ())
     reason = "62% of the vertices are occluded in the sensor that sees most of them"
-    assert judge([fit(1.0, 0.62), fit(1.0, 0.9)], (), SETTINGS) == (Status.DEGRADED, (reason,))
+    assert judge([fit(1.0, 0.62), fit(1.0, 0.9)], (), SHAPE, SETTINGS) == (Status.DEGRADED, (reason,))
+
+
+def on_the_rim(**rim: int) -> SensorFit:
+    return replace(fit(1.0), rim=RimFit(**rim))
+
+
+def test_a_mesh_off_its_outline_is_degraded():
+    assert judge([on_the_rim(visible=60, outside=8, inside=8)], (), SHAPE, SETTINGS)[0] == Status.TRACKING
+    status, reasons = judge([on_the_rim(visible=60, outside=15, inside=9)], (), SHAPE, SETTINGS)
+    assert (status, len(reasons)) == (Status.DEGRADED, 1)
+    assert reasons[0].startswith("40% of the free edges lie off the object's outline")
+    few = [on_the_rim(visible=4, outside=4), fit(1.0)]
+    assert judge(few, (), SHAPE, SETTINGS)[0] == Status.TRACKING
+
+
+def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
+    folded = ShapeQuality(stretch=0.1, folded_share=0.1, deviation_m=1e-3)
+    assert judge([fit(1.0)], (), folded, SETTINGS)[1] == (
+        "10% of the faces are folded: the model cannot follow the shape",
+    )
+    loose = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=0.02)
+    status, reasons = judge([fit(1.0)], (), loose, SETTINGS)
+    assert status == Status.DEGRADED
+    assert reasons[0].startswith("vertices are known to 20 mm only")

@@ -11,7 +11,7 @@ from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.posterior.covariance import propagated, sandwich, uncorrected_variance
+from abs_service.tracker.posterior.covariance import propagated, score_covariance, uncorrected_variance
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
 from evaluation.method.posterior import coverage
@@ -62,6 +62,12 @@ def test_least_squares_corrects_the_projection_of_the_meshs_own_errors_and_leave
     np.testing.assert_allclose(found, 0.25 * (1 - np.diag(projection)), rtol=1e-6, atol=1e-9)
 
 
+def sandwich(inverse: np.ndarray, residual: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Covariance of the solutions, of independent residuals."""
+    curvature = np.linalg.inv(inverse)
+    return inverse @ score_covariance(curvature, inverse, [[Linearization(residual, rows)]], np.ones(1)) @ inverse
+
+
 @given(SEEDS)
 def test_the_sandwich_is_that_of_the_definition(seed):
     generator = np.random.default_rng(seed)
@@ -70,7 +76,7 @@ def test_the_sandwich_is_that_of_the_definition(seed):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows + prior), np.float64)
     leverage = np.diag(rows @ inverse @ rows.T)
     expected = inverse @ (rows.T @ np.diag(residual**2 / (1 - leverage)) @ rows + prior) @ inverse
-    found = sandwich(inverse, [Linearization(residual, rows)])
+    found = sandwich(inverse, residual, rows)
     np.testing.assert_allclose(found, expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
     assert np.linalg.eigvalsh(found).min() > 0
 
@@ -83,7 +89,7 @@ def test_the_sandwich_learns_the_noise_that_the_residuals_show(factor):
     inverse = np.asarray(np.linalg.inv(rows.T @ rows), np.float64)
     fit = np.eye(200) - rows @ inverse @ rows.T
     draws = [fit @ (factor * generator.standard_normal(200)) for _ in range(100)]
-    mean = np.mean([sandwich(inverse, [Linearization(residual, rows)]) for residual in draws], axis=0)
+    mean = np.mean([sandwich(inverse, residual, rows) for residual in draws], axis=0)
     np.testing.assert_allclose(mean, factor**2 * inverse, atol=0.05 * factor**2 * np.diag(inverse).max())
 
 

@@ -10,7 +10,8 @@ from abs_service.pairing.observation import Source
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.optimizers.base import Stop
-from abs_service.tracker.terms.base import SensorFit
+from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.terms.base import RimFit, SensorFit
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
 
@@ -31,7 +32,8 @@ ESTIMATE = Estimate(
     evaluations=45,
     budget=1000,
     inlier_share=0.9,
-    fits=(SensorFit("tof", 280, 10, 270, 260, 1.5, 1.1),),
+    fits=(SensorFit("tof", 280, 10, 270, 260, 1.5, 1.1, RimFit(visible=60, outside=5, inside=3, occluded=2)),),
+    shape=ShapeQuality(stretch=0.02, folded_share=0.01, deviation_m=1.5e-3),
     sources={"tof": Source(42, 10**9, 25_000)},
     missing=("color",),
 )
@@ -66,6 +68,13 @@ def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
     assert (tof.sensor, tof.seq, tof.samples, tof.dropped, tof.missing) == ("tof", 42, 270, 4, False)
     assert (color.sensor, color.dropped, color.missing) == ("color", 5, True)
     assert (state.samples, state.clock_sigma_ns, state.skipped) == (270, 25_000, 3)
+
+
+def test_what_the_status_is_judged_by_is_published():
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    tof = state.sensors[0]
+    assert (tof.rim_visible, tof.rim_outside, tof.rim_inside, tof.rim_occluded) == (60, 5, 3, 2)
+    assert (state.stretch, state.folded_share, state.deviation_m) == (0.02, 0.01, 1.5e-3)
 
 
 def test_effort_and_budget_of_the_search_are_published():

@@ -17,6 +17,9 @@ LEAST_VERTICES = 25
 #: Minimum share of a grid point's neighbourhood that shows the object for it to become a vertex.
 LEAST_COVER = 0.75
 
+#: Least radius around a grid point: within it are three pixels at least, wherever the point lies [px].
+LEAST_RADIUS_PX = 1.5
+
 #: Distances around a grid point that deviate by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
 
@@ -47,7 +50,7 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
-    at_grid, deviation = _local_planes(pixels, distance, 0.75 * spacing)
+    at_grid, deviation = _local_planes(pixels, distance, max(0.75 * spacing, LEAST_RADIUS_PX))
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
     faces = _without_islands(_without_jumps(positions, triangles(place)))
@@ -94,7 +97,7 @@ def _local_planes(
     squares, freedom = 0.0, 0
     for g, pixel in enumerate(pixels):
         around = np.floor(pixel + 0.5).astype(int) + steps
-        around = around[np.linalg.norm(around - pixel, axis=1) <= max(radius, 1.0)]
+        around = around[np.linalg.norm(around - pixel, axis=1) <= radius]
         inside = np.all((around >= 0) & (around < (width, height)), axis=1)
         values = np.full(len(around), np.nan)
         values[inside] = distance[around[inside, 1], around[inside, 0]]

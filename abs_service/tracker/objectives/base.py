@@ -44,6 +44,10 @@ class Objective(Protocol):
         """Agreement of every contributing sensor with a population of one."""
         ...
 
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains."""
+        ...
+
 
 class TermSum:
     """The sum of all sensors' terms (eq. 16); a sensor without a frame contributes nothing."""
@@ -76,3 +80,8 @@ class TermSum:
     def fits(self, surface: Surface) -> list[SensorFit]:
         """Agreement of every contributing sensor with a population of one."""
         return [term.fit(surface) for term in self._active]
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains; the largest."""
+        none = np.zeros(surface.vertices.shape[2])
+        return reduce(np.maximum, (term.misfit(surface) for term in self._active), none)

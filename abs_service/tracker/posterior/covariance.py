@@ -31,20 +31,30 @@ from calib.jit import kernel
 LEAST_KEPT = 1e-6
 
 
-def sandwich(inverse: NDArray[np.float64], sensed: Sequence[Linearization]) -> NDArray[np.float64]:
-    """Covariance (dim, dim) of Θ: Σ (Jᵀ diag(r² / (1 − h)) J + P) Σ, where P = Σ⁻¹ − JᵀJ.
+def score_covariance(
+    curvature: NDArray[np.float64],
+    inverse: NDArray[np.float64],
+    sensed: Sequence[Sequence[Linearization]],
+    effects: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P, where P = Σ⁻¹ − JᵀJ.
+
+    The covariance of Θ is the sandwich Σ B Σ.
 
     Args:
-        inverse: Σ (dim, dim), of the curvature of likelihood and priors.
-        sensed: r and J of the sensors, in parts.
+        curvature: Σ⁻¹ (dim, dim), of likelihood and priors.
+        inverse: Σ (dim, dim).
+        sensed: r and J of the sensors, by source, in parts.
+        effects: design effect D (sources,) of the residuals of every source, see `correlation`.
     """
-    excess = np.zeros_like(inverse)  # of Jᵀ diag(r² / (1 − h)) J over JᵀJ
-    for part in sensed:
-        own, jacobian = part.parameters, part.jacobian
-        answer = jacobian @ inverse[own][:, own]
-        kept = np.maximum(1 - np.einsum("md,md->m", answer, jacobian), LEAST_KEPT)
-        add_at(own, (jacobian.T * (part.residual**2 / kept - 1)) @ jacobian, excess)
-    return inverse + inverse @ excess @ inverse
+    result = curvature.copy()
+    for parts, effect in zip(sensed, effects):
+        for part in parts:
+            own, jacobian = part.parameters, part.jacobian
+            answer = jacobian @ inverse[own][:, own]
+            kept = np.maximum(1 - np.einsum("md,md->m", answer, jacobian), LEAST_KEPT)
+            add_at(own, (jacobian.T * (effect * part.residual**2 / kept - 1)) @ jacobian, result)
+    return result
 
 
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -87,6 +97,11 @@ def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np
     """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
     normals = surface.normals[0].T.astype(np.float64)
     return variance[:, None, None] * normals[:, :, None] * normals[:, None, :]
+
+
+def isotropic(variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (n, 3, 3) [m²] of errors with a variance (n,) [m²] in every direction."""
+    return variance[:, None, None] * np.eye(3)
 
 
 def uncorrected_variance(

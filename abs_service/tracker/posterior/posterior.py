@@ -26,13 +26,13 @@ class Linearized:
     Attributes:
         theta: the parameters (dim,).
         quadratic: likelihood and priors.
-        sensed: residuals and derivatives of the sensors alone.
+        sensed: residuals and derivatives of the sensors alone, by the origin of their errors, each in parts.
         sparse_jacobian: derivatives of the vertices.
     """
 
     theta: NDArray[np.float64]
     quadratic: Quadratic
-    sensed: list[Linearization]
+    sensed: list[list[Linearization]]
     sparse_jacobian: SparseJacobian
 
 
@@ -103,8 +103,10 @@ class FramePosterior:
         """Gauss–Newton approximation of the cost near theta (dim,)."""
         of = self._of
         surface, sparse_jacobian = of.model.deform(theta[None]), of.model.sparse_jacobian(theta)
-        sensed = [part for points in of.objective.linearize(surface, sparse_jacobian) for part in points.parts()]
-        quadratic = gauss_newton([*sensed, *self._priors(surface, sparse_jacobian, theta)], self.dimension)
+        terms = of.objective.linearize(surface, sparse_jacobian)
+        sensed = [source.parts() for term in terms for source in term.sources()]
+        parts = [part for source in sensed for part in source]
+        quadratic = gauss_newton([*parts, *self._priors(surface, sparse_jacobian, theta)], self.dimension)
         self.linearized = Linearized(theta, quadratic, sensed, sparse_jacobian)
         return quadratic
 
@@ -114,7 +116,7 @@ class FramePosterior:
         if last is not None:
             step = theta - last.theta
             if 0.5 * step @ last.quadratic.curvature @ step < REUSED_WITHIN * self.dimension:
-                return replace(last, sensed=[part.moved(step) for part in last.sensed])
+                return replace(last, sensed=[[part.moved(step) for part in source] for source in last.sensed])
         self.linearize(theta)
         return self.linearized_near(theta)
 
@@ -142,6 +144,10 @@ class FramePosterior:
             surface = self._of.model.deform(theta[None])
             self._fitted = (theta, tuple(self._of.objective.fits(surface)))
         return self._fitted[1]
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains."""
+        return self._of.objective.misfit(surface)
 
     def outlier_share(self, theta: NDArray[np.float64]) -> float:
         """Share of the visible vertices, over all sensors, that do not agree with their measurement at theta (dim,)."""

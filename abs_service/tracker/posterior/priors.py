@@ -70,6 +70,16 @@ class MotionPrior:
         self._elapsed_s = FIRST_INTERVAL_S
         self._inverse_deviation = self._told()
 
+    @property
+    def deviation(self) -> NDArray[np.float64]:
+        """Standard deviation (dim,) of the parameters around the predicted ones after the longest interval."""
+        return self._scales * self._settings.speed * LONGEST_INTERVAL_S
+
+    @property
+    def precision(self) -> NDArray[np.float64]:
+        """Inverse variance (dim,) of the parameters around the predicted ones."""
+        return self._inverse_deviation**2
+
     def predict(self, t_ns: int) -> None:
         """Predicts theta at time `t_ns` [ns]; the velocity decays with the age of the last estimate."""
         began = self._t_ns is not None

@@ -35,7 +35,7 @@ class StretchPrior:
         of_points = sparse_jacobian.local, sparse_jacobian.group, sparse_jacobian.parameters
         edges = surface.vertices[0], self._edges, scales, self._inverse_deviation
         _stretch_rows(*edges, *of_points, start[:-1].copy(), residual, rows, across)
-        parts = split(residual[:within], rows, start[:-1], sparse_jacobian.parameters)
+        parts = split(residual[:within], rows, start[:-1], sparse_jacobian.parameters, np.zeros((0, 3)))
         return [*parts, Linearization(residual[within:], across)]
 
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import BeamReading, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.terms.base import Bounds, SensorFit
-from abs_service.tracker.terms.linearization import PointLinearization
+from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization
 from calib.camera import Camera
 from calib.jit import kernel
 from calib.noise.binary import LightBarrier
@@ -49,12 +49,16 @@ class BarrierTerm:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> PointLinearization:
         """No residuals: the cost is piecewise constant, its derivative zero."""
-        return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), sparse_jacobian)
+        return PointLinearization(*NO_ROWS, sparse_jacobian, np.zeros((0, 3)))
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the single sample with a population of one."""
         agrees = int(self._crossing(surface)[0] == self._interrupted)
         return SensorFit(self.sensor, 1, 0, 1, agrees, -float(self.cost(surface)[0]), float("nan"))
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Zero: a beam has no vertex."""
+        return np.zeros(())
 
     def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
         crossing = np.zeros(len(surface.vertices), np.bool_)

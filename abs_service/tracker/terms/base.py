@@ -32,6 +32,27 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
+class RimFit:
+    """Numbers of outer vertices of a mesh by what a depth image shows beside them.
+
+    Attributes:
+        visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
+        outside: of these, beside the object: the mesh hangs over the outline.
+        inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
+        occluded: on free edges, but not visible.
+        covered: on edges that something hid in the first image.
+        uncovered: of these, measured surface of the object now continues beyond the mesh.
+    """
+
+    visible: int = 0
+    outside: int = 0
+    inside: int = 0
+    occluded: int = 0
+    covered: int = 0
+    uncovered: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class SensorFit:
     """Agreement of one sensor with one deformed mesh.
 
@@ -44,6 +65,7 @@ class SensorFit:
         mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if the objective is a likelihood.
         normalized_residual: standard deviation of the normalised residuals, estimated from the inliers: 1 if the noise
             model is right, 2 if its σ is half the true one; NaN without inliers or without a noise model.
+        rim: agreement of the mesh's edges with the outline; zeros for a sensor that measures no distances.
     """
 
     sensor: str
@@ -53,6 +75,7 @@ class SensorFit:
     inliers: int
     mean_log_likelihood: float
     normalized_residual: float
+    rim: RimFit = RimFit()
 
 
 def summarize(
@@ -141,4 +164,8 @@ class Term(Protocol):
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
+        ...
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Squared distance (n,) [m²] of each vertex from its measurement beyond what noise explains; or one zero ()."""
         ...

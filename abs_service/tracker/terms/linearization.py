@@ -1,17 +1,20 @@
 """Linearised residuals: each depends on one point of the surface, each point on a few parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian
-from calib.jit import kernel
+from abs_service.tracker.terms.chain_rule import apply_chain_rule, count_points, sum_at_points, transpose_times
 
 #: All parameters.
 EVERY = slice(None)
+
+#: Residuals, rows and points of no measurement.
+NO_ROWS = np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,19 +25,25 @@ class Linearization:
         residual: (m,).
         jacobian: (m, k).
         parameters: indices of the k parameters that the residuals depend on.
+        positions: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
     """
 
     residual: NDArray[np.float64]
     jacobian: NDArray[np.float64]
     parameters: NDArray[np.int64] | slice = field(default_factory=lambda: EVERY)
+    positions: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
 
     def parts(self) -> list["Linearization"]:
         """A list of this linearisation alone."""
         return [self]
 
+    def sources(self) -> list["Linear"]:
+        """A list of this linearisation alone."""
+        return [self]
+
     def moved(self, by: NDArray[np.float64]) -> "Linearization":
         """Linearisation with its residuals extrapolated to first order by a step (dim,) of theta."""
-        return Linearization(self.residual + self.jacobian @ by[self.parameters], self.jacobian, self.parameters)
+        return replace(self, residual=self.residual + self.jacobian @ by[self.parameters])
 
     def transposed_times(self, values: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
         """Jᵀ times values (m, k) of the residuals (dimension, k)."""
@@ -52,12 +61,14 @@ class PointLinearization:
         rows: derivatives (m, 3) with respect to the position of the point [1/m].
         points: index (m,) of the point.
         sparse_jacobian: derivative of the points with respect to theta.
+        positions: of all points (n, 3) [m].
     """
 
     residual: NDArray[np.float64]
     rows: NDArray[np.float64]
     points: NDArray[np.int64]
     sparse_jacobian: SparseJacobian
+    positions: NDArray[np.floating]
 
     @property
     def jacobian(self) -> NDArray[np.float64]:
@@ -74,30 +85,28 @@ class PointLinearization:
             np.zeros((len(sparse_jacobian.local), 3, values.shape[1])),
             np.zeros((dimension, values.shape[1])),
         )
-        _gather(self.rows, self.points, values, at_points)
-        _transpose(at_points, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, result)
+        sum_at_points(self.rows, self.points, values, at_points)
+        transpose_times(at_points, sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local, result)
         return result
+
+    def sources(self) -> list["Linear"]:
+        """A list of this linearisation alone."""
+        return [self]
 
     def parts(self) -> list[Linearization]:
         """Linearisations with respect to theta by the chain rule, one per group of points."""
         sparse_jacobian = self.sparse_jacobian
         end = np.zeros(len(sparse_jacobian.parameters) + 1, np.int64)
-        _count(self.points, sparse_jacobian.group, end)
-        residual, jacobian = (
-            np.empty(len(self.residual)),
-            np.empty((len(self.residual), sparse_jacobian.local.shape[2])),
+        count_points(self.points, sparse_jacobian.group, end)
+        m = len(self.residual)
+        residual, jacobian, points = (
+            np.empty(m),
+            np.empty((m, sparse_jacobian.local.shape[2])),
+            np.empty(m, self.points.dtype),
         )
-        _chain(
-            self.residual,
-            self.rows,
-            self.points,
-            sparse_jacobian.group,
-            sparse_jacobian.local,
-            end[:-1].copy(),
-            residual,
-            jacobian,
-        )
-        return split(residual, jacobian, end, sparse_jacobian.parameters)
+        of_points = sparse_jacobian.group, sparse_jacobian.local
+        apply_chain_rule(self.residual, self.rows, self.points, *of_points, end[:-1].copy(), residual, jacobian, points)
+        return split(residual, jacobian, end, sparse_jacobian.parameters, self.positions[points])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,6 +141,10 @@ class Together:
         """Parts of all linearisations."""
         return [part for linear in self.all for part in linear.parts()]
 
+    def sources(self) -> list["Linear"]:
+        """The linearisations, whose residuals have errors of different origin."""
+        return list(self.all)
+
 
 class Linear(Protocol):
     """Interface of a linearisation, independent of its storage."""
@@ -159,16 +172,21 @@ class Linear(Protocol):
         """The same residuals in any order, grouped by the parameters that they depend on."""
         ...
 
+    def sources(self) -> list["Linear"]:
+        """The linearisations that this one consists of, by the origin of their errors; always as many."""
+        ...
+
 
 def split(
     residual: NDArray[np.float64],
     jacobian: NDArray[np.float64],
     start: NDArray[np.int64],
     parameters: NDArray[np.int64],
+    positions: NDArray[np.floating],
 ) -> list[Linearization]:
     """One linearisation per non-empty group of residuals (m,), sorted by group with first indices `start`."""
     return [
-        Linearization(residual[first:last], jacobian[first:last], own)
+        Linearization(residual[first:last], jacobian[first:last], own, positions[first:last])
         for first, last, own in zip(start[:-1], start[1:], parameters)
         if last > first
     ]
@@ -184,67 +202,3 @@ def stack(parts: Sequence[Linear], dimension: int) -> Linearization:
         np.concatenate([np.zeros(0), *(part.residual for part in parts)]),
         np.concatenate(rows),
     )
-
-
-@kernel
-def _count(points: NDArray[np.int64], group: NDArray[np.int32], start: NDArray[np.int64]) -> None:
-    """First index of each group's residuals in sorted order, and their total, into zeros (groups + 1,)."""
-    for m in range(points.size):
-        start[group[points[m]] + 1] += 1
-    for g in range(1, start.size):
-        start[g] += start[g - 1]
-
-
-@kernel
-def _chain(
-    residual: NDArray[np.float64],
-    rows: NDArray[np.float64],
-    points: NDArray[np.int64],
-    group: NDArray[np.int32],
-    local: NDArray[np.float64],
-    place: NDArray[np.int64],
-    sorted_residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-) -> None:
-    """Rows times the Jacobians of their points, sorted by group; `place` is the first index of each group.
-
-    A library needs ten times as long for thousands of products of 1 × 3 by 3 × k matrices.
-    """
-    for m in range(points.size):
-        v = points[m]
-        to = place[group[v]]
-        place[group[v]] += 1
-        sorted_residual[to] = residual[m]
-        x, y, z = rows[m, 0], rows[m, 1], rows[m, 2]
-        for d in range(local.shape[2]):
-            jacobian[to, d] = x * local[v, 0, d] + y * local[v, 1, d] + z * local[v, 2, d]
-
-
-@kernel
-def _gather(
-    rows: NDArray[np.float64], points: NDArray[np.int64], values: NDArray[np.float64], at_points: NDArray[np.float64]
-) -> None:
-    """Sum of rowᵀ times value (3, k) over the residuals of each point, into zeros (n, 3, k)."""
-    for m in range(points.size):
-        for i in range(3):
-            total = at_points[points[m], i]
-            for k in range(values.shape[1]):
-                total[k] += rows[m, i] * values[m, k]
-
-
-@kernel
-def _transpose(
-    at_points: NDArray[np.float64],
-    group: NDArray[np.int32],
-    parameters: NDArray[np.int64],
-    local: NDArray[np.float64],
-    result: NDArray[np.float64],
-) -> None:
-    """Transposed Jacobian of the points times values at the points (n, 3, k), into zeros (dim, k)."""
-    for v in range(group.size):
-        own = parameters[group[v]]
-        for d in range(own.size):
-            total = result[own[d]]
-            for i in range(3):
-                for k in range(total.size):
-                    total[k] += local[v, i, d] * at_points[v, i, k]

@@ -9,7 +9,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class DeformationState(_message.Message):
-    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms")
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms", "stretch", "folded_share", "deviation_m")
     class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
@@ -35,7 +35,7 @@ class DeformationState(_message.Message):
     STOP_EVALUATIONS: DeformationState.Stop
     STOP_TIME: DeformationState.Stop
     class Sensor(_message.Message):
-        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "occluded")
+        __slots__ = ("sensor", "seq", "t_host_ns", "samples", "mean_log_likelihood", "normalized_residual", "missing", "dropped", "visible", "occluded", "rim_visible", "rim_outside", "rim_inside", "rim_occluded")
         SENSOR_FIELD_NUMBER: _ClassVar[int]
         SEQ_FIELD_NUMBER: _ClassVar[int]
         T_HOST_NS_FIELD_NUMBER: _ClassVar[int]
@@ -46,6 +46,10 @@ class DeformationState(_message.Message):
         DROPPED_FIELD_NUMBER: _ClassVar[int]
         VISIBLE_FIELD_NUMBER: _ClassVar[int]
         OCCLUDED_FIELD_NUMBER: _ClassVar[int]
+        RIM_VISIBLE_FIELD_NUMBER: _ClassVar[int]
+        RIM_OUTSIDE_FIELD_NUMBER: _ClassVar[int]
+        RIM_INSIDE_FIELD_NUMBER: _ClassVar[int]
+        RIM_OCCLUDED_FIELD_NUMBER: _ClassVar[int]
         sensor: str
         seq: int
         t_host_ns: int
@@ -56,7 +60,11 @@ class DeformationState(_message.Message):
         dropped: int
         visible: int
         occluded: int
-        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ...) -> None: ...
+        rim_visible: int
+        rim_outside: int
+        rim_inside: int
+        rim_occluded: int
+        def __init__(self, sensor: _Optional[str] = ..., seq: _Optional[int] = ..., t_host_ns: _Optional[int] = ..., samples: _Optional[int] = ..., mean_log_likelihood: _Optional[float] = ..., normalized_residual: _Optional[float] = ..., missing: _Optional[bool] = ..., dropped: _Optional[int] = ..., visible: _Optional[int] = ..., occluded: _Optional[int] = ..., rim_visible: _Optional[int] = ..., rim_outside: _Optional[int] = ..., rim_inside: _Optional[int] = ..., rim_occluded: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
     STATUS_FIELD_NUMBER: _ClassVar[int]
@@ -83,6 +91,9 @@ class DeformationState(_message.Message):
     STOP_FIELD_NUMBER: _ClassVar[int]
     BUDGET_EVALUATIONS_FIELD_NUMBER: _ClassVar[int]
     BUDGET_MS_FIELD_NUMBER: _ClassVar[int]
+    STRETCH_FIELD_NUMBER: _ClassVar[int]
+    FOLDED_SHARE_FIELD_NUMBER: _ClassVar[int]
+    DEVIATION_M_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
     status: DeformationState.Status
@@ -109,4 +120,7 @@ class DeformationState(_message.Message):
     stop: DeformationState.Stop
     budget_evaluations: int
     budget_ms: float
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ...) -> None: ...
+    stretch: float
+    folded_share: float
+    deviation_m: float
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ...) -> None: ...

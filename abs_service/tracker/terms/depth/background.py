@@ -50,4 +50,4 @@ class Background:
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
         shared = np.bincount(labels[usual & missing], minlength=count)
         shared[0] = 0
-        return (shared >= LEAST_PIXELS)[labels]
+        return (shared >= LEAST_PIXELS)[np.asarray(labels, np.intp)]

@@ -1,6 +1,7 @@
 """Term of a depth sensor: measured compared with synthesised distances."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
-from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
 from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
@@ -22,13 +23,17 @@ from abs_service.tracker.terms.depth.depth_cost import (
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline
 from abs_service.tracker.terms.depth.visibility import Visibility, classify
 from abs_service.tracker.terms.gradients import color_rows, depth_rows
-from abs_service.tracker.terms.linearization import PointLinearization, Together
+from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization, Together
 from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise, write_texture
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
 LEAST_FREE_M = 0.005
+
+
+#: A measurement that is farther from its vertex is no measurement of the object [m].
+LARGEST_MISFIT_M = 0.05
 
 
 class DepthTerm:
@@ -139,7 +144,7 @@ class DepthTerm:
             self._view.spread(surface, values) for values in (surface.vertices[0].T, surface.normals[0].T)
         )
         rows = depth_rows(vertices, normals, self._view.camera.center, use, inverse_deviation)
-        return PointLinearization(residual[use], rows, use, samples)
+        return PointLinearization(residual[use], rows, use, samples, vertices)
 
     def _linearize_free(self, surface: Surface, samples: SparseJacobian, seen: Synthesis) -> PointLinearization:
         """Residuals of samples in free space, which stop a thin sheet from sliding along itself.
@@ -150,12 +155,12 @@ class DepthTerm:
         away = self._free_m.ravel()[pixel].astype(np.float64)
         out = (pixel > 0) & (away > 0)
         if not out.any():
-            return PointLinearization(np.zeros(0), np.zeros((0, 3)), np.zeros(0, np.int64), samples)
-        vertices = self._view.spread(surface, surface.vertices[0].T)[out]
+            return PointLinearization(*NO_ROWS, samples, np.zeros((0, 3)))
+        vertices = self._view.spread(surface, surface.vertices[0].T)
         distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
         weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
-        rows = color_rows(distances, self._view.camera, vertices)[:, 0] * weight[:, None]
-        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples)
+        rows = color_rows(distances, self._view.camera, vertices[out])[:, 0] * weight[:, None]
+        return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples, vertices)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
@@ -166,9 +171,25 @@ class DepthTerm:
         hidden = (pixel < 0) | self._obscured[pixel]
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
-        return summarize(
-            self.sensor, (pixel > 0) & ~(hidden | self._doubtful[pixel]), hidden, measured | free, size, mean
+        visible = (pixel > 0) & ~(hidden | self._doubtful[pixel])
+        return replace(
+            summarize(self.sensor, visible, hidden, measured | free, size, mean), rim=self._outline.fit(surface)
         )
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Squared distance (n,) [m²] of each vertex from its measurement beyond what noise explains.
+
+        Zero where nothing is measured, and everywhere if the samples of the synthesis are not the vertices.
+        """
+        seen = self._view.synthesize(surface)
+        if seen.pixel.shape[1] != surface.vertices.shape[2]:
+            return np.zeros(())
+        residual, inverse, cost = self._residuals(seen)
+        pixel = np.maximum(seen.pixel[0], 0)
+        excess = np.maximum(residual**2 - INLIER_DEVIATIONS**2, 0.0) / np.maximum(inverse, 1e-9) ** 2
+        free = self._free_m.ravel()[pixel].astype(np.float64) ** 2
+        usable = (seen.pixel[0] > 0) & ~(self._obscured[pixel] | self._doubtful[pixel])
+        return np.where(usable, np.where(cost < np.inf, np.minimum(excess, LARGEST_MISFIT_M**2), free), 0.0)
 
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""

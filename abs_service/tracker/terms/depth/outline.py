@@ -5,10 +5,8 @@ between the pixels on the object and those beside it. Which stretches of the rim
 image (`rim_classes`).
 """
 
-from dataclasses import dataclass
 from typing import Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,8 +14,10 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.perspective import project_with_slopes
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
+from abs_service.tracker.terms.base import RimFit
+from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, locate, outline_cost
-from abs_service.tracker.terms.depth.rim_classes import RimClass, classify_rim
+from abs_service.tracker.terms.depth.rim_classes import MOST_BEYOND, RimClass, classify_rim
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
@@ -70,26 +70,9 @@ class Outline(Protocol):
         """Normalised residuals of a population of one and their derivatives with respect to theta."""
         ...
 
-    def fit(self, surface: Surface) -> "RimFit":
+    def fit(self, surface: Surface) -> RimFit:
         """Agreement of the free edges of a population of one with the outline."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class RimFit:
-    """Numbers of outer vertices on the free edges of a mesh.
-
-    Attributes:
-        visible: not behind an occluder, in a hole or behind the mesh's own surface.
-        outside: of these, beside the object: the mesh hangs over the outline.
-        inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
-        occluded: those that are not visible.
-    """
-
-    visible: int = 0
-    outside: int = 0
-    inside: int = 0
-    occluded: int = 0
 
 
 class NoOutline:
@@ -183,29 +166,41 @@ class RimOutline:
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
         by_place = project_with_slopes(self._camera, points[use].astype(np.float64))[1]
         rows = np.einsum("vi,vij->vj", slopes[use] / self._deviation, by_place)
-        outer, inner, beyond = (values[use] for values in self._ends)
+        outer, inner, beyond = self._ends
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
-        chain(rows, outer, inner, beyond, *of_points, jacobian)
-        return Linearization(residual[use], jacobian)
+        chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
+        return Linearization(residual[use], jacobian, positions=points[use])
 
     def fit(self, surface: Surface) -> RimFit:
-        """Agreement of the free edges of a population of one with the outline."""
-        points = self._locate(surface)[0].astype(np.float64)
-        place = np.floor(self._camera.project(points) - self._corner + 0.5)
-        rows, columns = self._inwards.shape
-        near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
-        away = np.full(len(place), -np.inf)  # the part of the image ends beside the object
-        column, row = place[near].astype(np.intp).T
-        away[near] = self._inwards[row, column]
+        """Agreement of the edges of a population of one with the outline."""
         far = max(OFF_PX, FARTHEST * self._deviation)
+        away = self._inside_at(self._locate(surface)[0].astype(np.float64))
         known = ~np.isnan(away)
+        covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
+        vertices = surface.vertices[0].T.astype(np.float64)
+        outer, inner = vertices[self._rim.outer[covered]], vertices[self._rim.inner[covered]]
+        beyond = self._inside_at(outer + MOST_BEYOND * (outer - inner))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
             inside=int(np.count_nonzero(away > far)),
             occluded=self._hidden + int(np.count_nonzero(~known)),
+            covered=len(covered),
+            uncovered=int(np.count_nonzero(beyond > 0)),
         )
+
+    def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
+        pixels = np.nan_to_num(self._camera.project(points), nan=-1e6)
+        place = np.floor(pixels - self._corner + 0.5)
+        rows, columns = self._inwards.shape
+        near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
+        away = np.full(len(place), -np.inf)  # the part of the image ends beside the object
+        away[~np.all((pixels >= 0) & (pixels < (self._camera.width, self._camera.height)), axis=1)] = np.nan
+        column, row = place[near].astype(np.intp).T
+        away[near] = self._inwards[row, column]
+        return away
 
     @property
     def _arguments(self) -> tuple[*Ends, *Optics, NDArray[np.float32], NDArray[np.float32]]:
@@ -231,35 +226,3 @@ class RimOutline:
         distance = np.linalg.norm(points[inside] - self._camera.center, axis=1)
         hidden[inside] = expected[row[inside], column[inside]] < distance - HIDDEN_BEHIND_M
         return hidden
-
-
-def _around(mask: NDArray[np.bool_], reach: int) -> Window:
-    """Rows and columns within so many pixels of those of a mask (height, width), which is not empty."""
-    axes = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    rows, columns = (slice(max(int(at[0]) - reach, 0), int(at[-1]) + reach + 1) for at in axes)
-    return rows, columns
-
-
-def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tuple[Window, NDArray[np.float32]]:
-    """Distance of pixels from the object's outline [px], negative outside it; NaN if unknown.
-
-    Occluders and holes are unknown: the object may continue there.
-
-    Args:
-        distance, seen: an image (height, width) [m], and what it shows.
-        reach: pixels outside the object up to which distances are needed [px].
-
-    Returns:
-        The part of the image that is not farther outside, and the distances there (rows, columns).
-    """
-    beside = (seen.free_m > 0) | (np.isnan(distance) & ~seen.hole)
-    if not (beside.any() and seen.object.any()):
-        return WHOLE, np.full(distance.shape, np.nan, np.float32)
-    part = _around(~beside, reach)
-    outside = beside[part]
-    to_inside, to_outside = (
-        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for mask in (outside, ~outside)
-    )
-    away = np.where(outside, 0.5 - to_inside, to_outside - 0.5).astype(np.float32)
-    away[seen.foreground[part] | seen.hole[part]] = np.nan
-    return part, away

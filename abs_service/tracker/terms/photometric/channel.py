@@ -120,10 +120,11 @@ class ChannelTerm:
         """
         residual, inverse, normalizer = self._residuals(surface)
         use = 0.5 * residual**2 + normalizer < self._bounds.outlier
-        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
+        vertices = self._view.spread(surface, surface.vertices[0].T)
         slopes = self._slopes(surface)[use] * inverse[use, None]
-        rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices))[:, 0]
-        return PointLinearization(residual[use], rows, np.flatnonzero(use), self._view.follow(surface, sparse_jacobian))
+        rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices[use]))[:, 0]
+        samples = self._view.follow(surface, sparse_jacobian)
+        return PointLinearization(residual[use], rows, np.flatnonzero(use), samples, vertices)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
@@ -132,6 +133,10 @@ class ChannelTerm:
         hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean)
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Zero: brightness carries no distance."""
+        return np.zeros(())
 
     def _slopes(self, surface: Surface) -> NDArray[np.float64]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].

@@ -92,13 +92,12 @@ class ColorTerm:
         """Normalised residuals of the inliers, three channels each, and their derivatives with respect to theta."""
         residual, measured = self._residuals(surface)
         use = measured & (self._normalizer + 0.5 * np.sum(residual**2, axis=1) < self._bounds.outlier)
-        vertices = self._view.spread(surface, surface.vertices[0].T)[use]
+        vertices = self._view.spread(surface, surface.vertices[0].T)
         inverse = np.broadcast_to(self._inverse, residual.shape)[use, :, None]
-        rows = color_rows(self._image, self._view.camera, vertices) * inverse
+        rows = color_rows(self._image, self._view.camera, vertices[use]) * inverse
         points = np.repeat(np.flatnonzero(use), residual.shape[1])
-        return PointLinearization(
-            residual[use].ravel(), rows.reshape(-1, 3), points, self._view.follow(surface, sparse_jacobian)
-        )
+        samples = self._view.follow(surface, sparse_jacobian)
+        return PointLinearization(residual[use].ravel(), rows.reshape(-1, 3), points, samples, vertices)
 
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
@@ -108,6 +107,10 @@ class ColorTerm:
         mean = -float(self.cost(surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
         return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, size, mean, channels=3)
+
+    def misfit(self, surface: Surface) -> NDArray[np.float64]:
+        """Zero: colours carry no distance."""
+        return np.zeros(())
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""

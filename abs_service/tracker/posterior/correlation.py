@@ -1,0 +1,93 @@
+"""Correlation of residuals: neighbouring points share errors that no noise model knows.
+
+The model cannot follow every fold, the appearance of the first frame has its own noise, an outline is off by half a
+pixel along a whole edge. If the errors within a cluster of neighbouring points are correlated, their scores Jᵀr do not
+cancel as those of independent errors do. Kish's design effect (Survey Sampling, 1965), here in the metric Σ of Θ,
+
+    D = Σ_c |Σ_{i ∈ c} J_iᵀ r_i|²_Σ / Σ_i |J_iᵀ r_i|²_Σ,
+
+is 1 for independent errors, and the number of points in a cluster if they are equal. Correlation does not end at
+the border of a cluster: if it falls off exponentially with the distance, the effect of all neighbours is about
+1 + 4 (D − 1), which multiplies the squared residuals of the sandwich (`covariance`).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.terms.linearization import Linearization
+from calib.jit import kernel
+
+#: Side of a cluster in units of the typical distance between vertices; so a cluster has about six of them.
+CLUSTER_SIDE = 2.5
+
+#: Effect of all neighbours over that of those in a cluster: with exponential correlation and six points in a cluster,
+#: between 4.0 and 4.6 for D from 1.5 to 2.
+BEYOND = 4.0
+
+#: Weight of a new frame in the running means, of which the design effect is the ratio.
+MEMORY = 0.1
+
+#: Clusters are cells of a spatial grid, numbered by a hash; cells with equal numbers are far from each other.
+CLUSTERS = 1024
+
+
+class DesignEffects:
+    """Design effect of every source of residuals, as a running mean over the frames.
+
+    Args:
+        mesh: the mesh, for the size of the clusters.
+    """
+
+    def __init__(self, mesh: Mesh):
+        self._side_m = CLUSTER_SIDE * float(np.sqrt(mesh.area / len(mesh.vertices)))
+        self._sums = np.zeros((0, 2))
+
+    def update(self, inverse: NDArray[np.float64], sensed: list[list[Linearization]]) -> NDArray[np.float64]:
+        """Design effect (sources,) of every source after another frame, at least 1.
+
+        Args:
+            inverse: Σ (dim, dim).
+            sensed: residuals and derivatives of every source, in parts.
+        """
+        if len(self._sums) != len(sensed):  # a sensor came or went
+            self._sums = np.zeros((len(sensed), 2))
+        for source, parts in enumerate(sensed):
+            new = self._squares(inverse, parts)
+            begun = self._sums[source, 1] > 0
+            self._sums[source] += (MEMORY if begun else 1.0) * (new - self._sums[source])
+        clustered, independent = self._sums.T
+        within = clustered / np.where(independent > 0, independent, 1.0)
+        return 1 + BEYOND * np.maximum(within - 1, 0.0)
+
+    def _squares(self, inverse: NDArray[np.float64], parts: list[Linearization]) -> NDArray[np.float64]:
+        """Squared lengths of the scores, added up within clusters, and one by one (2,)."""
+        scores, total = np.zeros((CLUSTERS, len(inverse))), 0.0
+        for part in parts:
+            if len(part.positions) < len(part.residual) or not len(part.residual):
+                continue
+            own = np.arange(len(inverse))[part.parameters]
+            score = part.jacobian * part.residual[:, None]
+            total += float(np.einsum("mk,kl,ml->", score, inverse[np.ix_(own, own)], score, optimize=True))
+            _add_clusters(part.positions, 1 / self._side_m, score, own, scores)
+        used = scores[np.any(scores != 0, axis=1)]
+        return np.array([float(np.einsum("ck,ck->", used @ inverse, used)), total])
+
+
+@kernel
+def _add_clusters(
+    positions: NDArray[np.floating],
+    per_metre: float,
+    score: NDArray[np.float64],
+    own: NDArray[np.int64],
+    scores: NDArray[np.float64],
+) -> None:
+    """Adds scores (m, k) for parameters `own` (k,) to those of the clusters of their positions (clusters, dim)."""
+    for m in range(score.shape[0]):
+        x = np.int64(np.floor(positions[m, 0] * per_metre))
+        y = np.int64(np.floor(positions[m, 1] * per_metre))
+        z = np.int64(np.floor(positions[m, 2] * per_metre))
+        # Teschner et al., Optimized spatial hashing for collision detection of deformable objects, VMV 2003.
+        row = scores[(x * 73856093 ^ y * 19349663 ^ z * 83492791) % scores.shape[0]]
+        for k in range(own.size):
+            row[own[k]] += score[m, k]

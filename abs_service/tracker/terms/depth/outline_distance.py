@@ -1,0 +1,40 @@
+"""Distances of pixels from the outline of the object in a depth image."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.synthesis.window import WHOLE, Window
+from abs_service.tracker.terms.depth.visibility import Visibility
+
+
+def _around(mask: NDArray[np.bool_], reach: int) -> Window:
+    """Rows and columns within so many pixels of those of a mask (height, width), which is not empty."""
+    axes = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    rows, columns = (slice(max(int(at[0]) - reach, 0), int(at[-1]) + reach + 1) for at in axes)
+    return rows, columns
+
+
+def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tuple[Window, NDArray[np.float32]]:
+    """Distance of pixels from the object's outline [px], negative outside it; NaN if unknown.
+
+    Occluders and holes are unknown: the object may continue there.
+
+    Args:
+        distance, seen: an image (height, width) [m], and what it shows.
+        reach: pixels outside the object up to which distances are needed [px].
+
+    Returns:
+        The part of the image that is not farther outside, and the distances there (rows, columns).
+    """
+    beside = (seen.free_m > 0) | (np.isnan(distance) & ~seen.hole)
+    if not (beside.any() and seen.object.any()):
+        return WHOLE, np.full(distance.shape, np.nan, np.float32)
+    part = _around(~beside, reach)
+    outside = beside[part]
+    to_inside, to_outside = (
+        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for mask in (outside, ~outside)
+    )
+    away = np.where(outside, 0.5 - to_inside, to_outside - 0.5).astype(np.float32)
+    away[seen.foreground[part] | seen.hole[part]] = np.nan
+    return part, away

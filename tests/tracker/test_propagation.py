@@ -1,0 +1,55 @@
+"""Covariance of Θ over time, compared with the errors of the estimator that it describes."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.posterior.propagation import ErrorPropagation
+
+DIM, FRAMES = 3, 40
+PRECISION = np.array([4.0, 1.0, 1.0])
+
+
+def setting() -> tuple[np.ndarray, np.ndarray]:
+    """Curvature of the measurements, which see nothing of the last parameter, and Σ."""
+    rows = np.random.default_rng(0).standard_normal((12, DIM)) * (3.0, 1.0, 0.0)
+    measured = rows.T @ rows
+    return measured, np.asarray(np.linalg.inv(measured + np.diag(PRECISION)))
+
+
+def test_it_is_the_covariance_of_the_errors_when_the_noise_is_that_of_the_first_frame():
+    measured, inverse = setting()
+    generator, step = np.random.default_rng(1), 0.3
+    half, errors = np.linalg.cholesky(measured + 1e-12 * np.eye(DIM)), []
+    for _ in range(4000):
+        score, error = half @ generator.standard_normal(DIM), np.zeros(DIM)
+        for frame in range(FRAMES):
+            moved = step * generator.standard_normal(DIM) if frame else np.zeros(DIM)
+            error = inverse @ (PRECISION * (error + moved) + score)
+        errors.append(error)
+    propagation, theta, found = ErrorPropagation(np.ones(DIM)), np.zeros(DIM), np.eye(DIM)
+    for _ in range(FRAMES):
+        found = propagation.update(theta, inverse, measured + np.diag(PRECISION), PRECISION)
+        theta = theta + step  # moves by as much in every frame
+    scale = np.sqrt(np.outer(np.diag(found), np.diag(found)))
+    np.testing.assert_allclose(np.cov(np.transpose(errors)) / scale, found / scale, atol=0.08)
+
+
+def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not():
+    measured, inverse = setting()
+    propagation, found = ErrorPropagation(np.ones(DIM)), []
+    for frame in range(FRAMES):
+        theta = np.array([0.1 * frame, 0.0, 0.0])
+        found.append(np.diag(propagation.update(theta, inverse, measured + np.diag(PRECISION), PRECISION)))
+    assert found[0][2] == pytest.approx(0, abs=1e-12)  # the first frame defines where the points are
+    motion = 0.1**2 / 3
+    np.testing.assert_allclose(np.diff([variance[2] for variance in found]), motion, rtol=1e-6)
+    assert found[-1][0] < 1.5 * found[5][0]
+
+
+def test_after_a_relocation_it_begins_with_what_that_leaves_open():
+    _, inverse = setting()
+    propagation = ErrorPropagation(np.ones(DIM))
+    propagation.update(np.zeros(DIM), inverse, np.diag(PRECISION), PRECISION)
+    propagation.restart(np.full(DIM, 5.0))
+    found = propagation.update(np.zeros(DIM), inverse, np.diag(PRECISION), PRECISION)
+    assert found[2, 2] == pytest.approx(25)
