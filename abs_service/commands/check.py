@@ -3,29 +3,33 @@
   abs-service check                 the simulated demo rig
   abs-service check rig.toml        your own
   abs-service check rig.toml --json the same for scripts
+  abs-service check rig.toml --picture first.png    also draws what would be tracked: region, mesh and its rim
+
+The picture needs images: only replay:// and simulated:// devices are opened for it.
 
 Exit code 0 if `abs-service run` could use it, 2 if not.
 """
 
 import argparse
 import json
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.commands import rig_process
+from abs_service.commands import harmless_devices, preview_option, rig_process
+from abs_service.commands.harmless_devices import HARMLESS, HarmlessError
+from abs_service.commands.preview_option import PictureOptionError
 from abs_service.config import plugins
 from abs_service.config.problems import allowed_instead
 from abs_service.pairing.image_decoders import kinds
 from abs_service.supervision.exit_codes import Exit, is_for_user
 from calib.rig import Noise
 from drivers import opening
-
-#: Drivers that touch no hardware, so that opening a device is the best check of its address.
-HARMLESS = frozenset({"replay", "simulated"})
 
 
 class CheckError(Exception):
@@ -36,19 +40,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service check`."""
     rig_process.add_config(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    preview_option.add_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Checks one configuration."""
+    if arguments.picture:
+        preview_option.check(arguments.picture)
     try:
         rig = rig_process.load_config(arguments)
         found = describe(rig, str(arguments.config or "demo.toml"))
-    except (config.ConfigError, CheckError) as error:
+        written = _draw_previews(rig, arguments.picture) if arguments.picture else []
+    except (config.ConfigError, CheckError, HarmlessError, PictureOptionError) as error:
         if not arguments.json:
             raise
         print(json.dumps({"ok": False, "error": str(error)}, ensure_ascii=False))
         return Exit.USER
     print(json.dumps(found, ensure_ascii=False) if arguments.json else text(found))
+    for line in written:
+        print(line, file=sys.stderr if arguments.json else sys.stdout)
     return Exit.OK
 
 
@@ -117,6 +127,15 @@ def text(found: dict[str, Any]) -> str:
     lines += [f"  publishes {key} …" for key in found["publishes"]]
     lines += ["", f"  applications connect to {found['endpoint']}", f"  records to {found['records'] or 'nowhere'}"]
     return "\n".join(lines)
+
+
+def _draw_previews(rig: config.ServiceConfig, path: Path) -> list[str]:
+    """Draws what each tracker would track; returns a line about each picture."""
+    written: list[str] = []
+    for name in rig.trackers:
+        with harmless_devices.opened(rig, name) as source:
+            written.append(preview_option.draw(rig, name, path, source))
+    return written
 
 
 def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:

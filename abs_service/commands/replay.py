@@ -3,6 +3,7 @@
   abs-service replay recordings/x.mcap                          with the configuration that it was recorded with
   abs-service replay recordings/x.mcap --config rig.toml        with another one
   abs-service replay recordings/x.mcap --json > estimates.jsonl one JSON object per estimate, for scripts
+  abs-service replay recordings/x.mcap --picture first.png      draws what will be tracked first
   abs-service replay recordings/x.mcap --speed 1                in real time, through the processes of `run`
 
 The configuration's devices are not opened. Cameras come from the recording, unless the configuration has its own.
@@ -16,6 +17,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO
 from urllib.parse import quote
 
 from rich.console import Console
@@ -23,12 +25,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands import preview_option
 from abs_service.commands import run as run_command
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
 from abs_service.tracking.session import TrackingSession, streams
 from calib.rig import Rig
+from drivers.contract.frame import Frame
 from drivers.encoding.mcap_file import McapFile
 from drivers.replay import Recording
 
@@ -47,14 +51,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="PATH", type=Path, help="file to write; with --speed the folder")
     parser.add_argument("--speed", metavar="X", type=float, help="play live, X times as fast as it was recorded")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate, no progress bar")
+    preview_option.add_argument(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Replays a recording, offline or live."""
+    if arguments.picture:
+        preview_option.check(arguments.picture)
     recording = Recording(arguments.recording)
     for note in notes(recording):
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = configuration(recording, arguments.config)
+    if arguments.picture:
+        _draw_previews(settings, recording, arguments.picture, sys.stderr if arguments.json else sys.stdout)
     if arguments.speed is not None:
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
@@ -112,6 +121,14 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     if missing:
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
     return rig, wiring.synchroniser(settings, name, rig.sensors.values())
+
+
+def _draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path, output: TextIO) -> None:
+    """Draws what each tracker will track."""
+    for name in settings.trackers:
+        rig, synchroniser = recorded_rig(settings, name, recording)
+        frame_sets = synchroniser.group(item for item in recording.frames() if isinstance(item, Frame))
+        print(preview_option.draw(settings, name, path, (rig, frame_sets)), file=output, flush=True)
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:

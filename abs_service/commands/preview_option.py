@@ -1,0 +1,70 @@
+"""The option --picture: one picture per tracker of what it would track."""
+
+import argparse
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from abs_service import config, wiring
+from abs_service.display import preview_picture
+from abs_service.tracking.preview import PreviewError, preview
+from calib.rig import Rig
+from drivers.contract.frame import FrameSet
+
+#: Formats of the picture.
+SUFFIXES = (".png", ".svg", ".pdf")
+
+#: The rig of a tracker, and its frame sets in order of time.
+Source = tuple[Rig, Iterable[FrameSet]]
+
+
+class PictureOptionError(Exception):
+    """A picture that cannot be drawn or written."""
+
+
+def add_argument(parser: argparse.ArgumentParser) -> None:
+    """Adds --picture."""
+    parser.add_argument(
+        "--picture",
+        metavar="PATH",
+        type=Path,
+        help="picture to draw of what would be tracked in the first frame; of several trackers, PATH-NAME each",
+    )
+
+
+def check(path: Path) -> None:
+    """Refuses a path that says no format.
+
+    Raises:
+        PictureOptionError: its suffix is none of `SUFFIXES`.
+    """
+    if path.suffix not in SUFFIXES:
+        raise PictureOptionError(f"--picture {path}: its suffix must be one of {', '.join(SUFFIXES)}")
+
+
+def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
+    """Draws what one tracker would track; a reason why it would track nothing goes to standard error.
+
+    Args:
+        settings: the configuration.
+        name: of the tracker.
+        path: that was asked for.
+        source: what the tracker would get.
+
+    Returns:
+        A line that says what was written.
+
+    Raises:
+        PictureOptionError: there is no depth image, or the file cannot be written.
+    """
+    own = path if len(settings.trackers) == 1 else path.with_name(f"{path.stem}-{name}{path.suffix}")
+    try:
+        seen = preview(source[1], source[0], wiring.plan(settings, name))
+        preview_picture.draw(seen, name, wiring.model_name(settings, name), own)
+    except PreviewError as error:
+        raise PictureOptionError(f"--picture {own}: {error}") from None
+    except OSError as error:
+        raise PictureOptionError(f"--picture {own}: cannot be written: {error.strerror}") from None
+    if seen.found is None:
+        print(f"abs-service: note: {name} finds nothing to track: {seen.reason}", file=sys.stderr)
+    return f"wrote {own}"

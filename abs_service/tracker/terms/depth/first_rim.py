@@ -1,0 +1,34 @@
+"""Classes of a mesh's rim in the first depth image, without a term: what the outline of a tracker begins with."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.synthesis.rasterization.raster import Raster
+from abs_service.tracker.synthesis.window import WHOLE
+from abs_service.tracker.terms.depth.background import Background
+from abs_service.tracker.terms.depth.outline import RimOutline
+from abs_service.tracker.terms.depth.rim import Rim
+from abs_service.tracker.terms.depth.visibility import classify
+from calib.camera import Camera
+
+
+def classified_rim(
+    camera: Camera, mesh: Mesh, surface: Surface, distance: NDArray[np.float32]
+) -> tuple[Rim, NDArray[np.uint8]]:
+    """The rim of a mesh, and the `RimClass` (k,) of its outer vertices.
+
+    Args:
+        camera: the depth camera.
+        mesh: the mesh.
+        surface: the mesh in the image, a population of one.
+        distance: radial distances (height, width) [m] without mean offset, NaN without return.
+    """
+    expected = Raster(camera, mesh.faces).render(surface.vertices[0])
+    empty = Background().observe(np.isnan(distance), np.isfinite(expected), WHOLE, distance.shape)
+    rim = Rim.of(mesh)
+    # The classes do not depend on the standard deviation, which says how far from the outline distances are known.
+    outline = RimOutline(camera, rim, deviation=1.0)
+    outline.observe(distance, classify(distance, expected, camera.fx, empty), expected, surface)
+    return rim, outline.classes
