@@ -46,7 +46,7 @@ class ShapeJudge:
         stretch = np.abs(_lengths(vertices, self._edges) / self._lengths - 1)
         normals = _normals(vertices, self._faces)
         cosine = np.einsum("pi,pi->p", normals[self._pairs[:, 0]], normals[self._pairs[:, 1]])
-        variance = np.trace(vertex_covariance, axis1=1, axis2=2)
+        variance = np.einsum("nii->n", vertex_covariance)
         return ShapeQuality(
             stretch=float(np.percentile(stretch, 95)),
             folded_share=float(np.mean(cosine < FOLDED_COSINE)) if len(cosine) else 0.0,
@@ -55,14 +55,16 @@ class ShapeJudge:
 
 
 def _lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:
-    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    steps = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    return np.sqrt(np.einsum("ei,ei->e", steps, steps))
 
 
 def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
     """Unit normals (m, 3) of the faces."""
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    corner = vertices[faces[:, 0]]
+    (a, b, c), (d, e, f) = (vertices[faces[:, 1]] - corner).T, (vertices[faces[:, 2]] - corner).T
+    normals = np.stack([b * f - c * e, c * d - a * f, a * e - b * d])
+    return (normals / np.maximum(np.sqrt(np.sum(normals**2, axis=0)), 1e-12)).T
 
 
 def _neighbors(faces: NDArray[np.int32]) -> NDArray[np.intp]:

@@ -15,7 +15,7 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.correlation import DesignEffects
-from abs_service.tracker.posterior.covariance import along_normals, isotropic, propagated, score_covariance
+from abs_service.tracker.posterior.covariance import along_normals, isotropic, leverages, propagated, score_covariance
 from abs_service.tracker.posterior.curvature import posterior_covariance
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.misfit import NeighborMean
@@ -103,8 +103,9 @@ class Tracker:
         theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
         near = frame.linearized_near(theta)
         inverse = posterior_covariance(near.quadratic)
-        effects = self._effects.update(inverse, near.sensed)
-        scores = score_covariance(near.quadratic.curvature, inverse, near.sensed, effects)
+        leverage = leverages(inverse, near.sensed)
+        effects = self._effects.update(inverse, near.sensed, leverage)
+        scores = score_covariance(near.quadratic.curvature, near.sensed, leverage, effects)
         covariance = self._errors.update(theta, inverse, scores, self._posterior.motion.precision)
         vertices = np.ascontiguousarray(surface.vertices[0].T)
         vertex_covariance = (

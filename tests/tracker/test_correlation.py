@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.posterior.correlation import BEYOND, DesignEffects
+from abs_service.tracker.posterior.covariance import leverages
 from abs_service.tracker.posterior.misfit import NeighborMean
 from abs_service.tracker.terms.linearization import Linearization
 from tests.tracker.scenes import flat, sheet
@@ -23,7 +24,7 @@ def effect(draw, frames: int = 60, halves: bool = False) -> float:
         residual = draw(generator)
         cuts = (slice(0, 300), slice(300, None)) if halves else (slice(None),)
         parts = [Linearization(residual[cut], jacobian[cut], positions=MESH.vertices[cut]) for cut in cuts]
-        found = effects.update(inverse, [parts])
+        found = effects.update(inverse, [parts], leverages(inverse, [parts]))
     return float(found[0])
 
 
@@ -50,7 +51,8 @@ def test_a_cluster_may_lie_in_two_parts():
 
 def test_residuals_without_a_position_have_no_effect():
     effects = DesignEffects(MESH)
-    found = effects.update(np.eye(2), [[Linearization(np.ones(4), np.ones((4, 2)))], []])
+    sensed = [[Linearization(np.ones(4), np.ones((4, 2)))], []]
+    found = effects.update(np.eye(2), sensed, leverages(np.eye(2), sensed))
     np.testing.assert_array_equal(found, [1, 1])
 
 

@@ -11,7 +11,7 @@ from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.objectives import likelihood
-from abs_service.tracker.posterior.covariance import propagated, score_covariance, uncorrected_variance
+from abs_service.tracker.posterior.covariance import leverages, propagated, score_covariance, uncorrected_variance
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
 from evaluation.method.posterior import coverage
@@ -64,8 +64,8 @@ def test_least_squares_corrects_the_projection_of_the_meshs_own_errors_and_leave
 
 def sandwich(inverse: np.ndarray, residual: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Covariance of the solutions, of independent residuals."""
-    curvature = np.linalg.inv(inverse)
-    return inverse @ score_covariance(curvature, inverse, [[Linearization(residual, rows)]], np.ones(1)) @ inverse
+    curvature, sensed = np.asarray(np.linalg.inv(inverse), np.float64), [[Linearization(residual, rows)]]
+    return inverse @ score_covariance(curvature, sensed, leverages(inverse, sensed), np.ones(1)) @ inverse
 
 
 @given(SEEDS)

@@ -11,10 +11,13 @@ the border of a cluster: if it falls off exponentially with the distance, the ef
 1 + 4 (D − 1), which multiplies the squared residuals of the sandwich (`covariance`).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.posterior.covariance import PerResidual, Sensed
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
@@ -43,51 +46,72 @@ class DesignEffects:
         self._side_m = CLUSTER_SIDE * float(np.sqrt(mesh.area / len(mesh.vertices)))
         self._sums = np.zeros((0, 2))
 
-    def update(self, inverse: NDArray[np.float64], sensed: list[list[Linearization]]) -> NDArray[np.float64]:
+    def update(self, inverse: NDArray[np.float64], sensed: Sensed, leverage: PerResidual) -> NDArray[np.float64]:
         """Design effect (sources,) of every source after another frame, at least 1.
 
         Args:
             inverse: Σ (dim, dim).
-            sensed: residuals and derivatives of every source, in parts.
+            sensed: residuals and derivatives of every source.
+            leverage: of every residual, diag(J Σ Jᵀ).
         """
         if len(self._sums) != len(sensed):  # a sensor came or went
             self._sums = np.zeros((len(sensed), 2))
-        for source, parts in enumerate(sensed):
-            new = self._squares(inverse, parts)
+        for source, (parts, shares) in enumerate(zip(sensed, leverage)):
+            new = self._squares(inverse, parts, shares)
             begun = self._sums[source, 1] > 0
             self._sums[source] += (MEMORY if begun else 1.0) * (new - self._sums[source])
         clustered, independent = self._sums.T
         within = clustered / np.where(independent > 0, independent, 1.0)
         return 1 + BEYOND * np.maximum(within - 1, 0.0)
 
-    def _squares(self, inverse: NDArray[np.float64], parts: list[Linearization]) -> NDArray[np.float64]:
+    def _squares(
+        self,
+        inverse: NDArray[np.float64],
+        parts: Sequence[Linearization],
+        leverage: Sequence[NDArray[np.float64]],
+    ) -> NDArray[np.float64]:
         """Squared lengths of the scores, added up within clusters, and one by one (2,)."""
-        scores, total = np.zeros((CLUSTERS, len(inverse))), 0.0
-        for part in parts:
-            if len(part.positions) < len(part.residual) or not len(part.residual):
-                continue
-            own = np.arange(len(inverse))[part.parameters]
-            score = part.jacobian * part.residual[:, None]
-            total += float(np.einsum("mk,kl,ml->", score, inverse[np.ix_(own, own)], score, optimize=True))
-            _add_clusters(part.positions, 1 / self._side_m, score, own, scores)
-        used = scores[np.any(scores != 0, axis=1)]
-        return np.array([float(np.einsum("ck,ck->", used @ inverse, used)), total])
+        scores, numbers, total = np.zeros((CLUSTERS, len(inverse))), np.full(CLUSTERS, -1, np.int64), 0.0
+        every = np.arange(len(inverse))
+        for part, share in zip(parts, leverage):
+            if len(part.residual) and len(part.positions) == len(part.residual):
+                own = every[part.parameters]
+                total += float(np.vdot(part.residual**2, share))  # the squared length of a score is r² h
+                _add_clusters(part.positions, 1 / self._side_m, part.residual, part.jacobian, own, numbers, scores)
+        used = scores[: numbers.max() + 1]
+        return np.array([float(np.vdot(used @ inverse, used)), total])
 
 
 @kernel
 def _add_clusters(
     positions: NDArray[np.floating],
     per_metre: float,
-    score: NDArray[np.float64],
+    residual: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
     own: NDArray[np.int64],
+    numbers: NDArray[np.int64],
     scores: NDArray[np.float64],
 ) -> None:
-    """Adds scores (m, k) for parameters `own` (k,) to those of the clusters of their positions (clusters, dim)."""
-    for m in range(score.shape[0]):
+    """Adds scores Jᵀr to those of the clusters of their positions.
+
+    Args:
+        positions: of the points (m, 3) [m].
+        per_metre: inverse side of a cell [1/m].
+        residual, jacobian: (m,) and (m, k).
+        own: parameters (k,).
+        numbers: row of a cluster in `scores` by the hash of its cell (clusters,); −1 if it has none yet.
+        scores: of the clusters (clusters, dim).
+    """
+    count = numbers.max() + 1
+    for m in range(residual.size):
         x = np.int64(np.floor(positions[m, 0] * per_metre))
         y = np.int64(np.floor(positions[m, 1] * per_metre))
         z = np.int64(np.floor(positions[m, 2] * per_metre))
         # Teschner et al., Optimized spatial hashing for collision detection of deformable objects, VMV 2003.
-        row = scores[(x * 73856093 ^ y * 19349663 ^ z * 83492791) % scores.shape[0]]
+        cell = (x * 73856093 ^ y * 19349663 ^ z * 83492791) % numbers.size
+        if numbers[cell] < 0:
+            numbers[cell] = count
+            count += 1
+        row = scores[numbers[cell]]
         for k in range(own.size):
-            row[own[k]] += score[m, k]
+            row[own[k]] += residual[m] * jacobian[m, k]

@@ -31,11 +31,23 @@ from calib.jit import kernel
 LEAST_KEPT = 1e-6
 
 
+#: Residuals and derivatives of the sensors, by source, in parts; and a value of each residual (m,).
+Sensed = Sequence[Sequence[Linearization]]
+PerResidual = Sequence[Sequence[NDArray[np.float64]]]
+
+
+def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
+    """Leverage h = diag(J Σ Jᵀ) of every residual, from Σ (dim, dim)."""
+    return [[_leverage(inverse, part) for part in parts] for parts in sensed]
+
+
+def _leverage(inverse: NDArray[np.float64], part: Linearization) -> NDArray[np.float64]:
+    answer = part.jacobian @ inverse[part.parameters][:, part.parameters]
+    return np.einsum("md,md->m", answer, part.jacobian)
+
+
 def score_covariance(
-    curvature: NDArray[np.float64],
-    inverse: NDArray[np.float64],
-    sensed: Sequence[Sequence[Linearization]],
-    effects: NDArray[np.float64],
+    curvature: NDArray[np.float64], sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P, where P = Σ⁻¹ − JᵀJ.
 
@@ -43,17 +55,15 @@ def score_covariance(
 
     Args:
         curvature: Σ⁻¹ (dim, dim), of likelihood and priors.
-        inverse: Σ (dim, dim).
-        sensed: r and J of the sensors, by source, in parts.
+        sensed: r and J of the sensors.
+        leverage: h.
         effects: design effect D (sources,) of the residuals of every source, see `correlation`.
     """
     result = curvature.copy()
-    for parts, effect in zip(sensed, effects):
-        for part in parts:
-            own, jacobian = part.parameters, part.jacobian
-            answer = jacobian @ inverse[own][:, own]
-            kept = np.maximum(1 - np.einsum("md,md->m", answer, jacobian), LEAST_KEPT)
-            add_at(own, (jacobian.T * (effect * part.residual**2 / kept - 1)) @ jacobian, result)
+    for parts, shares, effect in zip(sensed, leverage, effects):
+        for part, share in zip(parts, shares):
+            weight = effect * part.residual**2 / np.maximum(1 - share, LEAST_KEPT) - 1
+            add_at(part.parameters, (part.jacobian.T * weight) @ part.jacobian, result)
     return result
 
 

@@ -33,7 +33,7 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
     part = _around(~beside, reach)
     outside = beside[part]
     to_inside, to_outside = (
-        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) for mask in (outside, ~outside)
+        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) for mask in (outside, ~outside)
     )
     away = np.where(outside, 0.5 - to_inside, to_outside - 0.5).astype(np.float32)
     away[seen.foreground[part] | seen.hole[part]] = np.nan
