@@ -26,6 +26,7 @@ class Settings:
         degraded_folded: share of folded faces above which an estimate is DEGRADED.
         degraded_deviation_m: standard deviation of the position of a vertex, median over the mesh, above which an
             estimate is DEGRADED [m].
+        degraded_unheld_m: the same by the measurements of one frame alone, without the past [m].
     """
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6
@@ -34,6 +35,7 @@ class Settings:
     degraded_rim: Annotated[float, Interval(gt=0, le=1)] = 0.3
     degraded_folded: Annotated[float, Interval(gt=0, le=1)] = 0.05
     degraded_deviation_m: Annotated[float, Gt(0)] = 0.015
+    degraded_unheld_m: Annotated[float, Gt(0)] = 0.02
 
 
 def judge(
@@ -57,10 +59,10 @@ def judge(
         reasons.append(f"{rim:.0%} of the free edges lie off the object's outline: the mesh has slid or turned on it")
     if shape.folded_share > limits.degraded_folded:
         reasons.append(f"{shape.folded_share:.0%} of the faces are folded: the model cannot follow the shape")
-    if shape.deviation_m > limits.degraded_deviation_m:
+    if shape.deviation_m > limits.degraded_deviation_m or shape.unheld_m > limits.degraded_unheld_m:
         reasons.append(
-            f"vertices are known to {shape.deviation_m * 1e3:.0f} mm only: nothing holds the surface along itself; "
-            "it needs a print that a colour camera sees, or a free edge in sight"
+            f"nothing holds the surface along itself, vertices are known to {shape.deviation_m * 1e3:.0f} mm so far: "
+            "it needs a print that a colour camera sees, or free edges in sight"
         )
     if inliers < limits.lost_below:
         return Status.LOST, tuple(reasons)

@@ -14,14 +14,9 @@ from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
-from abs_service.tracker.posterior.correlation import DesignEffects
-from abs_service.tracker.posterior.covariance import along_normals, isotropic, leverages, propagated, score_covariance
-from abs_service.tracker.posterior.curvature import posterior_covariance
-from abs_service.tracker.posterior.mesh_noise import MeshNoise
-from abs_service.tracker.posterior.misfit import NeighborMean
 from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
-from abs_service.tracker.posterior.propagation import ErrorPropagation
 from abs_service.tracker.posterior.relocation import laid_over
+from abs_service.tracker.posterior.uncertainty import Uncertainty
 from abs_service.tracker.shape_quality import ShapeJudge
 from abs_service.tracker.terms.base import inlier_share
 
@@ -53,10 +48,7 @@ class Tracker:
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits
-        self._mesh_noise = MeshNoise(model)
-        self._effects = DesignEffects(model.mesh)
-        self._errors = ErrorPropagation(model.scales)
-        self._neighbor_mean = NeighborMean(model.mesh)
+        self._uncertainty = Uncertainty(model, posterior.motion)
         self._shape_judge = ShapeJudge(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest
@@ -72,7 +64,6 @@ class Tracker:
         if self._is_warm:
             budget = Budget(self._evaluations, in_time)
             outcome = self._minimize(frame, self._optimizer.follow(frame, frame.predicted, budget), budget)
-            self._mesh_noise.update(frame, outcome.theta)
         else:
             budget = Budget(self._evaluations, lambda: True)
             outcome = self._minimize(frame, self._optimizer.explore(frame, frame.predicted, budget), budget)
@@ -83,7 +74,7 @@ class Tracker:
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
         self._posterior.motion.restart(laid_over(self.model, self._last_tracked, points))
-        self._errors.restart(self._posterior.motion.deviation)
+        self._uncertainty.relocate()
         self._is_warm = False
 
     def _minimize(self, frame: FramePosterior, search: Search, budget: Budget) -> Outcome:
@@ -101,19 +92,9 @@ class Tracker:
     def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, budget: Budget) -> Estimate:
         """Posterior covariance, agreement of the sensors and status at the optimum."""
         theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
-        near = frame.linearized_near(theta)
-        inverse = posterior_covariance(near.quadratic)
-        leverage = leverages(inverse, near.sensed)
-        effects = self._effects.update(inverse, near.sensed, leverage)
-        scores = score_covariance(near.quadratic.curvature, near.sensed, leverage, effects)
-        covariance = self._errors.update(theta, inverse, scores, self._posterior.motion.precision)
         vertices = np.ascontiguousarray(surface.vertices[0].T)
-        vertex_covariance = (
-            propagated(near.sparse_jacobian, covariance)
-            + along_normals(surface, self._mesh_noise.variance)
-            + isotropic(self._neighbor_mean(frame.misfit(surface)))
-        )
-        fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, vertex_covariance)
+        known = self._uncertainty.estimate(frame, theta, surface)
+        fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, known.vertices, known.unheld_m)
         verdict, reasons = status.judge(fits, observation.missing, shape, self._limits)
         if verdict == Status.TRACKING:
             self._last_tracked = theta
@@ -123,9 +104,9 @@ class Tracker:
             status=verdict,
             reasons=reasons,
             theta=theta,
-            covariance=covariance,
+            covariance=known.theta,
             vertices=vertices,
-            vertex_covariance=vertex_covariance,
+            vertex_covariance=known.vertices,
             cost=outcome.cost,
             deviation=outcome.deviation,
             searcher=outcome.searcher,

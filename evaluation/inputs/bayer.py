@@ -85,7 +85,7 @@ class MosaicSequence:
         )
         self._cameras = {name: head.camera for name, head in simulation.heads.items()}
         self._order = order
-        self._plan = demo_plan(nurbs.Settings((4, 4)), reference="structured_light", vertices=vertices)
+        self._plan = demo_plan(nurbs.Settings((4, 4), 2), reference="structured_light", vertices=vertices)
         self._exposures = expose(simulation, range(frames))
 
     def track(self, variant: str, sigma: float) -> Result:

@@ -92,7 +92,7 @@ class SensorSequence:
         """Mean vertex and surface error [mm] of tracking with a subset of the sensors."""
         noises = {"tof": self._tof, **NOISES}
         rig = Rig("e7", {name: Sensor(name, self._cameras[name], noises[name]) for name in SENSORS if name in subset})
-        plan = demo_plan(nurbs.Settings((4, 4)), reference=next(name for name in DEPTH if name in subset))
+        plan = demo_plan(nurbs.Settings((4, 4), 2), reference=next(name for name in DEPTH if name in subset))
         found = track(
             rig, plan, [replace(exposure, frames=_of(exposure.frames, subset)) for exposure in self._exposures]
         )

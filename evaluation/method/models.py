@@ -50,17 +50,17 @@ class Case:
 
 
 CASES = (
-    Case("nurbs, 4 × 4", "sheet", nurbs.Settings((4, 4))),
-    Case("nurbs, 4 × 4", "sheet", nurbs.Settings((4, 4)), misplacement_px=0.2),
-    Case("posed, nurbs 4 × 4", "sheet", posed.Settings(nurbs.Settings((4, 4)))),
+    Case("nurbs, 4 × 4", "sheet", nurbs.Settings((4, 4), 2)),
+    Case("nurbs, 4 × 4", "sheet", nurbs.Settings((4, 4), 2), misplacement_px=0.2),
+    Case("posed, nurbs 4 × 4", "sheet", posed.Settings(nurbs.Settings((4, 4), 2))),
     Case("flexpad, size given", "sheet", flexpad.Settings(0.3, 0.2)),
     Case("flexpad, size detected", "sheet", flexpad.Settings()),
     Case("gravity, 8 segments, length given", "strip", gravity.Settings(length_m=0.3)),
     Case("rigid, hybrid", "board", rigid.Settings(), optimizer=hybrid.Settings()),
     Case("rigid, hybrid", "board", rigid.Settings(), misplacement_px=0.2, optimizer=hybrid.Settings()),
     Case("rigid", "board", rigid.Settings(), misplacement_px=0.2),
-    Case("nurbs, 4 × 4, hybrid", "board", nurbs.Settings((4, 4)), optimizer=hybrid.Settings()),
-    Case("nurbs, 4 × 4, hybrid", "board", nurbs.Settings((4, 4)), misplacement_px=0.2, optimizer=hybrid.Settings()),
+    Case("nurbs, 4 × 4, hybrid", "board", nurbs.Settings((4, 4), 2), optimizer=hybrid.Settings()),
+    Case("nurbs, 4 × 4, hybrid", "board", nurbs.Settings((4, 4), 2), misplacement_px=0.2, optimizer=hybrid.Settings()),
 )
 
 

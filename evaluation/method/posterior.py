@@ -107,7 +107,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     """Tracks a simulated device with the default tracker; `sigma`: standard deviation of the colours [levels]."""
     simulation = simulate(uri)
     rig = with_noise(demo_rig(simulation), "color", GaussianColor(sigma))
-    found = track(rig, demo_plan(nurbs.Settings((4, 4))), expose(simulation, range(frames)))
+    found = track(rig, demo_plan(nurbs.Settings((4, 4), 2)), expose(simulation, range(frames)))
     rows, predicted, true = [], [], []
     for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
         error, known = points - estimate.vertices, estimate.covariance
@@ -115,11 +115,11 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
         off = np.asarray(np.linalg.lstsq(jacobian.reshape(error.size, -1), error.ravel())[0], np.float64)
         sensed = _sensed(known, _prior(model, estimate, jacobian, 1 / simulation.rate_hz))
         within = [
-            _inside(error, estimate.vertex_covariance),
-            _inside(error, propagated(SparseJacobian.from_dense(jacobian), known)),
-            _inside((sensed @ off)[None], (sensed @ known @ sensed.T)[None]),
+            inside_region(error, estimate.vertex_covariance),
+            inside_region(error, propagated(SparseJacobian.from_dense(jacobian), known)),
+            inside_region((sensed @ off)[None], (sensed @ known @ sensed.T)[None]),
             len(sensed),
-            _inside(off[None], known[None]),
+            inside_region(off[None], known[None]),
         ]
         rows.append([np.mean(part) for part in within])
         predicted.append(np.trace(estimate.vertex_covariance, axis1=1, axis2=2))
@@ -147,7 +147,7 @@ def _sensed(covariance: NDArray[np.float64], prior: NDArray[np.float64]) -> NDAr
     return np.linalg.inv(directions)[gain > 2]
 
 
-def _inside(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.bool_]:
+def inside_region(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.bool_]:
     """True (n,) where errors (n, d) lie inside the 95 % ellipsoids of covariances (n, d, d)."""
     square = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[..., None])[..., 0])
     return square < chi2.ppf(SHARE, error.shape[1])

@@ -30,7 +30,7 @@ from evaluation.sequences import (
 
 TITLE = "E3: a mean offset of 10 cm over the whole image"
 
-MODELS: Mapping[str, ModelSettings] = {"NURBS": nurbs.Settings((4, 4)), "FlexPad": flexpad.Settings(0.3, 0.2)}
+MODELS: Mapping[str, ModelSettings] = {"NURBS": nurbs.Settings((4, 4), 2), "FlexPad": flexpad.Settings(0.3, 0.2)}
 
 #: Distance between sheet and wall [m], with and without the offset.
 BETWEEN_M = 1.4

@@ -160,7 +160,7 @@ def test_the_object_can_be_looked_for_anew():
 def test_parts_may_be_tables_of_a_rig_file():
     tracker = a.Tracker(
         CAMERA,
-        {"type": "posed", "shape": {"type": "nurbs", "control_points": [3, 3]}},
+        {"type": "posed", "shape": {"type": "nurbs", "control_points": [3, 3], "degree": 2}},
         noise={"type": "constant", "sigma": 0.001},
         vertices=100,
         region={"type": "box", "lowest": [-1, -1, 0.1], "highest": [1, 1, 0.9]},
@@ -172,7 +172,10 @@ def test_parts_may_be_tables_of_a_rig_file():
     assert estimate.theta.shape == (6 + 27,)
     assert 50 < len(estimate.vertices) < 200
     assert estimate.evaluations <= 500
-    assert a.Tracker(CAMERA, a.Posed(a.Nurbs(3, 3)), noise=NOISE).track(Sheet().depth(), time_s=0).theta.size == 33
+    assert (
+        a.Tracker(CAMERA, a.Posed(a.Nurbs(3, 3, degree=2)), noise=NOISE).track(Sheet().depth(), time_s=0).theta.size
+        == 33
+    )
 
 
 def test_a_search_may_be_limited_in_time():

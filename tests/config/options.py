@@ -114,7 +114,7 @@ OPTIONS = {
         _option("model.rigid", scene="board"),
         _option("model.flexpad", "width_m = 0.3, height_m = 0.2"),
         _option("model.gravity", "segments = 3, length_m = 0.3", scene="strip", size="tof=176x144&color=160x120"),
-        _option("model.posed", 'shape = { type = "nurbs", control_points = [3, 3] }'),
+        _option("model.posed", 'shape = { type = "nurbs", control_points = [3, 3], degree = 2 }'),
         _option("synthesis.sparse"),
         _option("synthesis.undistorted", **LENS),
         _option("synthesis.warped", 'sensor = "tof"', size="tof=176x144&color=160x120&lens=-0.25,0.06"),

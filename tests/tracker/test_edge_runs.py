@@ -81,7 +81,9 @@ def test_runs_stay_within_the_mesh(seed, rows, columns):
     assert np.all(runs[:, 1] + runs[:, 2] <= len(mesh.vertices))
 
 
-@pytest.mark.parametrize(("least", "mesh"), [(0.99, sheet(17, 18)), (0.9, Nurbs((4, 4)).of_mesh(sheet(17, 18)).mesh)])
+@pytest.mark.parametrize(
+    ("least", "mesh"), [(0.99, sheet(17, 18)), (0.9, Nurbs((4, 4), 2).of_mesh(sheet(17, 18)).mesh)]
+)
 def test_most_edges_of_a_grid_are_in_few_runs(least, mesh):
     found = runs_of(mesh)
     assert len(found.singles) < (1 - least) * len(mesh.edges)

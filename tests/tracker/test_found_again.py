@@ -12,8 +12,8 @@ from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simu
 @pytest.mark.parametrize(
     ("scene", "model", "error_mm"),
     [
-        ("sheet", nurbs.Settings((4, 4)), 2),
-        ("sheet", posed.Settings(nurbs.Settings((4, 4))), 2),
+        ("sheet", nurbs.Settings((4, 4), 2), 2),
+        ("sheet", posed.Settings(nurbs.Settings((4, 4), 2)), 2),
         ("sheet", flexpad.Settings(0.3, 0.2), 2),
         ("board", rigid.Settings(), 6),  # a board of one-coloured squares slides along itself
     ],

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from abs_service.tracker.models.base import SparseJacobian
+from abs_service.tracker.posterior.covariance import KEPT_PRIOR, unheld_deviation
 from abs_service.tracker.posterior.propagation import ErrorPropagation
 
 DIM, FRAMES = 3, 40
@@ -53,3 +55,15 @@ def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     propagation.restart(np.full(DIM, 5.0))
     found = propagation.update(np.zeros(DIM), inverse, np.diag(PRECISION), PRECISION)
     assert found[2, 2] == pytest.approx(25)
+
+
+def test_a_direction_that_no_measurement_holds_is_found_in_a_single_frame():
+    """Points that only move along x and y with two parameters; the second is measured, the first is not."""
+    local = np.zeros((30, 3, 2))
+    local[:, 0, 0] = local[:, 1, 1] = 1.0
+    jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
+    prior, measured = np.full(2, 1e4), np.diag([0.0, 1e6])
+    found = unheld_deviation(measured + np.diag(prior), prior, jacobian)
+    assert found == pytest.approx(np.sqrt(1 / (KEPT_PRIOR * 1e4) + 1 / (1e6 + KEPT_PRIOR * 1e4)), rel=1e-6)
+    held = unheld_deviation(np.diag([1e6, 1e6]) + np.diag(prior), prior, jacobian)
+    assert held == pytest.approx(np.sqrt(2e-6), rel=1e-3)

@@ -69,4 +69,6 @@ def test_a_folded_mesh_and_one_that_nothing_holds_are_degraded():
     loose = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=0.02)
     status, reasons = judge([fit(1.0)], (), loose, SETTINGS)
     assert status == Status.DEGRADED
-    assert reasons[0].startswith("vertices are known to 20 mm only")
+    assert reasons[0].startswith("nothing holds the surface along itself, vertices are known to 20 mm so far")
+    unheld = ShapeQuality(stretch=0.01, folded_share=0.0, deviation_m=1e-3, unheld_m=0.2)
+    assert judge([fit(1.0)], (), unheld, SETTINGS)[0] == Status.DEGRADED

@@ -115,7 +115,7 @@ def test_the_search_answers_each_vertex_s_own_error_as_it_answers_a_motion_of_it
 
 def test_what_the_mesh_did_not_know_stays_with_its_vertices_when_they_are_sorted():
     mesh = sheet()
-    model = nurbs.Settings((4, 4)).of_mesh(mesh)
+    model = nurbs.Settings((4, 4), 2).of_mesh(mesh)
     assert model.mesh.deviation.shape == (len(mesh.vertices),)
     order = np.random.default_rng(0).permutation(len(mesh.vertices))
     known = type(mesh)(mesh.vertices, mesh.faces, mesh.colors, mesh.chart, deviation=mesh.vertices[:, 0])

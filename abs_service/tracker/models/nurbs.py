@@ -16,7 +16,7 @@ from abs_service.tracker.models.parts.bspline_patches import Patches
 from calib.jit import kernel
 
 #: Knot spans along the long side of an object for `control_points = "auto"`.
-SPANS = 4
+SPANS = 3
 
 #: Least number of cells of the mesh's grid in a span; fewer vertices do not determine its control points.
 LEAST_CELLS = 3.0
@@ -30,8 +30,8 @@ class Settings:
 
     Attributes:
         control_points: numbers of control points along the object's long and short side; Θ has three values for each.
-            "auto": four knot spans along the long side, each of which bends by some 60° without stretching, as many
-            per length along the short side, fewer where the mesh is too coarse for them.
+            "auto": three knot spans along the long side, as many per length along the short side, fewer where the mesh
+            is too coarse for them.
         degree: polynomial degree of the splines.
         margin: share of the object's size by which the rest surface extends beyond it on every side.
         weights: weight of every control point, a table of as many rows and columns; a larger weight than that of the
@@ -41,7 +41,7 @@ class Settings:
     """
 
     control_points: Literal["auto"] | tuple[ControlPoints, ControlPoints] = "auto"
-    degree: Annotated[int, Interval(ge=1, le=4)] = 2
+    degree: Annotated[int, Interval(ge=1, le=4)] = 3
     weights: tuple[tuple[Annotated[float, Interval(gt=0, le=1000)], ...], ...] = ()
     margin: Annotated[float, Interval(gt=0, le=0.5)] = 0.08
     smoothing: Annotated[float, Interval(gt=0, le=1)] = 1e-3
@@ -92,26 +92,24 @@ class Settings:
 
 
 def derived_shape(mesh: Mesh, degree: int) -> tuple[int, int]:
-    """Numbers of control points along the long and the short side of a mesh, for `control_points = "auto"`.
-
-    On a narrow strip, two spans across leave room for a twist.
-    """
-    cells = np.ptp(mesh.chart, axis=0)
-    lengths = _side_lengths(mesh)
-    wanted = np.clip(np.round(SPANS * lengths / lengths.max()), 2, SPANS)
+    """Numbers of control points along the long and the short side of a mesh, for `control_points = "auto"`."""
+    lengths, cells = _sides(mesh)
+    wanted = np.clip(np.round(SPANS * lengths / lengths.max()), 1, SPANS)
     spans = np.clip(np.floor(cells / LEAST_CELLS), 1, wanted).astype(int)
     # Three control points are the least that a side may have.
     return max(int(spans[0]) + degree, 3), max(int(spans[1]) + degree, 3)
 
 
-def _side_lengths(mesh: Mesh) -> NDArray[np.float64]:
-    """Lengths (2,) of the mesh along the axes of its chart, from the typical length of a unit of the chart [m]."""
-    edges = mesh.edges
+def _sides(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lengths (2,) of the mesh along the axes of its chart [m], and numbers (2,) of edges on them, both approximate."""
+    edges, size = mesh.edges, np.ptp(mesh.chart, axis=0)
     steps = np.abs(mesh.chart[edges[:, 1]] - mesh.chart[edges[:, 0]])
     lengths = np.linalg.norm(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], axis=1)
     along = [steps[:, axis] > 10 * steps[:, 1 - axis] for axis in range(2)]
-    units = [np.median(lengths[own] / steps[own, axis]) if own.any() else 1.0 for axis, own in enumerate(along)]
-    return np.ptp(mesh.chart, axis=0) * units
+    along = [own if own.any() else np.ones_like(own) for own in along]  # a mesh without edges along its chart
+    step = np.array([np.median(steps[own, axis]) for axis, own in enumerate(along)])
+    length = np.array([np.median(lengths[own]) for own in along])
+    return size / step * length, size / step
 
 
 class Nurbs:

@@ -23,9 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.curvature import add_at
+from abs_service.tracker.posterior.curvature import add_at, solved
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
+
+#: Share of the motion prior's precision that keeps `unheld_deviation` finite, and the number of vertices it looks at.
+KEPT_PRIOR, PROBES = 1e-3, 24
 
 #: Lower bound of 1 − h; below it, rounding errors dominate.
 LEAST_KEPT = 1e-6
@@ -101,6 +104,28 @@ def _multiply(
         square[0, 0], square[1, 1], square[2, 2] = xx, yy, zz
         square[0, 1], square[0, 2], square[1, 2] = xy, xz, yz
         square[1, 0], square[2, 0], square[2, 1] = xy, xz, yz
+
+
+def unheld_deviation(
+    curvature: NDArray[np.float64], precision: NDArray[np.float64], sparse_jacobian: SparseJacobian
+) -> float:
+    """Standard deviation [m] of a vertex by the measurements of one frame alone, median: large if nothing holds it.
+
+    Args:
+        curvature: (dim, dim), of likelihood and priors.
+        precision: diagonal (dim,) of the motion prior, of which hardly anything is kept.
+        sparse_jacobian: derivative of the vertices.
+    """
+    alone = curvature.copy()
+    alone.flat[:: len(alone) + 1] -= (1 - KEPT_PRIOR) * precision
+    some = np.linspace(0, len(sparse_jacobian.local) - 1, PROBES).astype(np.intp)
+    rows = np.zeros((PROBES, 3, len(alone)))
+    np.put_along_axis(
+        rows, sparse_jacobian.parameters[sparse_jacobian.group[some]][:, None], sparse_jacobian.local[some], axis=2
+    )
+    flat = rows.reshape(-1, len(alone))
+    variance = np.einsum("pd,dp->p", flat, solved(alone, flat.T)).reshape(PROBES, 3).sum(axis=1)
+    return float(np.sqrt(np.median(variance)))
 
 
 def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:

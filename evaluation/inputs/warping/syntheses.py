@@ -68,7 +68,9 @@ def recorded(seed: int, frames: int) -> Recorded:
 
 def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row:
     """Tracks all sequences with a synthesis."""
-    found = [track(one.rig, demo_plan(nurbs.Settings((4, 4)), synthesis=synthesis), one.exposures) for one in sequences]
+    found = [
+        track(one.rig, demo_plan(nurbs.Settings((4, 4), 2), synthesis=synthesis), one.exposures) for one in sequences
+    ]
     return Row(
         tuple(one.vertex_mm for one in found),
         float(np.mean([one.surface_mm for one in found])),
@@ -78,7 +80,7 @@ def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row
 
 def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     """Time to synthesise one candidate of a sequence's first frame and to compare it [µs], for every synthesis."""
-    model = Rigid(track(sequence.rig, demo_plan(nurbs.Settings((4, 4))), sequence.exposures[:1]).model.mesh)
+    model = Rigid(track(sequence.rig, demo_plan(nurbs.Settings((4, 4), 2)), sequence.exposures[:1]).model.mesh)
     thetas = np.random.default_rng(0).normal(0, 2e-3, (POPULATION, 6))
     objectives = {name: _objective(SYNTHESES[name], sequence, model) for name in names}
     least = dict.fromkeys(names, np.inf)
@@ -94,6 +96,6 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
 def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> Objective:
     """Objective of the first frame."""
     rig, mesh = sequence.rig, model.mesh
-    objective = demo_plan(nurbs.Settings((4, 4))).objective.build(rig, mesh, synthesis.build(rig, mesh))
+    objective = demo_plan(nurbs.Settings((4, 4), 2)).objective.build(rig, mesh, synthesis.build(rig, mesh))
     objective.observe(Observer(rig).observe(sequence.exposures[0].frames), model.deform(model.rest[None]))
     return objective

@@ -136,7 +136,7 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
 
 def _noise_variants(settings: Settings) -> tuple[Variant, ...]:
     """The true noise model with a scaled σ, and simpler models."""
-    plan = demo_plan(nurbs.Settings((4, 4)))
+    plan = demo_plan(nurbs.Settings((4, 4), 2))
     laws = {f"{factor:g} σ": assumed_rig(settings.noise, factor) for factor in settings.sigma_factors}
     laws["one σ everywhere"] = _with_noise(Constant(settings.noise * MEAN_DEVIATION))
     return tuple(Variant(name, plan, rig) for name, rig in laws.items())
@@ -166,7 +166,7 @@ def _with_noise(noise: DepthNoise) -> Rig:
 
 
 def _question(title: str, rig: Rig, lines: Mapping[str, Mapping[str, Any]]) -> Question:
-    plans = {name: demo_plan(**{"model": nurbs.Settings((4, 4)), **changes}) for name, changes in lines.items()}
+    plans = {name: demo_plan(**{"model": nurbs.Settings((4, 4), 2), **changes}) for name, changes in lines.items()}
     return Question(title, tuple(Variant(name, plan, rig) for name, plan in plans.items()))
 
 

@@ -124,7 +124,7 @@ MEASURES: Mapping[str, Measure] = {
         largest_bends,
         "",
     ),
-    "NURBS": Measure(nurbs.Settings((4, 4)), cma_es.Settings(population=32, generations=1000), unevenness_mm, "mm"),
+    "NURBS": Measure(nurbs.Settings((4, 4), 2), cma_es.Settings(population=32, generations=1000), unevenness_mm, "mm"),
 }
 
 

@@ -25,7 +25,7 @@ SIZE, RADIUS = (0.297, 0.210), 0.1
 T_RP = pose.from_rotation_vector([0.2, -0.3, 0.1], [0.05, -0.02, 0.9])
 STRIP = Strip(T_RP, 0.3, 0.05, np.linspace(0, 1, 65) ** 2, 0.004)
 DOWN = np.array([0.0, 1.0, 0.0])
-SURFACE = nurbs.Settings((4, 4)).of_mesh(MESH)
+SURFACE = nurbs.Settings((4, 4), 2).of_mesh(MESH)
 FLEXPAD = FlexPad(Sheet(T_RP, *SIZE), 60, RADIUS, 1.0)
 MODELS: dict[str, DeformationModel] = {
     "nurbs": SURFACE,

@@ -32,7 +32,7 @@ from tests.tracker.driving import default_plan, drive, mean_errors, rig_of, simu
 from tests.tracker.scenes import sheet
 
 MESH = sheet()
-SHAPE = nurbs.Settings((4, 4)).of_mesh(MESH)
+SHAPE = nurbs.Settings((4, 4), 2).of_mesh(MESH)
 MODEL = Posed(SHAPE)
 RIG = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
 T_RP = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
@@ -152,7 +152,7 @@ def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
 
 def test_the_motion_of_a_rigid_board_is_all_pose():
     simulation = simulate("simulated://board?seed=1")
-    tracker = TrackingSession(rig_of(simulation), default_plan(model=posed.Settings(nurbs.Settings((4, 4)))))
+    tracker = TrackingSession(rig_of(simulation), default_plan(model=posed.Settings(nurbs.Settings((4, 4), 2))))
     steps = list(drive(tracker, simulation, range(25, 75)))
     assert {step.estimate.status for step in steps} == {Status.TRACKING}
     (board,) = simulation.scene.surfaces
@@ -213,7 +213,7 @@ def test_mistakes_of_the_shape_are_told_with_their_full_key(model, mistake):
 
 def error_over_150_exposures(uri: str, **changes: object) -> float:
     simulation = simulate(uri)
-    plan = default_plan(model=posed.Settings(nurbs.Settings((4, 4))), optimizer=cma_es.Settings(), **changes)
+    plan = default_plan(model=posed.Settings(nurbs.Settings((4, 4), 2)), optimizer=cma_es.Settings(), **changes)
     steps = list(drive(TrackingSession(rig_of(simulation), plan), simulation, range(20, 170)))
     vertex_mm, surface_mm = mean_errors(steps)
     objective = "euclidean" if changes else "likelihood"

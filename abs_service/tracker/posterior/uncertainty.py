@@ -1,0 +1,78 @@
+"""Covariance of every frame's estimate: of Θ and of the vertices, with all that is known of their errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel, Surface
+from abs_service.tracker.posterior.correlation import DesignEffects
+from abs_service.tracker.posterior.covariance import (
+    along_normals,
+    isotropic,
+    leverages,
+    propagated,
+    score_covariance,
+    unheld_deviation,
+)
+from abs_service.tracker.posterior.curvature import posterior_covariance
+from abs_service.tracker.posterior.mesh_noise import MeshNoise
+from abs_service.tracker.posterior.misfit import NeighborMean
+from abs_service.tracker.posterior.posterior import FramePosterior
+from abs_service.tracker.posterior.priors import MotionPrior
+from abs_service.tracker.posterior.propagation import ErrorPropagation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Covariances:
+    """Covariances of one estimate.
+
+    Attributes:
+        theta: of Θ (dim, dim).
+        vertices: of every vertex around its material point (n, 3, 3) [m²].
+        unheld_m: standard deviation of a vertex by the measurements of this frame alone, median [m].
+    """
+
+    theta: NDArray[np.float64]
+    vertices: NDArray[np.float64]
+    unheld_m: float
+
+
+class Uncertainty:
+    """Covariances of the estimates of one mesh over time.
+
+    Args:
+        model: the deformation model.
+        motion: the motion prior.
+    """
+
+    def __init__(self, model: DeformationModel, motion: MotionPrior):
+        self._motion = motion
+        self._mesh_noise = MeshNoise(model)
+        self._effects = DesignEffects(model.mesh)
+        self._errors = ErrorPropagation(model.scales)
+        self._neighbor_mean = NeighborMean(model.mesh)
+        self._begun = False
+
+    def relocate(self) -> None:
+        """Forgets the past, after the mesh was laid over a detected object."""
+        self._errors.restart(self._motion.deviation)
+        self._begun = False
+
+    def estimate(self, frame: FramePosterior, theta: NDArray[np.float64], surface: Surface) -> Covariances:
+        """Covariances at the estimate theta (dim,) of a frame, whose surface is a population of one."""
+        if self._begun:  # in the first frame, nothing has moved
+            self._mesh_noise.update(frame, theta)
+        self._begun = True
+        near, precision = frame.linearized_near(theta), self._motion.precision
+        inverse, curvature = posterior_covariance(near.quadratic), near.quadratic.curvature
+        leverage = leverages(inverse, near.sensed)
+        effects = self._effects.update(inverse, near.sensed, leverage)
+        scores = score_covariance(curvature, near.sensed, leverage, effects)
+        covariance = self._errors.update(theta, inverse, scores, precision)
+        vertices = (
+            propagated(near.sparse_jacobian, covariance)
+            + along_normals(surface, self._mesh_noise.variance)
+            + isotropic(self._neighbor_mean(frame.misfit(surface)))
+        )
+        return Covariances(covariance, vertices, unheld_deviation(curvature, precision, near.sparse_jacobian))

@@ -1,0 +1,208 @@
+"""Is TRACKING true, and σ: sheets that slide along themselves, and the coverage of the 95 % regions over time.
+
+All settings are a user's defaults, but for the camera, the noise and the sheet's mask; coverage is measured without the
+outline, too. Truth: the states of a sheet that is rendered densely with noise and mixed pixels (`evaluation.scenes`),
+and the simulator's ray casting.
+
+- **Slides.** A sheet swings for 30 frames; then it lies farther along itself by some centimetres from one frame to the
+  next. A frame is wrong if it is TRACKING while the median error of the vertices' material points exceeds 5 mm and
+  three of the claimed standard deviations. The statistic is the longest row of wrong frames.
+- **Creeps.** A flat sheet on a table is drawn along itself by 2 mm a frame; no edge is free, and nothing is printed
+  on it.
+- **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence: with colour
+  and without, with the outline and without.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+import abs_service as a
+from abs_service.report.content import Cell, Column, Section, Table
+from abs_service.tracker.objectives import likelihood
+from calib.rig import Rig
+from evaluation.experiment import Context, Findings, at_least, at_most
+from evaluation.method.posterior import inside_region
+from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, SheetFrame, SheetScene, SheetState, render_frames, swing
+from evaluation.scenes.surfaces import Wall
+from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
+
+TITLE = "Trust: sheets that slide along themselves, and coverage over time"
+
+#: Frame of the slide, number of frames after it, and what counts as wrong at least [m].
+SLIDE_FRAME, FRAMES_AFTER, WRONG_M = 30, 30, 5e-3
+
+#: The wall behind the table's sheet [m], and how far it is drawn in a frame [m].
+TABLE, CREEP_M = Wall(1.002), 2e-3
+
+#: Outlines with which coverage is measured.
+OUTLINES = {"auto": likelihood.Settings(), "none": likelihood.Settings(outline_px=0.0)}
+
+#: Distances beyond are no returns in the scene without a background [m].
+FARTHEST_M = 1.3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Size of the experiment.
+
+    Attributes:
+        slides_m: lengths of the slides [m].
+        seeds: of the noise and of the simulated sequences, added to the context's seed.
+        frames: of the sequences whose coverage is measured.
+    """
+
+    slides_m: tuple[float, ...] = (0.02, 0.04, 0.08)
+    seeds: tuple[int, ...] = (21, 22, 23)
+    frames: int = 600
+
+
+QUICK = Settings((0.04,), (21,), 24)
+
+
+@dataclass(frozen=True)
+class Slide:
+    """A swinging sheet that lies farther along itself from one frame on."""
+
+    by_m: float
+
+    def __call__(self, t: float) -> SheetState:
+        """The sheet at a time [s]."""
+        state = swing(t)
+        return _drawn(state, self.by_m) if t > (SLIDE_FRAME - 0.5) * INTERVAL_S else state
+
+
+def creep(t: float) -> SheetState:
+    """A flat sheet that is drawn along itself."""
+    return _drawn(SheetState(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), CREEP_M * t / INTERVAL_S)
+
+
+def _drawn(state: SheetState, by_m: float) -> SheetState:
+    """The sheet drawn along its long axis, where that is in its centre [m]."""
+    ends = state.points(np.array([[-1e-3, 0.0], [1e-3, 0.0]]))
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    x, y, z = np.asarray(state.center) + by_m * along
+    return replace(state, center=(float(x), float(y), float(z)))
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """One sequence.
+
+    Attributes:
+        error_m, sigma_m: median error and claimed standard deviation of every frame [m].
+        tracking: True where the status is TRACKING.
+    """
+
+    error_m: NDArray[np.float64]
+    sigma_m: NDArray[np.float64]
+    tracking: NDArray[np.bool_]
+
+    @property
+    def wrong(self) -> NDArray[np.bool_]:
+        """True where TRACKING is said and wrong."""
+        return self.tracking & (self.error_m > np.maximum(WRONG_M, 3 * self.sigma_m))
+
+    @property
+    def longest_wrong(self) -> int:
+        """Longest row of wrong frames."""
+        rows = "".join("x" if wrong else " " for wrong in self.wrong).split()
+        return max(map(len, rows), default=0)
+
+
+def follow(frames: Sequence[SheetFrame], sigma: float) -> Followed:
+    """Tracks frames by distance alone; the first is flat, and its mask tells the object."""
+    tracker = a.Tracker(CAMERA, a.Nurbs(), noise=a.noise.Constant(sigma), geometry="radial")
+    error, claimed, tracking, places = [], [], [], np.zeros((0, 2))
+    for frame in frames:
+        found = tracker.track(frame.distance, time_s=frame.t_ns * 1e-9, mask=frame.sheet)
+        if not len(places):
+            corner, right, down = frame.state.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+            places = (found.vertices - corner) @ np.stack([right - corner, down - corner], axis=1)
+        off = np.linalg.norm(found.vertices - frame.state.points(places), axis=1)
+        error.append(np.median(off))
+        claimed.append(np.sqrt(np.median(np.trace(found.vertex_covariance, axis1=1, axis2=2))))
+        tracking.append(found.status == a.Status.TRACKING)
+    return Followed(np.array(error), np.array(claimed), np.array(tracking))
+
+
+def sequences(settings: Settings, seed: int) -> Iterator[tuple[str, SheetScene, bool]]:
+    """Name, scene, and whether the background gives no return."""
+    for by in settings.slides_m:
+        for empty in (False, True):
+            name = f"slides by {by * 1e3:.0f} mm, {'no return' if empty else 'a wall'} behind"
+            yield name, SheetScene(name, Slide(by)), empty
+    yield "creeps on a table", SheetScene("table", creep, wall=TABLE), False
+
+
+def run(settings: Settings, context: Context) -> Findings:
+    """Runs all sequences."""
+    rows, longest = [], []
+    for seed in (context.seed + one for one in settings.seeds):
+        for name, scene, empty in sequences(settings, seed):
+            context.progress(f"seed {seed}: {name}")
+            frames = render_frames(scene, range(SLIDE_FRAME + FRAMES_AFTER), np.random.default_rng(seed))
+            found = follow([_without_background(one) if empty else one for one in frames], scene.sigma)
+            after = slice(SLIDE_FRAME, None)
+            longest.append(found.longest_wrong)
+            rows.append((
+                name, seed, float(np.median(found.error_m[:SLIDE_FRAME])) * 1e3, found.error_m[-1] * 1e3,
+                found.sigma_m[-1] * 1e3, float(found.tracking[after].mean()), int(found.wrong.sum()), longest[-1],
+            ))  # fmt: skip
+    coverage = _coverage(settings, context)
+    shares = [share for row in coverage for share in row[3:7]]
+    goals = (
+        at_most("Longest row of frames that are TRACKING and wrong", max(longest), 10),
+        at_most("Sequences with a frame that is TRACKING and wrong", sum(one > 0 for one in longest), 0),
+        at_least("Coverage of the 95 % regions, the least of all quarters", min(shares), 0.90),
+        at_most("Coverage of the 95 % regions, the most of all quarters", max(shares), 0.99),
+    )
+    return Findings(goals, (_slides(rows), _quarters(coverage)), {"slides": rows, "coverage": coverage})
+
+
+def _without_background(frame: SheetFrame) -> SheetFrame:
+    return replace(frame, distance=np.where(frame.distance > FARTHEST_M, np.float32(np.nan), frame.distance))
+
+
+def _coverage(settings: Settings, context: Context) -> list[tuple[str, str, int, float, float, float, float, float]]:
+    """Sensors, outline, seed, coverage by quarters, and median error of the last [mm]."""
+    rows = []
+    for seed in (context.seed + one for one in settings.seeds):
+        simulation = simulate(f"simulated://sheet?seed={seed}")
+        rig = demo_rig(simulation)
+        depth = Rig(rig.name, {name: sensor for name, sensor in rig.sensors.items() if name != "color"})
+        for sensors, used in (("colour and depth", rig), ("depth", depth)):
+            for outline, objective in OUTLINES.items():
+                context.progress(f"seed {seed}: {sensors}, outline {outline}")
+                plan = demo_plan(objective=objective)
+                found = track(used, plan, expose(simulation, range(settings.frames)))
+                inside, error = [], []
+                for estimate, points in list(zip(found.estimates, found.material))[1:]:
+                    off = points - estimate.vertices
+                    inside.append(np.mean(inside_region(off, estimate.vertex_covariance)))
+                    error.append(np.median(np.linalg.norm(off, axis=1)))
+                quarters = [float(np.mean(part)) for part in np.array_split(inside, 4)]
+                last = float(np.median(np.array_split(error, 4)[-1])) * 1e3
+                rows.append((sensors, outline, seed, *quarters, last))
+    return rows
+
+
+def _slides(rows: Sequence[tuple[Cell, ...]]) -> Section:
+    columns = (
+        Column("sequence"), Column("seed"), Column("error before", "mm", ".2f"),
+        Column("error at the end", "mm", ".1f"), Column("claimed σ at the end", "mm", ".1f"),
+        Column("TRACKING after the slide", "", ".0%"),
+        Column("wrong frames"), Column("longest row"),
+    )  # fmt: skip
+    return Section("Slides", (Table("Depth alone, all defaults", columns, tuple(rows)),))
+
+
+def _quarters(rows: Sequence[tuple[Cell, ...]]) -> Section:
+    columns = (
+        Column("sensors"), Column("outline"), Column("seed"), Column("1st quarter", "", ".1%"),
+        Column("2nd", "", ".1%"), Column("3rd", "", ".1%"), Column("4th", "", ".1%"),
+        Column("median error, 4th", "mm", ".2f"),
+    )  # fmt: skip
+    return Section("Coverage over time", (Table("Share inside the 95 % region", columns, tuple(rows)),))
