@@ -35,7 +35,7 @@ def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
         rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
         frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
         tracking = TrackingSession(rig, replace(plan, region=nearest.Settings()))
-        for seq, seen in enumerate((frames, [_without_object(frame) for frame in frames])):
+        for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
             tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 

@@ -1,5 +1,7 @@
 """Predictions and costs of the priors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -148,6 +150,16 @@ def test_bending_costs_next_to_nothing_and_stretching_does():
     assert costs[1] < 0.02 * costs[2]
     along_x = np.count_nonzero(MESH.edges[:, 1] - MESH.edges[:, 0] == 1)
     assert costs[2] > along_x * 0.5 * 2.0**2 * 0.99
+
+
+def test_lengths_at_rest_may_change():
+    longer, surface = MESH.vertices * (1.02, 1, 1), as_surface((bent(0.15), MESH.normals))
+    changed, jacobian = StretchPrior(MESH, 0.01), SparseJacobian.from_dense(np.ones((len(MESH.vertices), 3, 2)))
+    changed.rest_on(longer)
+    new = StretchPrior(replace(MESH, vertices=longer), 0.01)
+    np.testing.assert_array_equal(changed.cost(surface), new.cost(surface))
+    one, other = (stack(prior.linearize(surface, jacobian), 2) for prior in (changed, new))
+    np.testing.assert_array_equal(one.residual, other.residual)
 
 
 def test_a_mesh_has_every_edge_once():

@@ -153,10 +153,17 @@ class Nurbs:
         """Deforms the mesh (eq. 8) with every row of `thetas` (population, dim)."""
         return self._patches.deform(thetas)
 
-    def add_offsets(self, by: NDArray[np.float64]) -> None:
-        """Adds lengths (n,) [m] to the vertex offsets along the normals, at rest and deformed."""
-        self._offset += by.astype(np.float32)
-        self._patches.add_offsets(by)
+    @property
+    def offset(self) -> NDArray[np.float32]:
+        """Offsets of the vertices along their normals (n,) [m]."""
+        return self._offset
+
+    def set_offsets(self, offset: NDArray[np.float64], deviation: NDArray[np.float64]) -> None:
+        """Replaces the vertex offsets (n,) [m], known with a standard deviation (n,) [m], in mesh and deformations."""
+        self._offset = offset.astype(np.float32)
+        self._patches.set_offsets(offset)
+        vertices = self.deform(self.rest[None]).vertices[0].T.astype(np.float64)
+        self.mesh = replace(self.mesh, vertices=vertices, deviation=deviation)
 
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""

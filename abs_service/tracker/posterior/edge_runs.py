@@ -35,12 +35,17 @@ class EdgeRuns:
             vertices: number of vertices.
         """
         blocks, lane = _blocks(edges.astype(np.int64), vertices)
-        single = lane < 0
+        single = np.flatnonzero(lane < 0)
         self.runs = _joined(blocks)
         self.singles = np.ascontiguousarray(edges[single])
-        in_runs = np.zeros(_LANES * len(blocks), np.float32)
-        in_runs[lane[~single]] = inverse_lengths[~single]
-        self._inverse_lengths = np.concatenate([in_runs, inverse_lengths[single]])
+        lane[single] = _LANES * len(blocks) + np.arange(len(single))
+        self._place = lane
+        self._inverse_lengths = np.zeros(_LANES * len(blocks) + len(single), np.float32)
+        self.rest_on(inverse_lengths)
+
+    def rest_on(self, inverse_lengths: NDArray[np.float32]) -> None:
+        """Replaces 1 / length at rest (k,) [1/m]."""
+        self._inverse_lengths[self._place] = inverse_lengths
 
     def sum_squares(self, vertices: NDArray[np.float32], factor: float) -> NDArray[np.float64]:
         """Sum (population,) of the squared relative changes of length, times a factor.

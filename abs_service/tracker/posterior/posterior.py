@@ -61,7 +61,11 @@ class Posterior:
         self.motion = motion
 
     def observe(self, observation: Observation) -> "FramePosterior":
-        """Predicts theta, and renders every noise model over its image around the predicted surface."""
+        """Predicts theta, and renders every noise model over its image around the predicted surface.
+
+        Vertex offsets that the model has learnt since the last frame have moved its mesh at rest.
+        """
+        self.stretch.rest_on(self.model.mesh.vertices)
         self.motion.predict(observation.t_host_ns)
         predicted = self.motion.predicted
         self.objective.observe(observation, self.model.deform(predicted[None]), self.motion.reach_m)

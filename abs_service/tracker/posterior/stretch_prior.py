@@ -11,14 +11,29 @@ from calib.jit import kernel
 
 
 class StretchPrior:
-    """Relative edge-length changes are normal with zero mean; it penalises stretching and shearing, never bending."""
+    """Relative edge-length changes are normal with zero mean; it penalises stretching and shearing, never bending.
+
+    Args:
+        mesh: the mesh at rest.
+        deviation: standard deviation of the relative change of an edge's length.
+    """
 
     def __init__(self, mesh: Mesh, deviation: float):
         self._edges = mesh.edges
-        lengths = np.linalg.norm(mesh.vertices[self._edges[:, 0]] - mesh.vertices[self._edges[:, 1]], axis=1)
-        self._inverse_lengths = (1 / lengths).astype(np.float32)
+        self._rest = mesh.vertices
+        self._inverse_lengths = self._inverse_lengths_of(mesh.vertices)
         self._runs = EdgeRuns(self._edges, self._inverse_lengths, len(mesh.vertices))
         self._inverse_deviation = 1 / deviation
+
+    def rest_on(self, vertices: NDArray[np.float64]) -> None:
+        """Takes the edges' lengths at rest from vertices (n, 3) [m]; the same array again changes nothing."""
+        if vertices is not self._rest:
+            self._rest, self._inverse_lengths = vertices, self._inverse_lengths_of(vertices)
+            self._runs.rest_on(self._inverse_lengths)
+
+    def _inverse_lengths_of(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
+        sides = vertices[self._edges[:, 0]] - vertices[self._edges[:, 1]]
+        return (1 / np.linalg.norm(sides, axis=1)).astype(np.float32)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Negative log-density (population,) of the edge lengths, up to a constant."""

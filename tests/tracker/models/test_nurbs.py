@@ -102,6 +102,20 @@ def test_deformation_is_eq_8(shape, degree, seed, weighted):
     np.testing.assert_allclose(surface.normals[0].T[place], normals, atol=2e-4)
 
 
+def test_offsets_may_be_replaced_at_rest_and_deformed():
+    generator = np.random.default_rng(3)
+    u, w, (before, after) = *generator.uniform(0, 1, (2, 9)), generator.uniform(-0.02, 0.02, (2, 9))
+    mesh, rest, weights = sheet(3, 3), bent_control(5, 4), np.ones((5, 4))
+    model, other = (Nurbs(mesh, rest, weights, 2, u, w, offset) for offset in (before, after))
+    model.set_offsets(other.offset.astype(float), np.full(9, 1e-3))
+    theta = model.rest + generator.normal(0, 0.01, model.rest.shape)
+    for one, same in zip(model.deform(theta[None]).vertices, other.deform(theta[None]).vertices, strict=True):
+        np.testing.assert_array_equal(one, same)
+    np.testing.assert_array_equal(model.jacobian(theta), other.jacobian(theta))
+    np.testing.assert_array_equal(model.mesh.vertices, other.mesh.vertices)
+    np.testing.assert_array_equal(model.mesh.deviation, 1e-3)
+
+
 @CASES
 def test_every_candidate_is_deformed_by_itself(case):
     model = MODELS[case]

@@ -60,9 +60,9 @@ class Patches:
     def _arguments(self) -> tuple[NDArray[np.generic], ...]:
         return self._control, self._powers, self._start, self._vertices
 
-    def add_offsets(self, by: NDArray[np.float64]) -> None:
-        """Adds lengths (n,) [m] to the vertex offsets."""
-        self._vertices[2, : len(by)] += by.astype(np.float32)
+    def set_offsets(self, offset: NDArray[np.float64]) -> None:
+        """Replaces the vertex offsets (n,) [m]."""
+        self._vertices[2, : len(offset)] = offset
 
 
 def _polynomials(

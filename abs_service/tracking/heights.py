@@ -1,0 +1,138 @@
+"""Heights of measured points above a mesh: what a depth image shows at every vertex beyond the estimated surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.pairing.images import DepthImage
+from abs_service.tracker.mesh import Mesh
+from calib.camera import Camera
+from calib.jit import kernel
+from calib.noise.base import DepthNoise
+
+#: A pixel that differs by more standard deviations is an outlier, and a vertex most of whose pixels do is not measured.
+INLIER_DEVIATIONS = 3.0
+
+#: Measurements at a smaller cosine between line of sight and normal are ignored: they hardly constrain the height.
+LEAST_COSINE = 0.3
+
+#: Pixels farther away from a vertex are another vertex's, or too many for their use [px].
+LARGEST_RADIUS_PX = 2.5
+
+
+@dataclass(frozen=True, eq=False)
+class Heights:
+    """Heights above the vertices' tangential planes, along the normals.
+
+    Attributes:
+        mean: of the measured points (n,) [m]; 0 where nothing is measured.
+        precision: 1 / σ² (n,) [1/m²]; 0 where nothing is measured.
+    """
+
+    mean: NDArray[np.float64]
+    precision: NDArray[np.float64]
+
+
+class HeightSensor:
+    """A depth sensor that measures heights, of every vertex by the pixels that are nearer to it than to others.
+
+    Args:
+        camera, noise: of the depth sensor.
+        mesh: the mesh as the camera saw it first.
+    """
+
+    def __init__(self, camera: Camera, noise: DepthNoise, mesh: Mesh):
+        self._camera, self._noise = camera, noise
+        one, other = camera.project(mesh.vertices)[mesh.edges].transpose(1, 0, 2)
+        spacing = float(np.nanmedian(np.linalg.norm(one - other, axis=1)))
+        radius = min(spacing / np.sqrt(np.pi), LARGEST_RADIUS_PX)  # a disc as large as a cell
+        self._reach = int(radius)
+        rows, columns = np.mgrid[-self._reach : self._reach + 1, -self._reach : self._reach + 1].reshape(2, -1)
+        self._steps = (rows * camera.width + columns)[np.hypot(rows, columns) <= radius]
+        self._rays = camera.lookup.rays.reshape(-1, 3) @ camera.T_rs[:3, :3].T
+
+    def measure(
+        self,
+        image: DepthImage,
+        vertices: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        variance: NDArray[np.float64],
+    ) -> Heights:
+        """Heights in an image above vertices (n, 3) [m] with unit normals (n, 3).
+
+        Args:
+            image: the depth image.
+            vertices, normals: see above.
+            variance: of what is known of the heights (n,) [m²], which decides what is an outlier.
+        """
+        sight = vertices - self._camera.center
+        distance = np.sqrt(np.vecdot(sight, sight))
+        cosine = np.abs(np.vecdot(sight, normals)) / distance
+        pixel, seen = self._pixel(vertices)
+        deviation, mean = self._noise_of(image, distance, pixel, seen & (cosine > LEAST_COSINE))
+        sigma = deviation * cosine
+        limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
+        height, pixels = np.empty_like(sigma), np.empty_like(sigma)
+        _mean_heights(
+            image.distance.ravel(), self._rays, self._steps, pixel, sight, normals, mean, limit, height, pixels
+        )
+        return Heights(height, pixels / np.where(pixels, sigma, 1) ** 2)
+
+    def _pixel(self, vertices: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Number (n,) of the pixel of every vertex, and whether all of its pixels are in the image, (n,)."""
+        camera, reach = self._camera, self._reach
+        column, row = np.floor(camera.project(vertices).T + 0.5)
+        seen = (column >= reach) & (column < camera.width - reach) & (row >= reach) & (row < camera.height - reach)
+        return np.where(seen, row * camera.width + column, reach * (camera.width + 1)).astype(np.int64), seen
+
+    def _noise_of(
+        self, image: DepthImage, distance: NDArray[np.float64], pixel: NDArray[np.int64], wanted: NDArray[np.bool_]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """σ and mean offset (n,) [m] of the vertices' own pixels; NaN where not wanted or not known."""
+        amplitude = image.amplitude.ravel()[pixel].astype(np.float64)
+        known = wanted & (np.isfinite(amplitude) | (not self._noise.uses_amplitude))
+        row, column = np.divmod(pixel[known], self._camera.width)
+        arguments = distance[known], amplitude[known], (row, column)
+        deviation, mean = np.full((2, len(distance)), np.nan)
+        deviation[known], mean[known] = self._noise.deviation(*arguments), self._noise.mean(*arguments)
+        return deviation, mean
+
+
+@kernel
+def _mean_heights(
+    distance: NDArray[np.float32],
+    rays: NDArray[np.float64],
+    steps: NDArray[np.int64],
+    pixel: NDArray[np.int64],
+    sight: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    mean: NDArray[np.float64],
+    limit: NDArray[np.float64],
+    height: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+) -> None:
+    """Mean height of the inliers among every vertex's pixels, if they are more than half.
+
+    Args:
+        distance: measured distances of all pixels (height · width,) [m].
+        rays: unit directions of all pixels in the rig frame (height · width, 3).
+        steps: from a vertex's own pixel to each of its pixels (k,).
+        pixel: of every vertex (n,).
+        sight: vertices relative to the camera (n, 3) [m].
+        normals: their unit normals (n, 3).
+        mean: mean offset of their measurements (n,) [m]; NaN where nothing is to be measured.
+        limit: largest height of an inlier (n,) [m].
+        height, pixels: results (n,) [m], and the number of inliers (n,); both 0 without enough of them.
+    """
+    for v in range(pixel.size):
+        x, y, z = normals[v, 0], normals[v, 1], normals[v, 2]
+        vertex, total, count = sight[v, 0] * x + sight[v, 1] * y + sight[v, 2] * z, 0.0, 0
+        for step in steps:
+            ray = rays[pixel[v] + step]
+            away = (distance[pixel[v] + step] - mean[v]) * (ray[0] * x + ray[1] * y + ray[2] * z) - vertex
+            if abs(away) < limit[v]:  # False for NaN
+                total += away
+                count += 1
+        enough = 2 * count > steps.size
+        height[v], pixels[v] = (total / count, count) if enough else (0.0, 0)
