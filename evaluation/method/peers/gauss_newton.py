@@ -8,7 +8,10 @@ from scipy.interpolate import BSpline
 from evaluation.scenes.bent_sheet import CAMERA, SIDE, SheetFrame
 from evaluation.scenes.surfaces import knots
 
-CONTROL, DEGREE, ITERATIONS = 4, 3, 6
+#: Control points along the long and the short side.
+CONTROL = (5, 4)
+
+DEGREE, ITERATIONS = 3, 6
 
 #: Standard deviations: of an edge's relative change of length, of what is beside the silhouette [m], of a control
 #: point's motion between frames [m].
@@ -16,7 +19,7 @@ EDGE, BESIDE_M, MOTION_M = 0.02, 0.005, 0.05
 
 
 class GaussNewton:
-    """4 × 4 control points, six iterations; residuals are distances, edge lengths, silhouette and motion.
+    """5 × 4 control points, six iterations; residuals are distances, edge lengths, silhouette and motion.
 
     Args:
         vertices: the template (n, 3) [m] in its first pose, row by row.
@@ -25,8 +28,10 @@ class GaussNewton:
     """
 
     def __init__(self, vertices: NDArray[np.float64], sigma: float, knows_hole: bool = False):
-        u = BSpline.design_matrix(np.linspace(0, 1, SIDE), knots(CONTROL, DEGREE), DEGREE).toarray()
-        self._basis = np.kron(u, u)
+        u, w = (
+            BSpline.design_matrix(np.linspace(0, 1, SIDE), knots(count, DEGREE), DEGREE).toarray() for count in CONTROL
+        )
+        self._basis = np.kron(w, u)
         grid = np.arange(SIDE * SIDE).reshape(SIDE, SIDE)
         steps = [(grid[:, :-1], grid[:, 1:]), (grid[:-1], grid[1:]), (grid[:-1, :-1], grid[1:, 1:])]
         self._a, self._b = (np.concatenate([step[i].ravel() for step in steps]) for i in (0, 1))

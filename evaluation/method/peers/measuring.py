@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -75,11 +75,6 @@ def track_frames(tracker: SheetTracker, at: NDArray[np.float64], frames: Sequenc
         cpu.append(time.process_time() - begun)
     # Errors are found when they are asked for: in between, that would drive what the tracker needs out of the caches.
     return TrackedRun(at, [frame.state for frame in frames[1:]], tracked, 1e3 * np.array(cpu))
-
-
-def fastest(repeats: Sequence[TrackedRun]) -> TrackedRun:
-    """A sequence that was followed several times, with the least time of each frame: what else runs only adds to it."""
-    return replace(repeats[0], cpu_ms=np.min([one.cpu_ms for one in repeats], axis=0))
 
 
 #: Makes a tracker that knows the sheet in the first frame, and tells the places (n, 2) [m] of its vertices.

@@ -1,7 +1,7 @@
 """Our own trackers on the peers' terms: the same template in its first pose, then depth images alone."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,13 +29,8 @@ from calib.noise.constant import Constant
 from calib.rig import Rig, Sensor
 from evaluation.scenes.bent_sheet import CAMERA, SIDE, SIZE, SheetFrame, SheetState, places
 
-#: A sheet of known size that moves faster than most: its rim is where the outline is, and its parameters may change
-#: their speed by 1 m/s from frame to frame.
-OBJECTIVE = likelihood.Settings(outline_px=0.5)
-PRIORS = priors.Settings(speed=1.0)
-
-#: Where nine of ten vertices agree with their measurements as a rule, three of ten that do not are a loss: the sheet
-#: is looked for in the next frame, and stays the same sheet.
+#: What the template adds to the defaults: where nine of ten vertices agree with their measurements as a rule, three of
+#: ten that do not are a loss; the sheet is looked for in the next frame, and stays the same sheet.
 STATUS = status.Settings(degraded_below=0.85, lost_below=0.7)
 REINITIALIZATION = loss_monitor.Settings(after_s=0.0, keep_s=3600.0, every_s=0.1)
 
@@ -47,26 +42,25 @@ class Setup:
     Attributes:
         model: "nurbs" or "flexpad".
         optimizer: its search.
-        control_points, degree: of a NURBS.
+        surface: settings of a NURBS.
     """
 
     model: str
     optimizer: OptimizerSettings
-    control_points: tuple[int, int] = (5, 4)
-    degree: int = 3
+    surface: nurbs.Settings = field(default_factory=nurbs.Settings)
 
 
 #: A search that never samples: what the descent alone is worth.
 DESCENT = hybrid.Settings(fallback_above=0.999, fallback_until=0.998)
 
-#: What the rows are called. 5 × 4 control points of degree 3 can bend to ±120° along the long side without stretching
-#: (0.1 mm off), 4 × 4 of degree 2, the paper's, cannot (0.8 mm off, and 3 % stretched).
+#: What the rows are called. By default, the sheet gets 6 × 5 control points of degree 3. 5 × 4 can bend to ±120° along
+#: the long side without stretching (0.1 mm off); 4 × 4 of degree 2, the paper's, cannot (0.8 mm, and 3 % stretched).
 SETUPS: Mapping[str, Setup] = {
-    "hybrid, NURBS 5 × 4, degree 3": Setup("nurbs", hybrid.Settings()),
-    "hybrid, NURBS 4 × 4, degree 3": Setup("nurbs", hybrid.Settings(), (4, 4)),
-    "hybrid, NURBS 4 × 4, degree 2": Setup("nurbs", hybrid.Settings(), (4, 4), 2),
+    "hybrid, NURBS by default": Setup("nurbs", hybrid.Settings()),
+    "hybrid, NURBS 5 × 4, degree 3": Setup("nurbs", hybrid.Settings(), nurbs.Settings((5, 4))),
+    "hybrid, NURBS 4 × 4, degree 2": Setup("nurbs", hybrid.Settings(), nurbs.Settings((4, 4), 2)),
     "hybrid, FlexPad": Setup("flexpad", hybrid.Settings()),
-    "descent alone, NURBS 5 × 4": Setup("nurbs", DESCENT),
+    "descent alone, NURBS by default": Setup("nurbs", DESCENT),
     "cma_es, 20 generations": Setup("nurbs", cma_es.Settings()),
     "cma_es, 60 generations": Setup("nurbs", cma_es.Settings(generations=60)),
 }
@@ -95,7 +89,7 @@ class Template:
             turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)
             settings = flexpad.Settings()
             return flexpad.FlexPad(turned, SIDE**2, settings.least_radius_m, settings.bend_deviation)
-        return nurbs.Settings(self.setup.control_points, self.setup.degree).of_mesh(template(self.first))
+        return self.setup.surface.of_mesh(template(self.first))
 
 
 def template(state: SheetState) -> Mesh:
@@ -126,11 +120,11 @@ class OwnTracker:
             model=Template(setup, first.state),
             region=nearest.Settings(),
             synthesis=sparse.Settings(),
-            objective=OBJECTIVE,
+            objective=likelihood.Settings(),
             optimizer=setup.optimizer,
             evaluations=100_000,
             vertices=SIDE**2,
-            priors=PRIORS,
+            priors=priors.Settings(),
             status=STATUS,
             reinitialization=REINITIALIZATION,
             seed=seed,

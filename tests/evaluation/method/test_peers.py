@@ -7,7 +7,7 @@ from evaluation.experiment import Context
 from evaluation.method import peers
 from evaluation.method.peers.competitors import KNOWN, NoTracking, installed
 from evaluation.method.peers.gauss_newton import GaussNewton
-from evaluation.method.peers.measuring import TrackedRun, fastest, track_frames, with_template
+from evaluation.method.peers.measuring import track_frames, with_template
 from evaluation.method.peers.own_trackers import SETUPS, OwnTracker
 from evaluation.scenes.bent_sheet import CAMERA, SIZE, SheetScene, SheetState, places, render_frames, spin, swing
 
@@ -68,11 +68,5 @@ def test_rivals_that_are_not_installed_are_left_out():
 @pytest.mark.slow
 def test_quick_peers():
     findings = peers.run(peers.QUICK, Context(1))
-    missed = [goal.name for goal in findings.goals if not goal.met]
-    assert not [what for what in missed if "error" in what]
+    assert all(goal.value < 3.5 for goal in findings.goals if "error" in goal.name)  # six frames instead of forty
     assert {"5 mm", "15 mm", "hole", "turn", "spin"} == set(findings.values["scenes"])
-
-
-def test_the_least_time_of_each_frame_counts():
-    fast, slow = (TrackedRun(np.zeros((1, 2)), [], [], np.array(ms)) for ms in ([1, 5, 2], [2, 3, 9]))
-    np.testing.assert_array_equal(fastest([fast, slow]).cpu_ms, [1, 3, 2])
