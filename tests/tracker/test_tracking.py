@@ -202,6 +202,15 @@ def error_over_300_exposures(uri: str, **changes: object) -> float:
     return vertex_mm
 
 
+def test_a_second_frame_set_without_any_image_that_counts_is_survived():
+    """A distance without its amplitude does not count, and there is no colour."""
+    alone = only(Kind.DEPTH)
+    steps = list(drive(tracking(), SHEET, [0, 1, 2, 3], lambda k, frames: alone(k, frames) if k == 1 else frames))
+    assert steps[1].estimate.status != Status.TRACKING
+    assert steps[3].estimate.status == Status.DEGRADED  # found again two estimates ago
+    assert np.linalg.eigvalsh(steps[3].estimate.vertex_covariance).min() > 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_likelihood_is_within_2_mm_and_better_than_squares_of_the_same_size(seed):
@@ -215,4 +224,4 @@ def test_the_likelihood_is_within_2_mm_and_better_than_squares_of_the_same_size(
     assert likelihood <= 2
     equal = euclidean.Settings(depth_weight=0.5 / 4.5e-3**2, color_weight=0.5 / 4.0**2)
     assert likelihood < error_over_300_exposures(uri, objective=equal)
-    assert likelihood < 1.15 * error_over_300_exposures(uri, objective=euclidean.Settings())
+    assert likelihood < error_over_300_exposures(uri, objective=euclidean.Settings()) + 0.2

@@ -61,10 +61,10 @@ class Uncertainty:
 
     def estimate(self, frame: FramePosterior, theta: NDArray[np.float64], surface: Surface) -> Covariances:
         """Covariances at the estimate theta (dim,) of a frame, whose surface is a population of one."""
-        if self._begun:  # in the first frame, nothing has moved
+        near, precision = frame.linearized_near(theta), self._motion.precision
+        if self._begun and near.sensed:  # nothing has moved in the first frame, nothing is known in one without images
             self._mesh_noise.update(frame, theta)
         self._begun = True
-        near, precision = frame.linearized_near(theta), self._motion.precision
         inverse, curvature = posterior_covariance(near.quadratic), near.quadratic.curvature
         leverage = leverages(inverse, near.sensed)
         effects = self._effects.update(inverse, near.sensed, leverage)
