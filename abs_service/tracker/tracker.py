@@ -15,7 +15,7 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.optimizers.base import Budget, Optimizer, Outcome, Search
 from abs_service.tracker.posterior.posterior import FramePosterior, Posterior
-from abs_service.tracker.posterior.relocation import laid_over
+from abs_service.tracker.posterior.relocation import fit_to_points
 from abs_service.tracker.posterior.uncertainty import Uncertainty
 from abs_service.tracker.shape_quality import ShapeJudge
 from abs_service.tracker.terms.base import inlier_share
@@ -73,7 +73,7 @@ class Tracker:
 
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
-        self._posterior.motion.restart(laid_over(self.model, self._last_tracked, points))
+        self._posterior.motion.restart(fit_to_points(self.model, self._last_tracked, points))
         self._uncertainty.relocate()
         self._is_warm = False
 

@@ -18,7 +18,7 @@ from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.priors import MotionPrior, ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.photometric.appearance import dressed
+from abs_service.tracker.terms.photometric.appearance import with_appearance
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
 from abs_service.tracking.vertex_offsets import Settings as VertexOffsetSettings
@@ -102,8 +102,8 @@ def make_posterior(plan: Plan, rig: Rig, model: DeformationModel, observation: O
     """Posterior of a model, and its mesh with the appearance from the observation."""
     synthesizer = plan.synthesis.build(rig, model.mesh)
     mesh = replace(
-        dressed(model.mesh, observation.images, rig),
-        appearance=dressed(synthesizer.canvas, observation.images, rig).appearance,
+        with_appearance(model.mesh, observation.images, rig),
+        appearance=with_appearance(synthesizer.canvas, observation.images, rig).appearance,
     )
     posterior = Posterior(
         model,

@@ -31,7 +31,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis import sparse, undistorted, warped
-from abs_service.tracker.terms.photometric.appearance import dressed
+from abs_service.tracker.terms.photometric.appearance import with_appearance
 from abs_service.tracking.plan import SynthesisSettings
 from calib import jit, pose
 from calib.noise.bayer import GaussianBayer
@@ -89,8 +89,8 @@ def objective_of(
     rig = Rig("r", {name: Sensor(name, cameras[name], NOISES[head]) for name, head in heads.items()})
     observation = Observer(rig).observe(frame_set(simulation.frames(0), 0))
     synthesizer = synthesis.build(rig, model.mesh)
-    appearance = dressed(synthesizer.canvas, observation.images, rig).appearance
-    mesh = replace(dressed(model.mesh, observation.images, rig), appearance=appearance)
+    appearance = with_appearance(synthesizer.canvas, observation.images, rig).appearance
+    mesh = replace(with_appearance(model.mesh, observation.images, rig), appearance=appearance)
     objective = likelihood.Settings().build(rig, mesh, synthesizer)
     objective.observe(observation, model.deform(model.rest[None]))
     fits = objective.fits(model.deform(model.rest[None]))

@@ -6,7 +6,7 @@ import pytest
 from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
 from abs_service.pairing.images import ChannelImage, ColorImage, Image
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.terms.photometric.appearance import dressed
+from abs_service.tracker.terms.photometric.appearance import with_appearance
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens
@@ -49,12 +49,12 @@ def mosaic(order: str, levels: np.ndarray = RAMPS) -> ChannelImage:
 
 def seen(image: Image, noise: Noise) -> np.ndarray:
     mesh = mesh_before()
-    return dressed(mesh, {"camera": image}, rig(camera=noise)).appearance_of("camera")
+    return with_appearance(mesh, {"camera": image}, rig(camera=noise)).appearance_of("camera")
 
 
 def test_a_color_sensor_sees_its_own_colors_between_the_pixels():
     mesh = mesh_before()
-    result = dressed(mesh, {"color": ColorImage(np.rint(RAMPS).astype(np.uint8))}, rig(color=GaussianColor()))
+    result = with_appearance(mesh, {"color": ColorImage(np.rint(RAMPS).astype(np.uint8))}, rig(color=GaussianColor()))
     np.testing.assert_allclose(result.colors, ramps(mesh), atol=0.51)
     np.testing.assert_array_equal(result.appearance_of("color"), result.colors)
 
@@ -76,20 +76,22 @@ def test_active_light_is_divided_out():
     rays = CAMERA.rays()
     distance = 1 / rays[..., 2]  # of the plane z = 1 m in the sensor's frame
     image = ChannelImage((3000 * rays[..., 2] / distance**2).astype(np.float32), ONE_CHANNEL)
-    looks = dressed(mesh, {"tof": image}, rig(tof=GaussianIntensity("amplitude", 10.0))).appearance_of("tof")
-    np.testing.assert_allclose(looks, 3000, rtol=2e-4)
+    appearance = with_appearance(mesh, {"tof": image}, rig(tof=GaussianIntensity("amplitude", 10.0))).appearance_of(
+        "tof"
+    )
+    np.testing.assert_allclose(appearance, 3000, rtol=2e-4)
 
 
 def test_crosstalk_is_done_to_the_colors_of_a_color_sensor():
     mesh, noise = mesh_before(), GaussianBayer(crosstalk=CROSSTALK)
     images = {"color": ColorImage(np.rint(RAMPS).astype(np.uint8)), "raw": mosaic("rggb", np.zeros_like(RAMPS))}
-    result = dressed(mesh, images, rig(color=GaussianColor(), raw=noise))
+    result = with_appearance(mesh, images, rig(color=GaussianColor(), raw=noise))
     np.testing.assert_allclose(result.appearance_of("raw"), result.colors @ np.array(CROSSTALK).T, atol=1e-3)
 
 
 def test_crosstalk_is_in_the_mosaic_that_the_colors_come_from_and_not_in_the_colors():
     mesh, noise = mesh_before(), GaussianBayer(crosstalk=CROSSTALK)
-    result = dressed(mesh, {"raw": mosaic("gbrg", RAMPS @ np.array(CROSSTALK).T)}, rig(raw=noise))
+    result = with_appearance(mesh, {"raw": mosaic("gbrg", RAMPS @ np.array(CROSSTALK).T)}, rig(raw=noise))
     np.testing.assert_allclose(result.appearance_of("raw"), ramps(mesh) @ np.array(CROSSTALK).T, atol=1e-3)
     np.testing.assert_allclose(result.colors, ramps(mesh), atol=1e-3)
 
@@ -100,7 +102,7 @@ def test_defocus_is_done_to_the_colors_of_a_color_sensor():
     stripes = np.repeat((100 + 100 * (COLUMNS % 4 < 2))[..., None], 3, axis=2)
     images = {"color": ColorImage(stripes.astype(np.uint8))}
     sharp, soft = (
-        dressed(mesh, images, rig(color=GaussianColor(), raw=GaussianBayer(defocus_px=px))).appearance_of("raw")
+        with_appearance(mesh, images, rig(color=GaussianColor(), raw=GaussianBayer(defocus_px=px))).appearance_of("raw")
         for px in (0.0, 3.0)
     )
     assert np.std(sharp[:, 0]) > 20
@@ -112,7 +114,7 @@ def test_a_sensor_that_saw_nothing_takes_the_colors_of_the_others():
     mesh = mesh_before()
     images = {"color": ColorImage(np.rint(RAMPS).astype(np.uint8))}
     noises = {"color": GaussianColor(), "second": GaussianColor(), "grey": GaussianGrey(), "raw": GaussianBayer()}
-    result = dressed(mesh, images, rig(**noises, ir=GaussianIntensity("ir", 5.0)))
+    result = with_appearance(mesh, images, rig(**noises, ir=GaussianIntensity("ir", 5.0)))
     for name in ("second", "raw"):
         np.testing.assert_array_equal(result.appearance_of(name), result.colors)
     np.testing.assert_allclose(result.appearance_of("grey")[:, 0], result.colors @ [0.299, 0.587, 0.114], rtol=1e-5)
@@ -123,13 +125,15 @@ def test_a_sensor_that_saw_nothing_takes_the_colors_of_the_others():
 def test_colors_of_several_sensors_are_averaged_but_each_is_compared_with_its_own():
     mesh = mesh_before()
     images = {name: ColorImage(np.full((240, 320, 3), level, np.uint8)) for name, level in (("a", 100), ("b", 200))}
-    result = dressed(mesh, images, rig(a=GaussianColor(), b=GaussianColor()))
+    result = with_appearance(mesh, images, rig(a=GaussianColor(), b=GaussianColor()))
     assert (result.colors.mean(), result.appearance_of("a").mean(), result.appearance_of("b").mean()) == (150, 100, 200)
 
 
 def test_without_a_picture_there_are_no_colors():
     mesh = mesh_before()
-    result = dressed(mesh, {"tof": depth_image(np.ones((240, 320)))}, rig(tof=Constant(0.01), color=GaussianColor()))
+    result = with_appearance(
+        mesh, {"tof": depth_image(np.ones((240, 320)))}, rig(tof=Constant(0.01), color=GaussianColor())
+    )
     assert np.isnan(result.colors).all()
     assert result.colors.shape == (len(mesh.vertices), 3)
     assert "tof" not in result.appearance
@@ -142,7 +146,7 @@ def test_what_is_out_of_sight_has_no_color(point):
     points = np.array([point, [0.1, 0.05, 1.0]])
     mesh = Mesh(points, np.zeros((0, 3), np.int32), np.zeros((2, 3), np.float32), np.zeros((2, 2)))
     image = ColorImage(np.full((48, 64, 3), 80, np.uint8))
-    colors = dressed(mesh, {"c": image}, Rig("r", {"c": Sensor("c", camera, GaussianColor())})).colors
+    colors = with_appearance(mesh, {"c": image}, Rig("r", {"c": Sensor("c", camera, GaussianColor())})).colors
     assert np.isnan(colors[0]).all()
     np.testing.assert_array_equal(colors[1], 80)
 
@@ -157,6 +161,6 @@ def test_what_the_image_does_not_know_is_not_taken_for_black():
 
 
 def test_appearance_follows_the_vertices_when_they_are_reordered():
-    mesh = dressed(mesh_before(), {"raw": mosaic("rggb")}, rig(raw=GaussianBayer()))
+    mesh = with_appearance(mesh_before(), {"raw": mosaic("rggb")}, rig(raw=GaussianBayer()))
     order = np.random.default_rng(1).permutation(len(mesh.vertices))
     np.testing.assert_array_equal(mesh.reordered(order).appearance_of("raw"), mesh.appearance_of("raw")[order])

@@ -17,7 +17,11 @@ from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
-from abs_service.tracker.terms.photometric.texture_registration_noise import NO_WIDENING, Misplacement, Widening
+from abs_service.tracker.terms.photometric.texture_registration_noise import (
+    NO_WIDENING,
+    TextureRegistrationNoise,
+    Widening,
+)
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
@@ -33,7 +37,7 @@ SHAPE = (CAMERA.height, CAMERA.width)
 
 
 @dataclass(frozen=True, slots=True)
-class Given(Misplacement):
+class Given(TextureRegistrationNoise):
     """A misplacement that makes of the noise what a test says."""
 
     factor: np.ndarray
@@ -100,7 +104,7 @@ def test_the_variance_grows_by_what_the_print_changes_over_the_misplacement():
     view = synthesizer.view("color", np.ascontiguousarray(print_.T, np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
     view.look(predicted)
-    widening = Misplacement(0.3).widening(view, predicted, np.array([[SIGMA]]))
+    widening = TextureRegistrationNoise(0.3).widening(view, predicted, np.array([[SIGMA]]))
     here, ahead, aside = (
         np.stack([reference.project(CAMERA, vertex.astype(float) + step) for vertex in mesh.vertices])
         for step in 1e-4 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
@@ -121,7 +125,7 @@ def test_where_every_candidate_has_samples_of_its_own_the_noise_is_the_sensor_s(
     view = synthesizer.view("color", np.ones((len(synthesizer.canvas.vertices), 3), np.float32))
     predicted = as_surface((mesh.vertices, mesh.normals))
     view.look(predicted)
-    assert Misplacement(0.3).widening(view, predicted, np.ones((1, 1))) is NO_WIDENING
+    assert TextureRegistrationNoise(0.3).widening(view, predicted, np.ones((1, 1))) is NO_WIDENING
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
-from abs_service.tracker.posterior.relocation import laid_over
+from abs_service.tracker.posterior.relocation import fit_to_points
 from calib import pose
 from tests.tracker.scenes import flat, sheet
 
@@ -32,7 +32,7 @@ def bent(degrees: float, turn: tuple[float, float, float], center: tuple[float, 
 @pytest.mark.parametrize("degrees", [70, -70])
 def test_it_lies_on_what_was_found(model: DeformationModel, degrees: float):
     points = bent(degrees, (0.3, -0.4, 0.9), (0.12, -0.05, 1.1))
-    theta = laid_over(model, model.rest, points)
+    theta = fit_to_points(model, model.rest, points)
     vertices = model.deform(theta[None]).vertices[0].T
     apart = np.linalg.norm(vertices[:, None] - points, axis=2)
     assert apart.min(axis=1).mean() < 8e-3
@@ -43,7 +43,7 @@ def test_it_is_turned_as_little_as_possible():
     """Upside down, a sheet is the same points; which way up it is tells the last pose that was trusted."""
     model, points = Rigid(MESH), bent(1e-3, (0, 0, np.deg2rad(100)), (0.1, 0, 1))
     for last, found in ((0.0, -80), (170.0, 100)):
-        theta = laid_over(model, np.array([0, 0, np.deg2rad(last), 0, 0, 0]), points)
+        theta = fit_to_points(model, np.array([0, 0, np.deg2rad(last), 0, 0, 0]), points)
         moved = model.deform(theta[None]).vertices[0].T - (0.1, 0, 1)
         right = MESH.vertices[:, 0] > 0.1
         direction = moved[right].mean(axis=0)

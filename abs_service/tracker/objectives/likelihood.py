@@ -11,7 +11,7 @@ from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.factory import make_term
-from abs_service.tracker.terms.photometric.texture_registration_noise import Misplacement
+from abs_service.tracker.terms.photometric.texture_registration_noise import TextureRegistrationNoise
 from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
 
@@ -44,7 +44,7 @@ class Settings:
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
-        misplacement = Misplacement(self.misplacement_px)
+        misplacement = TextureRegistrationNoise(self.misplacement_px)
         outline_px = OUTLINE_PX if self.outline_px == "auto" else self.outline_px
         return TermSum(
             synthesizer,

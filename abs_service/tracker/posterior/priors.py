@@ -68,7 +68,7 @@ class MotionPrior:
         self._velocity = np.zeros_like(rest)
         self._t_ns: int | None = None
         self._elapsed_s = FIRST_INTERVAL_S
-        self._inverse_deviation = self._told()
+        self._inverse_deviation = self._current_inverse_deviation()
 
     @property
     def deviation(self) -> NDArray[np.float64]:
@@ -86,7 +86,7 @@ class MotionPrior:
         elapsed_ns = FIRST_INTERVAL_S * 1e9 if self._t_ns is None else max(t_ns - self._t_ns, 1)
         self._elapsed_s = min(elapsed_ns * 1e-9, LONGEST_INTERVAL_S)
         self._t_ns = t_ns
-        self._inverse_deviation = self._told()
+        self._inverse_deviation = self._current_inverse_deviation()
         self.reach_m = FARTHEST * self._settings.speed * self._elapsed_s if began else np.inf
         travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
         self.predicted = self._theta + travel * self._velocity
@@ -110,7 +110,7 @@ class MotionPrior:
         """The normalised residuals of parameters (dim,), and their derivatives."""
         return Linearization((theta - self.predicted) * self._inverse_deviation, np.diag(self._inverse_deviation))
 
-    def _told(self) -> NDArray[np.float64]:
+    def _current_inverse_deviation(self) -> NDArray[np.float64]:
         """Inverse deviation (dim,) of the parameters around the predicted ones."""
         return 1 / (self._scales * self._settings.speed * self._elapsed_s)
 

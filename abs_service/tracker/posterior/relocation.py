@@ -19,7 +19,9 @@ _STEPS, _APART_M, _STRETCH = 15, 0.01, 0.02
 _POINTS = 500
 
 
-def laid_over(model: DeformationModel, last: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def fit_to_points(
+    model: DeformationModel, last: NDArray[np.float64], points: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Parameters (dim,) that fit the mesh to points (k, 3) [m] of the visible surface.
 
     The undeformed mesh is aligned by the principal axes of both. Of the four alignments, the one with the smallest

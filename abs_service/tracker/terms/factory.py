@@ -13,7 +13,10 @@ from abs_service.tracker.terms.depth.rim import Rim
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Active, Passive
-from abs_service.tracker.terms.photometric.texture_registration_noise import NOT_AT_ALL, Misplacement
+from abs_service.tracker.terms.photometric.texture_registration_noise import (
+    NO_REGISTRATION_NOISE,
+    TextureRegistrationNoise,
+)
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
 from calib.noise.bayer import GaussianBayer
@@ -29,7 +32,7 @@ def make_term(
     mesh: Mesh,
     synthesizer: Synthesizer,
     bounds: Bounds,
-    misplacement: Misplacement = NOT_AT_ALL,
+    misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
     outline_px: float = 0.0,
 ) -> Term:
     """Term of a sensor for a mesh, under the sensor's own noise model.

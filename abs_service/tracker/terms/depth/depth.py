@@ -16,8 +16,8 @@ from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
     distances,
+    median_inlier_cost,
     normalize,
-    usual_cost,
     write_constants,
 )
 from abs_service.tracker.terms.depth.outline import NoOutline, Outline
@@ -88,7 +88,7 @@ class DepthTerm:
         self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
         self._doubtful = placed(window, doubtful, height, width).ravel()
         self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)
-        self._silence(texture, seen, doubtful)
+        self._mask_pixels(texture, seen, doubtful)
         self._texture = texture.reshape(-1, 8)
 
     def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
@@ -109,17 +109,17 @@ class DepthTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Does nothing: a depth sensor detects occluders in its own image."""
 
-    def _silence(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
+    def _mask_pixels(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
         """Writes constant costs into the texture (height + 2, width + 2, 8) at pixels without a usable distance.
 
         Behind an occluder, in a hole, and next to an outline with a term of its own, a vertex costs the mean of an
         inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
         the distance from the object.
         """
-        silent = seen.foreground | seen.hole | doubtful
-        agreeing = usual_cost(within(texture, self._window), seen.object) if silent.any() else 0.0
+        masked = seen.foreground | seen.hole | doubtful
+        agreeing = median_inlier_cost(within(texture, self._window), seen.object) if masked.any() else 0.0
         free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
-        write_constants(silent, free_m, agreeing, outlier, *corner(self._window), texture)
+        write_constants(masked, free_m, agreeing, outlier, *corner(self._window), texture)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""

@@ -15,7 +15,7 @@ _TILE = 32
 
 
 @kernel
-def usual_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
+def median_inlier_cost(texels: NDArray[np.float32], shown: NDArray[np.bool_]) -> float:
     """Mean cost of an inlier on the object, given its mask (rows, columns); 0 for an empty mask."""
     normalizer, count = np.empty(shown.size, np.float32), 0
     for row in range(shown.shape[0]):
@@ -36,7 +36,7 @@ def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
 
 @kernel
 def write_constants(
-    silent: NDArray[np.bool_],
+    masked: NDArray[np.bool_],
     free_m: NDArray[np.float32],
     agreeing: float,
     outlier: float,
@@ -44,12 +44,12 @@ def write_constants(
     left: int,
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes texels of cost `agreeing` at silent pixels, and outlier + d / s at distance d > 0 into free space."""
+    """Writes texels of cost `agreeing` at masked pixels, and outlier + d / s at distance d > 0 into free space."""
     per_metre = np.float32(1 / FREE_SCALE_M)
-    for row in range(silent.shape[0]):
-        for column in range(silent.shape[1]):
+    for row in range(masked.shape[0]):
+        for column in range(masked.shape[1]):
             free = free_m[row, column]
-            if free > 0 or silent[row, column]:
+            if free > 0 or masked[row, column]:
                 texel = texture[top + row + 1, left + column + 1]
                 texel[:] = 0
                 texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)

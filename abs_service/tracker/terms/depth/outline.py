@@ -17,13 +17,13 @@ from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, locate, outline_cost
-from abs_service.tracker.terms.depth.rim_classes import MOST_BEYOND, RimClass, classify_rim
+from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
 
 #: Beside the object, pixels nearer to it than so many deviations are not held against a vertex: the rim is there.
-GRACE = 3.0
+UNJUDGED_DEVIATIONS = 3.0
 
 #: An outer vertex is hidden if the mesh's own surface lies so far in front of it [m].
 HIDDEN_BEHIND_M = 0.01
@@ -150,7 +150,7 @@ class RimOutline:
         self._ends = self._rim.outer[visible], self._rim.inner[visible], self._beyond[visible]
         self._hidden = len(free) - len(visible)
         beside = np.zeros(distance.shape, np.bool_)
-        beside[part] = (seen.free_m[part] > 0) & (self._inwards > -GRACE * self._deviation)
+        beside[part] = (seen.free_m[part] > 0) & (self._inwards > -UNJUDGED_DEVIATIONS * self._deviation)
         return beside
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
@@ -180,7 +180,7 @@ class RimOutline:
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
         vertices = surface.vertices[0].T.astype(np.float64)
         outer, inner = vertices[self._rim.outer[covered]], vertices[self._rim.inner[covered]]
-        beyond = self._inside_at(outer + MOST_BEYOND * (outer - inner))
+        beyond = self._inside_at(outer + LARGEST_GAP_STEPS * (outer - inner))
         return RimFit(
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),

@@ -10,7 +10,7 @@ from abs_service.tracker.terms.depth.rim import Rim
 from calib.camera import Camera
 
 #: The object continues beyond the outermost vertices by no more than so many times their distance from the next ones.
-MOST_BEYOND = 2.0
+LARGEST_GAP_STEPS = 2.0
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
@@ -58,12 +58,12 @@ def classify_rim(
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
-    classes[~(beyond <= MOST_BEYOND)] = RimClass.CONTACT
+    classes[~(beyond <= LARGEST_GAP_STEPS)] = RimClass.CONTACT
     classes[end_cosine < LEAST_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
-    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, MOST_BEYOND), 0.0)
+    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, LARGEST_GAP_STEPS), 0.0)
     return classes, gap.astype(np.float32)
 
 

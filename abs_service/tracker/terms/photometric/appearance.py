@@ -26,7 +26,7 @@ Values = NDArray[np.float64]
 LEAST_COSINE = 0.2
 
 
-def dressed(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
+def with_appearance(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
     """The mesh with its colours, and with its appearance in every imaging sensor.
 
     The appearance comes from the sensor's own image, because no two cameras agree on a colour; for vertices that it

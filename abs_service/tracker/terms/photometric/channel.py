@@ -24,7 +24,11 @@ from abs_service.tracker.terms.photometric.channel_cost import (
 )
 from abs_service.tracker.terms.photometric.illumination import Illumination
 from abs_service.tracker.terms.photometric.shadow import Shadow
-from abs_service.tracker.terms.photometric.texture_registration_noise import NO_WIDENING, NOT_AT_ALL, Misplacement
+from abs_service.tracker.terms.photometric.texture_registration_noise import (
+    NO_REGISTRATION_NOISE,
+    NO_WIDENING,
+    TextureRegistrationNoise,
+)
 from calib.noise.base import LOG_SQRT_2PI
 
 #: The texel of no measurement.
@@ -56,7 +60,7 @@ class ChannelTerm:
         noise: ChannelNoise,
         illumination: Illumination,
         bounds: Bounds,
-        misplacement: Misplacement = NOT_AT_ALL,
+        misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer

@@ -76,13 +76,13 @@ def channel_cost(
     samples, channels = factor.shape
     # No branches on what is measured, see `depth_cost._cost_of`.
     for k in prange(pixel.shape[0]):
-        total, pixels, looks = 0.0, pixel[k], appearance[np.intp(k) % appearance.shape[0]]
+        total, pixels, expected = 0.0, pixel[k], appearance[np.intp(k) % appearance.shape[0]]
         for v in range(np.uintp(pixels.size)):
             i = pixels[v]
             texel = texture[np.uintp(max(i, 0))]
             channel = np.uintp(np.int32(texel[1]))
             row, column = (v if samples > 1 else np.uintp(0)), (channel if channels > 1 else np.uintp(0))
-            e = (texel[0] - looks[v, channel]) * texel[2] / factor[row, column]
+            e = (texel[0] - expected[v, channel]) * texel[2] / factor[row, column]
             normalizer = texel[3] + log_factor[row, column]
             explained = min(half * e * e + normalizer, most)
             cost = half + normalizer if abs(e) > farthest else explained

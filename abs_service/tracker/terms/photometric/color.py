@@ -11,7 +11,10 @@ from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.shadow import Shadow
-from abs_service.tracker.terms.photometric.texture_registration_noise import NOT_AT_ALL, Misplacement
+from abs_service.tracker.terms.photometric.texture_registration_noise import (
+    NO_REGISTRATION_NOISE,
+    TextureRegistrationNoise,
+)
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
 from calib.noise.color import GaussianColor
@@ -31,7 +34,7 @@ class ColorTerm:
         colors: NDArray[np.float32],
         noise: GaussianColor,
         bounds: Bounds,
-        misplacement: Misplacement = NOT_AT_ALL,
+        misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer
@@ -141,10 +144,10 @@ def _color_cost(
     shared = inverse.shape[0] == 1
     # No branches on what is measured, see `depth_cost._cost_of`.
     for k in prange(pixel.shape[0]):
-        total, pixels, looks = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
+        total, pixels, expected = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
         for v in range(np.uintp(pixels.size)):
             i = pixels[v]
-            measured, color = texture[np.uintp(max(i, 0))], looks[v]
+            measured, color = texture[np.uintp(max(i, 0))], expected[v]
             row = np.uintp(0) if shared else v
             red = (measured[0] - color[0]) * inverse[row, 0]
             green = (measured[1] - color[1]) * inverse[row, 1]

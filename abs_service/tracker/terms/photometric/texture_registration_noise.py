@@ -23,7 +23,7 @@ class Widening(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Misplacement:
+class TextureRegistrationNoise:
     """Texture registration noise: the position of each sample's appearance is known to a fraction of a pixel only.
 
     The appearance was sampled in the first images on the first mesh, and the model follows the surface only
@@ -54,4 +54,4 @@ class Misplacement:
 
 #: That of a mesh on which everything is where it belongs.
 NO_WIDENING = Widening(np.ones((1, 1), np.float32), np.zeros((1, 1), np.float32))
-NOT_AT_ALL = Misplacement(0.0)
+NO_REGISTRATION_NOISE = TextureRegistrationNoise(0.0)
