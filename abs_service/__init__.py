@@ -3,7 +3,7 @@
   import abs_service as a
 
   camera = a.Camera(640, 480, fx=528, fy=528, cx=320, cy=240)
-  tracker = a.Tracker(depth=camera, model=a.Nurbs(4, 4))
+  tracker = a.Tracker(depth=camera, model=a.Nurbs())
   for number, depth_m in enumerate(images):
       estimate = tracker.track(depth_m, time_s=number / 30)
 
