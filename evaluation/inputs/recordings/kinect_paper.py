@@ -50,7 +50,7 @@ class Cell:
 
     def tracker(self) -> a.Tracker:
         """A tracker with the defaults of a user, of whom only cameras and model are asked."""
-        model = a.Nurbs(4, 4) if self.model == "nurbs" else a.FlexPad()
+        model = a.Nurbs() if self.model == "nurbs" else a.FlexPad()
         return a.Tracker(depth=CAMERA, color=CAMERA if self.color else None, model=model)
 
 
