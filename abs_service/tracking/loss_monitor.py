@@ -7,6 +7,10 @@ from annotated_types import Ge, Gt
 
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.status import rim_share
+
+#: Share of the free edges off the outline with which a mesh counts as misplaced.
+OFF_SHARE = 0.3
 
 
 @dataclass(frozen=True)
@@ -24,6 +28,8 @@ class Settings:
             an empty scene has surfaces, too.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
+        misfit_s: time for which more than three tenths of the free edges must lie off the object's outline before a new
+            mesh is made [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -32,6 +38,7 @@ class Settings:
     confirm: Annotated[int, Ge(1)] = 3
     size_ratio: Annotated[float, Gt(1)] = 2.0
     grow_s: Annotated[float, Ge(0)] = 2.0
+    misfit_s: Annotated[float, Ge(0)] = 1.0
 
 
 class LossMonitor:
@@ -41,11 +48,15 @@ class LossMonitor:
         self._settings = settings
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
+        self._off_ns: int | None = None
         self._good = settings.confirm
         self._event = "found again"
 
     def attempt_due(self, t_ns: int) -> bool:
         """True if an attempt is due at `t_ns` [ns]; it then counts as made."""
+        if self._off_ns is not None and t_ns - self._off_ns >= self._settings.misfit_s * 1e9:
+            self._off_ns = None
+            return True
         if self._lost_ns is None or t_ns - self._lost_ns < self._settings.after_s * 1e9:
             return False
         if self._tried_ns is not None and t_ns - self._tried_ns < self._settings.every_s * 1e9:
@@ -59,6 +70,8 @@ class LossMonitor:
 
     def with_hysteresis(self, estimate: Estimate) -> Estimate:
         """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
+        off = rim_share(estimate.fits) > OFF_SHARE
+        self._off_ns = (self._off_ns or estimate.t_host_ns) if off else None
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns
             self._good, self._event = 0, "found again"

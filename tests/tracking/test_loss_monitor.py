@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.terms.base import RimFit, SensorFit
 from abs_service.tracking.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind
@@ -45,6 +46,16 @@ def test_a_good_estimate_restarts_the_delay():
     monitor.with_hysteresis(estimate(9, Status.LOST))
     assert not monitor.attempt_due(10 * FRAME_NS)
     assert monitor.attempt_due(13 * FRAME_NS)
+
+
+def test_a_mesh_that_stays_off_its_outline_is_made_anew():
+    monitor, tries = LossMonitor(Settings(misfit_s=0.2)), []
+    off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, RimFit(visible=60, outside=12, inside=12)),)
+    for k in range(1, 20):
+        if monitor.attempt_due(k * FRAME_NS):
+            tries.append(k)
+        monitor.with_hysteresis(dataclasses.replace(estimate(k, Status.DEGRADED), fits=off if k != 3 else ()))
+    assert tries == [11, 18]  # 0.2 s after frame 4, and again as long after the next one
 
 
 def test_after_a_loss_the_first_good_estimates_are_degraded():
