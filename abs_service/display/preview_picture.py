@@ -101,7 +101,7 @@ def title(preview: Preview, tracker: str, model: str) -> str:
 
 
 def note(preview: Preview) -> str:
-    """Why there is no object in the first frame; "" if there is."""
+    """Reason why the first frame shows no object; "" if it does."""
     if not preview.reason:
         return ""
     return preview.reason if preview.found is None else f"Not found in the first frame: {preview.reason}"

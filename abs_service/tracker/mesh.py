@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class Mesh:
         """Appearance in a sensor at the points of its synthesis; defaults to the vertices' colours."""
         return self.appearance.get(sensor, self.colors)
 
-    @property
+    @cached_property
     def edges(self) -> NDArray[np.int32]:
         """Vertex indices (k, 2) of every edge once."""
         sides = np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]])
@@ -43,15 +44,12 @@ class Mesh:
     @property
     def area(self) -> float:
         """Area of the surface [m²]."""
-        corners = self.vertices[self.faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return float(np.linalg.norm(normals, axis=1).sum() / 2)
+        return float(np.linalg.norm(area_vectors(self.vertices, self.faces), axis=1).sum() / 2)
 
     @property
     def normals(self) -> NDArray[np.float64]:
         """Unit vertex normals (n, 3), the area-weighted mean of the adjacent faces' normals."""
-        corners = self.vertices[self.faces]
-        face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        face_normals = area_vectors(self.vertices, self.faces)
         normals = np.zeros_like(self.vertices)
         for corner in range(3):
             np.add.at(normals, self.faces[:, corner], face_normals)
@@ -66,3 +64,15 @@ class Mesh:
         return Mesh(
             self.vertices[order], place[self.faces], self.colors[order], self.chart[order], appearance, deviation
         )
+
+
+def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
+    """Normals (m, 3) of the faces (m, 3) of vertices (n, 3) [m], as long as twice their area [m²]."""
+    corner = vertices[faces[:, 0]]
+    (a, b, c), (d, e, f) = (vertices[faces[:, 1]] - corner).T, (vertices[faces[:, 2]] - corner).T
+    return np.stack([b * f - c * e, c * d - a * f, a * e - b * d], axis=1)
+
+
+def edge_lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:
+    """Lengths (k,) [m] of the edges (k, 2) of vertices (n, 3) [m]."""
+    return np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
 
 #: Neighbouring faces are folded if their normals differ by more than 120°, and by less than 60° at rest.
 FOLDED_COSINE, UNFOLDED_COSINE = -0.5, 0.5
@@ -13,7 +13,7 @@ FOLDED_COSINE, UNFOLDED_COSINE = -0.5, 0.5
 
 @dataclass(frozen=True, slots=True)
 class ShapeQuality:
-    """What a deformed mesh shows by itself.
+    """Plausibility of one deformed mesh by itself.
 
     Attributes:
         stretch: relative change of the length of an edge, 95th percentile.
@@ -37,7 +37,7 @@ class ShapeJudge:
 
     def __init__(self, mesh: Mesh):
         self._faces, self._edges = mesh.faces, mesh.edges
-        self._lengths = _lengths(mesh.vertices, self._edges)
+        self._lengths = edge_lengths(mesh.vertices, self._edges)
         pairs = _neighbors(mesh.faces)
         normals = _normals(mesh.vertices, mesh.faces)
         even = np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]]) > UNFOLDED_COSINE
@@ -47,7 +47,7 @@ class ShapeJudge:
         self, vertices: NDArray[np.floating], vertex_covariance: NDArray[np.float64], unheld_m: float
     ) -> ShapeQuality:
         """Quality of deformed vertices (n, 3) [m] with covariances (n, 3, 3) [m²]; `unheld_m` as in `ShapeQuality`."""
-        stretch = np.abs(_lengths(vertices, self._edges) / self._lengths - 1)
+        stretch = np.abs(edge_lengths(vertices, self._edges) / self._lengths - 1)
         normals = _normals(vertices, self._faces)
         cosine = np.einsum("pi,pi->p", normals[self._pairs[:, 0]], normals[self._pairs[:, 1]])
         variance = np.einsum("nii->n", vertex_covariance)
@@ -59,17 +59,10 @@ class ShapeJudge:
         )
 
 
-def _lengths(vertices: NDArray[np.floating], edges: NDArray[np.int32]) -> NDArray[np.floating]:
-    steps = vertices[edges[:, 0]] - vertices[edges[:, 1]]
-    return np.sqrt(np.einsum("ei,ei->e", steps, steps))
-
-
 def _normals(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:
     """Unit normals (m, 3) of the faces."""
-    corner = vertices[faces[:, 0]]
-    (a, b, c), (d, e, f) = (vertices[faces[:, 1]] - corner).T, (vertices[faces[:, 2]] - corner).T
-    normals = np.stack([b * f - c * e, c * d - a * f, a * e - b * d])
-    return (normals / np.maximum(np.sqrt(np.sum(normals**2, axis=0)), 1e-12)).T
+    normals = area_vectors(vertices, faces)
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
 def _neighbors(faces: NDArray[np.int32]) -> NDArray[np.intp]:

@@ -9,9 +9,6 @@ from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.status import rim_share
 
-#: Share of the free edges off the outline with which a mesh counts as misplaced.
-OFF_SHARE = 0.3
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -28,8 +25,8 @@ class Settings:
             an empty scene has surfaces, too.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
-        misfit_s: time for which more than three tenths of the free edges must lie off the object's outline before a new
-            mesh is made [s].
+        misfit_s: time for which too many of the free edges (`status.degraded_rim`) must lie off the object's outline
+            before a new mesh is made [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -42,9 +39,15 @@ class Settings:
 
 
 class LossMonitor:
-    """Status of one tracker over time."""
+    """Status of one tracker over time.
 
-    def __init__(self, settings: Settings):
+    Args:
+        settings: its settings.
+        off_share: share of the free edges off the outline above which a mesh is misplaced.
+    """
+
+    def __init__(self, settings: Settings, off_share: float):
+        self._off_share = off_share
         self._settings = settings
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
@@ -70,7 +73,7 @@ class LossMonitor:
 
     def with_hysteresis(self, estimate: Estimate) -> Estimate:
         """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
-        off = rim_share(estimate.fits) > OFF_SHARE
+        off = rim_share(estimate.fits) > self._off_share
         self._off_ns = (self._off_ns or estimate.t_host_ns) if off else None
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns

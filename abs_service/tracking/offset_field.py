@@ -33,7 +33,7 @@ EDGES_PER_VERTEX, DEGREE = 3, 6
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What is expected of offsets.
+    """Expectation of the offsets before their own evidence.
 
     Attributes:
         rest: r, where they are held (n,) [m].

@@ -42,7 +42,7 @@ class TrackingSession:
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
-        self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization)
+        self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status.degraded_rim)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
         self._reinitialize_requested = False

@@ -20,7 +20,7 @@ from annotated_types import Ge
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage, Image
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
 from abs_service.tracking.heights import HeightSensor
 from abs_service.tracking.offset_field import OffsetField, change_prior, relief_prior
@@ -196,6 +196,6 @@ def _mark_folded(
 def _edges_around(mesh: Mesh) -> NDArray[np.float64]:
     """Mean length (n,) [m] of every vertex's edges."""
     ends = mesh.edges
-    length = np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
+    length = edge_lengths(mesh.vertices, ends)
     total, count = (np.bincount(ends.ravel(), weights, len(mesh.vertices)) for weights in (length.repeat(2), None))
     return total / count

@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.stats import chi2
 
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.estimate import Estimate
@@ -24,10 +23,10 @@ from abs_service.tracker.posterior.covariance import propagated
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from calib.noise.color import GaussianColor
+from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track, with_noise
 
-SHARE = 0.95
 #: Standard deviation of a colour in the default rig [levels of 256].
 DEMO_SIGMA = 4.0
 
@@ -145,9 +144,3 @@ def _sensed(covariance: NDArray[np.float64], prior: NDArray[np.float64]) -> NDAr
     """Directions (k, dim) of Θ whose variance the sensors at least halve; `prior` is the priors' Hessian (dim, dim)."""
     gain, directions = eigh(np.linalg.inv(covariance), prior)  # gain: 1 where only the priors contribute
     return np.linalg.inv(directions)[gain > 2]
-
-
-def inside_region(error: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True (n,) where errors (n, d) lie inside the 95 % ellipsoids of covariances (n, d, d)."""
-    square = np.einsum("ni,ni->n", error, np.linalg.solve(covariance, error[..., None])[..., 0])
-    return square < chi2.ppf(SHARE, error.shape[1])

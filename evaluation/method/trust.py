@@ -23,8 +23,8 @@ import abs_service as a
 from abs_service.report.content import Cell, Column, Section, Table
 from abs_service.tracker.objectives import likelihood
 from calib.rig import Rig
+from evaluation.coverage import inside_region
 from evaluation.experiment import Context, Findings, at_least, at_most
-from evaluation.method.posterior import inside_region
 from evaluation.scenes.bent_sheet import CAMERA, INTERVAL_S, SheetFrame, SheetScene, SheetState, render_frames, swing
 from evaluation.scenes.surfaces import Wall
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track

@@ -17,25 +17,13 @@ from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracking.preview import FoundMesh, Preview
 from calib.camera import Camera
 from drivers.simulated.address import parse
+from tests.commands import test_check
 from tests.commands.simulated_recording import write_take
 from tests.tracker.scenes import flat, sheet
 
 ROOT = Path(__file__).parents[2]
 HEADS = {"tof": "tof", "color": "color"}
-RIG = """
-version = 1
-name = "bench"
-[devices.sim]
-uri = "simulated://sheet?seed=1&sensors=tof&tof=160x120"
-[sensors.tof]
-device = "sim"
-noise = { type = "gaussian_polynomial", sigma = [[0.005]] }
-[synchronisation]
-reference = "tof/depth"
-[trackers.sheet]
-sensors = ["tof"]
-model = { type = "rigid" }
-"""
+RIG = test_check.RIG.replace("sensors=tof", "sensors=tof&tof=160x120")
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from tests.tracker.driving import default_plan, drive, rig_of, simulate
 from tests.tracker.scenes import sheet
 
 FRAME_NS = 33_000_000
+OFF_SHARE = 0.3
 SHEET = simulate("simulated://sheet?seed=1")
 
 
@@ -24,13 +25,13 @@ def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
 
 
 def test_a_tracked_object_needs_no_attempt():
-    monitor = LossMonitor(Settings())
+    monitor = LossMonitor(Settings(), OFF_SHARE)
     assert [monitor.with_hysteresis(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
     assert not monitor.attempt_due(10**12)
 
 
 def test_attempts_are_due_after_a_delay_and_then_periodically():
-    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1))
+    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1), OFF_SHARE)
     tries = []
     for k in range(1, 16):
         if monitor.attempt_due(k * FRAME_NS):
@@ -40,7 +41,7 @@ def test_attempts_are_due_after_a_delay_and_then_periodically():
 
 
 def test_a_good_estimate_restarts_the_delay():
-    monitor = LossMonitor(Settings(after_s=0.1))
+    monitor = LossMonitor(Settings(after_s=0.1), OFF_SHARE)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     monitor.with_hysteresis(estimate(1, Status.DEGRADED, ("no frame from color",)))
     monitor.with_hysteresis(estimate(9, Status.LOST))
@@ -49,7 +50,7 @@ def test_a_good_estimate_restarts_the_delay():
 
 
 def test_a_mesh_that_stays_off_its_outline_is_made_anew():
-    monitor, tries = LossMonitor(Settings(misfit_s=0.2)), []
+    monitor, tries = LossMonitor(Settings(misfit_s=0.2), OFF_SHARE), []
     off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, RimFit(visible=60, outside=12, inside=12)),)
     for k in range(1, 20):
         if monitor.attempt_due(k * FRAME_NS):
@@ -59,7 +60,7 @@ def test_a_mesh_that_stays_off_its_outline_is_made_anew():
 
 
 def test_after_a_loss_the_first_good_estimates_are_degraded():
-    monitor = LossMonitor(Settings(confirm=3))
+    monitor = LossMonitor(Settings(confirm=3), OFF_SHARE)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     after = [monitor.with_hysteresis(estimate(k, Status.TRACKING)) for k in range(1, 5)]
     assert [e.status for e in after] == [Status.DEGRADED, Status.DEGRADED, Status.TRACKING, Status.TRACKING]
@@ -68,7 +69,7 @@ def test_after_a_loss_the_first_good_estimates_are_degraded():
 
 
 def test_objects_of_another_size_are_rejected():
-    monitor = LossMonitor(Settings(size_ratio=2.0))
+    monitor = LossMonitor(Settings(size_ratio=2.0), OFF_SHARE)
     lost = sheet(size=(0.3, 0.2))
     assert lost.area == pytest.approx(0.06, rel=0.05)
     assert not monitor.differs_in_size(sheet(size=(0.25, 0.2)), lost)
@@ -122,11 +123,11 @@ def test_reinitialize_makes_a_new_mesh_in_the_next_frame():
 
 
 def test_the_mesh_is_kept_for_keep_s_after_the_loss():
-    monitor = LossMonitor(Settings(keep_s=1.0))
+    monitor = LossMonitor(Settings(keep_s=1.0), OFF_SHARE)
     assert not monitor.keeps_mesh(0)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     assert monitor.keeps_mesh(FRAME_NS)
     assert not monitor.keeps_mesh(1_100_000_000)
-    lost_for_good = LossMonitor(Settings())
+    lost_for_good = LossMonitor(Settings(), OFF_SHARE)
     lost_for_good.with_hysteresis(estimate(0, Status.LOST))
     assert not lost_for_good.keeps_mesh(FRAME_NS)

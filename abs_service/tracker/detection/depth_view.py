@@ -1,4 +1,4 @@
-"""What a region selects from: the first depth image, its points and the camera that measured it."""
+"""Input of a region: the first depth image, its points and the camera that measured it."""
 
 from dataclasses import dataclass
 

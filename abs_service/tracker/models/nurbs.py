@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import binding, spline
 from abs_service.tracker.models.parts.bspline_patches import Patches
@@ -104,7 +104,7 @@ def _sides(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lengths (2,) of the mesh along the axes of its chart [m], and numbers (2,) of edges on them, both approximate."""
     edges, size = mesh.edges, np.ptp(mesh.chart, axis=0)
     steps = np.abs(mesh.chart[edges[:, 1]] - mesh.chart[edges[:, 0]])
-    lengths = np.linalg.norm(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], axis=1)
+    lengths = edge_lengths(mesh.vertices, edges)
     along = [steps[:, axis] > 10 * steps[:, 1 - axis] for axis in range(2)]
     along = [own if own.any() else np.ones_like(own) for own in along]  # a mesh without edges along its chart
     step = np.array([np.median(steps[own, axis]) for axis, own in enumerate(along)])

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.posterior.edge_runs import EdgeRuns
 from abs_service.tracker.terms.linearization import Linearization, split
@@ -32,8 +32,7 @@ class StretchPrior:
             self._runs.rest_on(self._inverse_lengths)
 
     def _inverse_lengths_of(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
-        sides = vertices[self._edges[:, 0]] - vertices[self._edges[:, 1]]
-        return (1 / np.linalg.norm(sides, axis=1)).astype(np.float32)
+        return (1 / edge_lengths(vertices, self._edges)).astype(np.float32)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Negative log-density (population,) of the edge lengths, up to a constant."""

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import abs_service as a
+from evaluation.coverage import inside_region
 from evaluation.inputs.recordings import features
 from evaluation.inputs.recordings.binding import Binding, Points, bind
 
@@ -27,9 +28,6 @@ RATE_HZ = 30.0
 
 #: z of a wall behind the sheet [m], where the data has no background.
 WALL_M = 0.85
-
-#: χ² of three degrees of freedom that holds 95 %.
-CHI2_95 = 7.815
 
 #: A frame is wrong if its median error is above this many of its own claimed σ, and above this [mm].
 WRONG_SIGMA, WRONG_MM = 3.0, 5.0
@@ -215,8 +213,7 @@ def _errors(
 def share_inside(error: Points, covariance: Points) -> float:
     """Share of the errors (n, 3) that are in the 95 % region of their covariances (n, 3, 3); NaN is outside."""
     known = np.isfinite(covariance).all(axis=(1, 2))
-    squared = np.einsum("ki,ki->k", error[known], np.linalg.solve(covariance[known], error[known][..., None])[..., 0])
-    return float((squared <= CHI2_95).sum() / len(error))
+    return float(inside_region(error[known], covariance[known]).sum() / len(error))
 
 
 def _image(path: Path, flags: int) -> NDArray[Any]:

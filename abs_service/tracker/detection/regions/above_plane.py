@@ -1,4 +1,4 @@
-"""What lies or stands on the dominant plane: objects on a table, or before a wall."""
+"""The object on the dominant plane, such as a table, or before one, such as a wall."""
 
 from dataclasses import dataclass
 from pathlib import Path

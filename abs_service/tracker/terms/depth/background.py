@@ -22,7 +22,7 @@ MARGIN_PX = 3
 
 
 class Background:
-    """Where the background gives no return, learnt from the first depth image."""
+    """Pixels at which the background gives no return, learnt from the first depth image."""
 
     def __init__(self) -> None:
         self._empty = np.zeros((0, 0), np.bool_)
