@@ -67,9 +67,12 @@ class Tracker:
         else:
             budget = Budget(self._evaluations, lambda: True)
             outcome = self._minimize(frame, self._optimizer.explore(frame, frame.predicted, budget), budget)
+        if self._posterior.motion.widen(outcome.theta):  # a sudden motion, for which the prior was too narrow
+            outcome = self._minimize(frame, self._optimizer.follow(frame, outcome.theta, budget), budget)
         self._is_warm = True
-        self._posterior.motion.update(outcome.theta)
-        return self._estimate(observation, frame, outcome, budget)
+        covariance = frame.covariance(outcome.theta)
+        self._posterior.motion.update(outcome.theta, covariance)
+        return self._estimate(observation, frame, outcome, budget, covariance)
 
     def relocate(self, points: NDArray[np.float64]) -> None:
         """Warm start from points (k, 3) [m] of a lost object: the next search begins with the mesh laid over them."""
@@ -89,11 +92,18 @@ class Tracker:
             except StopIteration as ended:
                 return ended.value
 
-    def _estimate(self, observation: Observation, frame: FramePosterior, outcome: Outcome, budget: Budget) -> Estimate:
+    def _estimate(
+        self,
+        observation: Observation,
+        frame: FramePosterior,
+        outcome: Outcome,
+        budget: Budget,
+        covariance: NDArray[np.float64],
+    ) -> Estimate:
         """Posterior covariance, agreement of the sensors and status at the optimum."""
         theta, surface = outcome.theta, self.model.deform(outcome.theta[None])
         vertices = np.ascontiguousarray(surface.vertices[0].T)
-        known = self._uncertainty.estimate(frame, theta, surface)
+        known = self._uncertainty.estimate(frame, theta, surface, covariance)
         fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, known.vertices, known.unheld_m)
         verdict, reasons = status.judge(fits, observation.missing, shape, self._limits)
         if verdict == Status.TRACKING:

@@ -14,8 +14,9 @@ from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.posterior import priors
+from abs_service.tracker.posterior.motion_prior import MotionPrior
 from abs_service.tracker.posterior.posterior import Posterior
-from abs_service.tracker.posterior.priors import MotionPrior, ShapePrior
+from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.photometric.appearance import with_appearance

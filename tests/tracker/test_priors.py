@@ -8,18 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.posterior.priors import (
+from abs_service.tracker.posterior.motion_prior import (
     FIRST_INTERVAL_S,
+    LAG_MARGIN,
     LONGEST_INTERVAL_S,
+    MARGIN,
     MotionPrior,
-    Settings,
-    ShapePrior,
 )
+from abs_service.tracker.posterior.priors import Settings, ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from tests.tracker.scenes import as_surface, flat, sheet
 
 MS = 1_000_000
+KNOWN = np.zeros((2, 2))
 
 
 def prior(speed: float = 0.3, memory_s: float = 1e9) -> MotionPrior:
@@ -38,14 +40,14 @@ def test_a_constant_velocity_goes_on():
         motion.predict(k * 40 * MS)
         if k > 1:
             np.testing.assert_allclose(motion.predicted, [0.01 * k, -0.02 * k], atol=1e-12)
-        motion.update(np.array([0.01, -0.02]) * k)
+        motion.update(np.array([0.01, -0.02]) * k, KNOWN)
 
 
 def test_after_a_gap_the_velocity_still_is_per_second():
     motion = prior()
     for t_ms, x in [(0, 0.0), (50, 0.05), (150, 0.15)]:  # 1 m/s
         motion.predict(t_ms * MS)
-        motion.update(np.array([x, 0]))
+        motion.update(np.array([x, 0]), KNOWN)
     motion.predict(350 * MS)
     np.testing.assert_allclose(motion.predicted, [0.35, 0], atol=1e-12)
 
@@ -56,7 +58,7 @@ def test_motion_fades_with_the_age_of_the_last_estimate():
         motion = prior(memory_s=0.1)
         for t_ms, x in [(0, 0.0), (50, 0.05)]:
             motion.predict(t_ms * MS)
-            motion.update(np.array([x, 0]))
+            motion.update(np.array([x, 0]), KNOWN)
         motion.predict((50 + gap_ms) * MS)
         travelled.append(motion.predicted[0] - 0.05)
     expected = [gap * np.exp(-gap / 0.1) for gap in (0.01, 0.1, 0.4, LONGEST_INTERVAL_S)]
@@ -87,7 +89,7 @@ def test_the_cost_is_that_of_a_speed():
     """A deviation of 0.3 m/s of the surface from the prediction costs ½, for every parameter."""
     motion = prior()
     motion.predict(0)
-    motion.update(np.zeros(2))
+    motion.update(np.zeros(2), KNOWN)
     motion.predict(100 * MS)
     off = np.array([[0.03, 0.0], [0.0, 0.06], [0.0, 0.0]])
     np.testing.assert_allclose(motion.cost(off), [0.5, 0.5, 0])
@@ -97,7 +99,7 @@ def test_the_cost_is_that_of_a_speed():
 def test_the_longer_the_gap_the_less_is_known_up_to_a_bound(gap_ms, seconds):
     motion = prior()
     motion.predict(0)
-    motion.update(np.zeros(2))
+    motion.update(np.zeros(2), KNOWN)
     motion.predict(gap_ms * MS)
     assert motion.cost(np.array([[0.3 * seconds, 0]]))[0] == pytest.approx(0.5)
 
@@ -112,7 +114,7 @@ def test_the_first_frame_is_given_the_usual_interval():
 def test_time_that_stands_still_or_goes_back_is_survived(again_ns):
     motion = prior()
     motion.predict(0)
-    motion.update(np.ones(2))
+    motion.update(np.ones(2), KNOWN)
     motion.predict(again_ns)
     assert np.isfinite(motion.cost(np.ones((1, 2)))).all()
 
@@ -165,3 +167,59 @@ def test_lengths_at_rest_may_change():
 def test_a_mesh_has_every_edge_once():
     rows, columns = 9, 13
     assert len(MESH.edges) == rows * (columns - 1) + columns * (rows - 1) + (rows - 1) * (columns - 1)
+
+
+def follow(motion: MotionPrior, steps: list[float], held: float = 1.0, begin: int = 0) -> list[float]:
+    """Speeds after estimates that are off the prediction by so much [m], at 30 Hz; so much of them is measured."""
+    speeds = []
+    motion.predict(round(begin * 1e9 / 30))
+    for k, step in enumerate([0.0, *steps], start=begin + 1):
+        motion.update(motion.predicted + np.array([step, 0.0]), np.diag((1 - held) / motion.precision))
+        motion.predict(round(k * 1e9 / 30))
+        speeds.append(motion.speed)
+    return speeds[1:]
+
+
+def test_a_calm_object_narrows_the_prior_to_its_bound_at_once():
+    assert follow(prior(), [1e-6] * 3) == [Settings().least_speed] * 3
+
+
+def test_the_prior_follows_the_size_of_erratic_innovations():
+    steps = [(-1) ** k * 1e-3 for k in range(60)]  # successive ones have nothing in common
+    assert follow(prior(), steps)[-1] == pytest.approx(MARGIN * 1e-3 * 30 / np.sqrt(2), rel=1e-6)
+
+
+def test_innovations_in_a_row_widen_the_prior_far_more():
+    assert follow(prior(), [1e-3] * 60)[-1] == pytest.approx(LAG_MARGIN * 1e-3 * 30 / np.sqrt(2), rel=0.05)
+
+
+def test_without_measurements_the_motion_is_that_of_before():
+    motion = prior()
+    follow(motion, [1e-3] * 30)
+    before = motion.unseen, motion.unpredicted
+    follow(motion, [0.0] * 30, held=0.0, begin=32)
+    np.testing.assert_allclose((motion.unseen, motion.unpredicted), before, rtol=0.1)
+
+
+def test_equal_bounds_fix_the_prior():
+    motion = MotionPrior(np.zeros(2), np.ones(2), Settings(speed=0.1, least_speed=0.1))
+    assert set(follow(motion, [1e-6, 1e-3, 0.1])) == {0.1}
+
+
+def test_after_a_relocation_nothing_is_known_of_the_motion():
+    motion = prior()
+    follow(motion, [1e-6] * 30)
+    motion.restart(np.zeros(2))
+    motion.predict(2_000 * MS)
+    assert motion.speed == Settings().speed
+
+
+def test_a_sudden_motion_widens_the_prior_of_its_own_frame():
+    motion = prior()
+    follow(motion, [1e-6] * 30)
+    assert not motion.widen(motion.predicted + 1e-5)
+    assert motion.widen(motion.predicted + np.array([4e-3, 0.0]))
+    assert motion.speed == pytest.approx(MARGIN * 4e-3 * 30 / np.sqrt(2), rel=0.01)
+    assert motion.widen(motion.predicted + np.array([0.5, 0.0]))
+    assert motion.speed == Settings().speed
+    assert not motion.widen(motion.predicted + 1.0)

@@ -5,9 +5,10 @@ import pytest
 
 from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.posterior.covariance import KEPT_PRIOR, unheld_deviation
-from abs_service.tracker.posterior.propagation import ErrorPropagation
+from abs_service.tracker.posterior.propagation import LASTING, ErrorPropagation
 
 DIM, FRAMES = 3, 40
+NONE = np.zeros((DIM, DIM))
 PRECISION = np.array([4.0, 1.0, 1.0])
 
 
@@ -18,42 +19,42 @@ def setting() -> tuple[np.ndarray, np.ndarray]:
     return measured, np.asarray(np.linalg.inv(measured + np.diag(PRECISION)))
 
 
-def test_it_is_the_covariance_of_the_errors_when_the_noise_is_that_of_the_first_frame():
+def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of_the_first_frame():
     measured, inverse = setting()
     generator, step = np.random.default_rng(1), 0.3
     half, errors = np.linalg.cholesky(measured + 1e-12 * np.eye(DIM)), []
     for _ in range(4000):
-        score, error = half @ generator.standard_normal(DIM), np.zeros(DIM)
+        lasting, error = np.sqrt(LASTING) * half @ generator.standard_normal(DIM), np.zeros(DIM)
         for frame in range(FRAMES):
             moved = step * generator.standard_normal(DIM) if frame else np.zeros(DIM)
+            score = lasting + np.sqrt(1 - LASTING) * half @ generator.standard_normal(DIM)
             error = inverse @ (PRECISION * (error + moved) + score)
         errors.append(error)
-    propagation, theta, found = ErrorPropagation(np.ones(DIM)), np.zeros(DIM), np.eye(DIM)
+    propagation, found = ErrorPropagation(DIM), np.eye(DIM)
     for _ in range(FRAMES):
-        found = propagation.update(theta, inverse, measured + np.diag(PRECISION), PRECISION)
-        theta = theta + step  # moves by as much in every frame
+        found = propagation.update(
+            np.full(DIM, step), np.zeros(DIM), inverse, measured + np.diag(PRECISION), NONE, PRECISION
+        )
     scale = np.sqrt(np.outer(np.diag(found), np.diag(found)))
     np.testing.assert_allclose(np.cov(np.transpose(errors)) / scale, found / scale, atol=0.08)
 
 
 def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not():
     measured, inverse = setting()
-    propagation, found = ErrorPropagation(np.ones(DIM)), []
-    for frame in range(FRAMES):
-        theta = np.array([0.1 * frame, 0.0, 0.0])
-        found.append(np.diag(propagation.update(theta, inverse, measured + np.diag(PRECISION), PRECISION)))
+    propagation, moved = ErrorPropagation(DIM), np.array([0.1, 0.1, 0.2])
+    scores = measured + np.diag(PRECISION)
+    found = [np.diag(propagation.update(np.zeros(DIM), moved, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
     assert found[0][2] == pytest.approx(0, abs=1e-12)  # the first frame defines where the points are
-    motion = 0.1**2 / 3
-    np.testing.assert_allclose(np.diff([variance[2] for variance in found]), motion, rtol=1e-6)
+    np.testing.assert_allclose(np.diff([variance[2] for variance in found]), 0.2**2, rtol=1e-6)
     assert found[-1][0] < 1.5 * found[5][0]
 
 
 def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     _, inverse = setting()
-    propagation = ErrorPropagation(np.ones(DIM))
-    propagation.update(np.zeros(DIM), inverse, np.diag(PRECISION), PRECISION)
+    propagation = ErrorPropagation(DIM)
+    propagation.update(np.zeros(DIM), np.zeros(DIM), inverse, np.diag(PRECISION), NONE, PRECISION)
     propagation.restart(np.full(DIM, 5.0))
-    found = propagation.update(np.zeros(DIM), inverse, np.diag(PRECISION), PRECISION)
+    found = propagation.update(np.zeros(DIM), np.zeros(DIM), inverse, np.diag(PRECISION), NONE, PRECISION)
     assert found[2, 2] == pytest.approx(25)
 
 
@@ -63,7 +64,7 @@ def test_a_direction_that_no_measurement_holds_is_found_in_a_single_frame():
     local[:, 0, 0] = local[:, 1, 1] = 1.0
     jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
     prior, measured = np.full(2, 1e4), np.diag([0.0, 1e6])
-    found = unheld_deviation(measured + np.diag(prior), prior, jacobian)
+    found = unheld_deviation(measured + np.diag(prior), prior, prior, jacobian)
     assert found == pytest.approx(np.sqrt(1 / (KEPT_PRIOR * 1e4) + 1 / (1e6 + KEPT_PRIOR * 1e4)), rel=1e-6)
-    held = unheld_deviation(np.diag([1e6, 1e6]) + np.diag(prior), prior, jacobian)
+    held = unheld_deviation(np.diag([1e6, 1e6]) + np.diag(prior), prior, prior, jacobian)
     assert held == pytest.approx(np.sqrt(2e-6), rel=1e-3)

@@ -28,7 +28,7 @@ from abs_service.tracker.posterior.curvature import add_at, solved
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
-#: Share of the motion prior's precision that keeps `unheld_deviation` finite, and the number of vertices it looks at.
+#: Share of the widest motion prior's precision that keeps `unheld_deviation` finite, and number of vertices it probes.
 KEPT_PRIOR, PROBES = 1e-3, 24
 
 #: Lower bound of 1 − h; below it, rounding errors dominate.
@@ -71,6 +71,14 @@ def score_covariance(
     return result
 
 
+def shared_covariance(sensed: Sensed, dimension: int) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of the gradient of errors that many residuals share, the same in all frames."""
+    result = np.zeros((dimension, dimension))
+    for part in (part for parts in sensed for part in parts if len(part.shared)):
+        add_at(part.parameters, part.shared.T @ part.shared, result)
+    return result
+
+
 def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance D Σ Dᵀ (n, 3, 3) of every vertex, from its Jacobian D and the covariance Σ (dim, dim) of Θ."""
     result = np.empty((len(sparse_jacobian.local), 3, 3))
@@ -108,17 +116,21 @@ def _multiply(
 
 
 def unheld_deviation(
-    curvature: NDArray[np.float64], precision: NDArray[np.float64], sparse_jacobian: SparseJacobian
+    curvature: NDArray[np.float64],
+    precision: NDArray[np.float64],
+    least_precision: NDArray[np.float64],
+    sparse_jacobian: SparseJacobian,
 ) -> float:
     """Standard deviation [m] of a vertex by the measurements of one frame alone, median: large if nothing holds it.
 
     Args:
         curvature: (dim, dim), of likelihood and priors.
-        precision: diagonal (dim,) of the motion prior, of which hardly anything is kept.
+        precision: diagonal (dim,) of the motion prior, which is removed.
+        least_precision: diagonal (dim,) of the widest motion prior, of which hardly anything is kept.
         sparse_jacobian: derivative of the vertices.
     """
     alone = curvature.copy()
-    alone.flat[:: len(alone) + 1] -= (1 - KEPT_PRIOR) * precision
+    alone.flat[:: len(alone) + 1] += KEPT_PRIOR * least_precision - precision
     some = np.linspace(0, len(sparse_jacobian.local) - 1, PROBES).astype(np.intp)
     rows = np.zeros((PROBES, 3, len(alone)))
     np.put_along_axis(

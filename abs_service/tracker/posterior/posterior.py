@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import Objective
-from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton
-from abs_service.tracker.posterior.priors import MotionPrior, ShapePrior
+from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance
+from abs_service.tracker.posterior.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 from abs_service.tracker.terms.linearization import Linearization
@@ -123,6 +124,10 @@ class FramePosterior:
                 return replace(last, sensed=[[part.moved(step) for part in source] for source in last.sensed])
         self.linearize(theta)
         return self.linearized_near(theta)
+
+    def covariance(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inverse curvature Σ (dim, dim) of the cost at the estimate theta (dim,), Laplace's approximation."""
+        return posterior_covariance(self.linearized_near(theta).quadratic)
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""

@@ -9,10 +9,11 @@ with what the object has done since the frame before, q, and the score s of the 
 whose covariance is B (`covariance`). Where the sensors outweigh W, G is zero and nothing of the past is left. Where
 nothing is measured, G is one, and the errors add up:
 
-- q is independent from frame to frame. Its variance adapts to the motion: the mean squared change of the parameters, in
-  the unit of their scales, over the last frames.
-- s is not: the noise of the first frame in mesh and appearance, and the misfit of the model, are the same in every
-  frame. Taken as equal in all frames, their error is R_t s with R_t = G R_{t−1} + Σ.
+- q, the motion that was not predicted, has the deviation of the innovations (`motion_prior`). Where nothing has been
+  measured in the last frames, G⁴ ≈ 1, the velocity is not known either, and the whole motion counts.
+- A share `LASTING` of the variance of s is the same in every frame: the noise of the first frame in mesh and
+  appearance. Its error is R_t s with R_t = G R_{t−1} + Σ. So is that of whole sides of the outline. The rest is this
+  frame's own noise, and independent.
 
 The first frame has no error before it: it defines the material points.
 """
@@ -20,54 +21,56 @@ The first frame has no error before it: it defines the material points.
 import numpy as np
 from numpy.typing import NDArray
 
-#: Weight of a new frame in the running mean of the squared motion.
-MEMORY = 0.1
-
-#: Least motion of the surface between two frames [m].
-LEAST_M = 1e-4
+#: Share of a residual's variance that comes from the first frame. Its colours are interpolated between four pixels,
+#: which leaves 4/9 of their variance on average (a share of 0.31); its distances are averaged over more (about 0.1).
+LASTING = 0.25
 
 
 class ErrorPropagation:
     """Covariance of Θ in each frame, from that of the frame before.
 
     Args:
-        scales: change (dim,) of each parameter that moves the surface by about one metre.
+        dimension: number of parameters.
     """
 
-    def __init__(self, scales: NDArray[np.float64]):
-        self._scales = scales
-        self._moved = np.zeros((len(scales), len(scales)))  # covariance of the error due to q
+    def __init__(self, dimension: int):
+        self._moved = np.zeros((dimension, dimension))  # covariance of the error due to q
         self._response = np.zeros_like(self._moved)  # R
-        self._last: NDArray[np.float64] | None = None
-        self._motion = 0.0
+        self._began = False
 
     def restart(self, deviation: NDArray[np.float64]) -> None:
         """Restarts with independent errors of a standard deviation (dim,), after a relocation."""
-        self._moved, self._response, self._last = np.diag(deviation**2), np.zeros_like(self._moved), None
+        self._moved, self._response, self._began = np.diag(deviation**2), np.zeros_like(self._moved), False
 
     def update(
         self,
-        theta: NDArray[np.float64],
+        unpredicted: NDArray[np.float64],
+        moved: NDArray[np.float64],
         inverse: NDArray[np.float64],
         scores: NDArray[np.float64],
+        shared: NDArray[np.float64],
         precision: NDArray[np.float64],
     ) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the estimate of a frame.
 
         Args:
-            theta: the estimate (dim,).
+            unpredicted: standard deviation (dim,) of the motion where measurements show the object's velocity.
+            moved: that of the motion where nothing shows it.
             inverse: Σ (dim, dim).
             scores: covariance (dim, dim) of the gradient, W included.
+            shared: the same of errors that are equal in all frames.
             precision: diagonal (dim,) of W.
         """
-        if self._last is not None:
-            motion = float(np.mean(((theta - self._last) / self._scales) ** 2))
-            self._motion += (MEMORY if self._motion else 1.0) * (motion - self._motion)
-            self._moved.flat[:: len(theta) + 1] += max(self._motion, LEAST_M**2) * self._scales**2
-        self._last = theta
         gain = inverse * precision
+        if self._began:
+            self._moved.flat[:: len(unpredicted) + 1] += unpredicted**2
+            unheld = gain @ gain
+            unheld = unheld @ unheld * moved
+            self._moved += unheld @ unheld.T
+        self._began = True
         self._moved = gain @ self._moved @ gain.T
-        self._response = gain @ self._response + inverse
         own = scores.copy()
-        own.flat[:: len(theta) + 1] -= precision
-        return self._response @ own @ self._response.T + self._moved
+        own.flat[:: len(own) + 1] -= precision
+        self._moved += (1 - LASTING) * inverse @ own @ inverse
+        self._response = gain @ self._response + inverse
+        return self._response @ (LASTING * own + shared) @ self._response.T + self._moved

@@ -13,13 +13,13 @@ from abs_service.tracker.posterior.covariance import (
     leverages,
     propagated,
     score_covariance,
+    shared_covariance,
     unheld_deviation,
 )
-from abs_service.tracker.posterior.curvature import posterior_covariance
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.misfit import NeighborMean
+from abs_service.tracker.posterior.motion_prior import MotionPrior
 from abs_service.tracker.posterior.posterior import FramePosterior
-from abs_service.tracker.posterior.priors import MotionPrior
 from abs_service.tracker.posterior.propagation import ErrorPropagation
 
 
@@ -50,7 +50,7 @@ class Uncertainty:
         self._motion = motion
         self._mesh_noise = MeshNoise(model)
         self._effects = DesignEffects(model.mesh)
-        self._errors = ErrorPropagation(model.scales)
+        self._errors = ErrorPropagation(len(model.rest))
         self._neighbor_mean = NeighborMean(model.mesh)
         self._begun = False
 
@@ -59,20 +59,31 @@ class Uncertainty:
         self._errors.restart(self._motion.deviation)
         self._begun = False
 
-    def estimate(self, frame: FramePosterior, theta: NDArray[np.float64], surface: Surface) -> Covariances:
-        """Covariances at the estimate theta (dim,) of a frame, whose surface is a population of one."""
+    def estimate(
+        self, frame: FramePosterior, theta: NDArray[np.float64], surface: Surface, inverse: NDArray[np.float64]
+    ) -> Covariances:
+        """Covariances of the estimate of a frame.
+
+        Args:
+            frame: the frame's posterior.
+            theta: the estimate (dim,).
+            surface: its surface, a population of one.
+            inverse: Σ (dim, dim), the inverse curvature of the cost.
+        """
         near, precision = frame.linearized_near(theta), self._motion.precision
         if self._begun and near.sensed:  # nothing has moved in the first frame, nothing is known in one without images
             self._mesh_noise.update(frame, theta)
         self._begun = True
-        inverse, curvature = posterior_covariance(near.quadratic), near.quadratic.curvature
+        curvature = near.quadratic.curvature
         leverage = leverages(inverse, near.sensed)
         effects = self._effects.update(inverse, near.sensed, leverage)
         scores = score_covariance(curvature, near.sensed, leverage, effects)
-        covariance = self._errors.update(theta, inverse, scores, precision)
+        shared, motion = shared_covariance(near.sensed, len(theta)), (self._motion.unpredicted, self._motion.unseen)
+        covariance = self._errors.update(*motion, inverse, scores, shared, precision)
         vertices = (
             propagated(near.sparse_jacobian, covariance)
             + along_normals(surface, self._mesh_noise.variance)
             + isotropic(self._neighbor_mean(frame.misfit(surface)))
         )
-        return Covariances(covariance, vertices, unheld_deviation(curvature, precision, near.sparse_jacobian))
+        unheld_m = unheld_deviation(curvature, precision, self._motion.least_precision, near.sparse_jacobian)
+        return Covariances(covariance, vertices, unheld_m)

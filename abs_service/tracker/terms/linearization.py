@@ -26,12 +26,14 @@ class Linearization:
         jacobian: (m, k).
         parameters: indices of the k parameters that the residuals depend on.
         positions: of the points that they belong to (m, 3) [m]; empty (0, 3) if they belong to none.
+        shared: sum of the derivatives (s, k) of the residuals that share an error, times that error's deviation.
     """
 
     residual: NDArray[np.float64]
     jacobian: NDArray[np.float64]
     parameters: NDArray[np.int64] | slice = field(default_factory=lambda: EVERY)
     positions: NDArray[np.floating] = field(default_factory=lambda: np.zeros((0, 3)))
+    shared: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
 
     def parts(self) -> list["Linearization"]:
         """A list of this linearisation alone."""

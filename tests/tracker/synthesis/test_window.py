@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from abs_service.pairing.image_decoders import BAYER_ORDERS
 from abs_service.pairing.images import ChannelImage, ColorImage
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.posterior.priors import MotionPrior, Settings
+from abs_service.tracker.posterior.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, around, placed
@@ -184,7 +185,7 @@ def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():
     prior = MotionPrior(np.zeros(3), np.ones(3), Settings(speed=0.3))
     prior.predict(0)
     assert np.isinf(prior.reach_m)  # no motion is known in the first frame
-    prior.update(np.zeros(3))
+    prior.update(np.zeros(3), np.zeros((3, 3)))
     prior.predict(100_000_000)
     assert prior.reach_m == pytest.approx(4 * 0.3 * 0.1)
     assert prior.cost(np.array([[prior.reach_m, 0, 0]]))[0] == pytest.approx(8)

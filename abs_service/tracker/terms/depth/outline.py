@@ -106,7 +106,8 @@ class RimOutline:
     """The distances of the free edges from the outline are normal with zero mean, and bounded as outliers are.
 
     A mesh made from an image ends up to one cell inside the object. The gap is measured in the first image; from then
-    on, the rim is that of the mesh extrapolated by this gap.
+    on, the rim is that of the mesh extrapolated by this gap. Edges that face the same side of the image share their
+    error: whether a sensor gives the mixed pixels of an edge a distance depends on the background and on the side.
 
     Args:
         camera: the camera.
@@ -170,7 +171,8 @@ class RimOutline:
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
         chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
-        return Linearization(residual[use], jacobian, positions=points[use])
+        shared = _sums_by_side(jacobian, slopes[use])
+        return Linearization(residual[use], jacobian, positions=points[use], shared=shared)
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
@@ -226,3 +228,9 @@ class RimOutline:
         distance = np.linalg.norm(points[inside] - self._camera.center, axis=1)
         hidden[inside] = expected[row[inside], column[inside]] < distance - HIDDEN_BEHIND_M
         return hidden
+
+
+def _sums_by_side(jacobian: NDArray[np.float64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, by their image gradients (k, 2)."""
+    quarter = np.floor(np.arctan2(slopes[:, 1], slopes[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
+    return np.stack([jacobian[quarter == side].sum(axis=0) for side in range(4)])
