@@ -4,17 +4,17 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from abs_service.config import ServiceConfig, plugins
-from abs_service.pairing.image_decoders import kinds
 from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.measurements import measurement
 from abs_service.tracker.models import nurbs
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import streams
 from calib.camera import Camera
-from calib.noise.base import DepthNoise
+from calib.noise.base import DepthNoise, ImageNoise
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
-from calib.rig import ImageNoise, Noise, Rig, Sensor
+from calib.rig import Noise, Rig, Sensor
 
 
 class PlanError(Exception):
@@ -82,7 +82,7 @@ def noises(config: ServiceConfig, tracker: str) -> dict[str, Noise]:
         models[name] = noise(table.noise, table.range_m)
         if table.texture is not None:
             made = texture(table.texture)
-            models[f"{name}/{kinds(made)[0]}"] = made
+            models[f"{name}/{measurement(made).frames[0]}"] = made
     return models
 
 

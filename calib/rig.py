@@ -5,15 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from calib.camera import Camera
-from calib.noise.base import DepthNoise
-from calib.noise.bayer import GaussianBayer
+from calib.noise.base import DepthNoise, ImageNoise
 from calib.noise.binary import LightBarrier
-from calib.noise.color import GaussianColor
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
 
-#: Noise models of an image of colour, grey or intensity.
-ImageNoise = GaussianColor | GaussianGrey | GaussianBayer | GaussianIntensity
 Noise = DepthNoise | ImageNoise | LightBarrier
 
 

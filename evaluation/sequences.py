@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from abs_service import config, wiring
 from abs_service.pairing.images import DepthImage
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import euclidean
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import ModelSettings, Plan
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors, TruthComparison

@@ -8,8 +8,12 @@ import numpy as np
 from calib import pose
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
+from calib.noise.bayer import GaussianBayer
+from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
-from calib.rig import ImageNoise
+
+#: Noise of one number per pixel.
+ChannelNoise = GaussianGrey | GaussianBayer | GaussianIntensity
 
 
 def knots(control_points: int, degree: int) -> np.ndarray:
@@ -242,7 +246,7 @@ def color_cost(
     return float(total)
 
 
-def picture_deviation(noise: ImageNoise, values: np.ndarray | float) -> np.ndarray:
+def picture_deviation(noise: ChannelNoise, values: np.ndarray | float) -> np.ndarray:
     """σ of numbers of a picture that have these values."""
     relative = noise.relative if isinstance(noise, GaussianIntensity) else 0.0
     return np.sqrt(noise.sigma**2 + (relative * np.asarray(values)) ** 2)
@@ -250,7 +254,7 @@ def picture_deviation(noise: ImageNoise, values: np.ndarray | float) -> np.ndarr
 
 def channel_cost(  # one argument per symbol
     camera: Camera,
-    noise: ImageNoise,
+    noise: ChannelNoise,
     image: np.ndarray,
     channel: np.ndarray,
     covered: np.ndarray,

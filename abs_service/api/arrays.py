@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from abs_service.api.errors import ArgumentError
-from abs_service.pairing.image_decoders import BAYER_ORDERS, kinds
+from abs_service.pairing.images import BAYER_ORDERS
+from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
@@ -101,7 +102,7 @@ class FrameBuilder:
         for sensor in self._rig.sensors.values():
             if not isinstance(sensor.noise, DepthNoise) or (sensor.head, "depth") not in frames:
                 continue
-            for kind in kinds(sensor.noise):
+            for kind in measurement(sensor.noise).frames:
                 stream = f"{sensor.head}/{kind}"
                 if (sensor.head, kind.value) not in frames:
                     raise ArgumentError(

@@ -26,8 +26,8 @@ from abs_service.commands.harmless_devices import HARMLESS, HarmlessError
 from abs_service.commands.preview_option import PictureOptionError
 from abs_service.config import plugins
 from abs_service.config.problems import allowed_instead
-from abs_service.pairing.image_decoders import kinds
 from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.tracker.measurements import measurement
 from calib.rig import Noise
 from drivers import opening
 
@@ -177,7 +177,7 @@ def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]
     for name, noise in noises.items():
         head = name.partition("/")[0]
         there = {stream.partition(" ")[0] for stream in streams.get(head, [])}
-        missing = [kind.value for kind in kinds(noise) if kind not in there]
+        missing = [kind.value for kind in measurement(noise).frames if kind not in there]
         if there and missing:
             raise CheckError(
                 f"{name}: its noise model needs the stream {missing[0]}, {allowed_instead(missing[0], there)}"

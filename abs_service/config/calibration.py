@@ -1,12 +1,12 @@
 """Tables of a calibration file, and its provenance in a merged configuration."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
-from abs_service.config.values import Name, Plugin
+from abs_service.config.values import Name, NoiseSettings
 
 #: Keys of a sensor in a calibration file that are keys of the same sensor in a rig file.
 SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "depth", "time_offset_ms")
@@ -82,8 +82,8 @@ class CalibratedSensor(SensorEvidence):
     """`[sensors.<name>]` of a calibration file; the other keys are those of the sensor in a rig file."""
 
     camera: CameraTable = CameraTable()
-    noise: Annotated[Any, Plugin("calib.noise")] | None = None
-    texture: Annotated[Any, Plugin("calib.noise")] | None = None
+    noise: NoiseSettings | None = None
+    texture: NoiseSettings | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
     depth: DepthTable | None = None

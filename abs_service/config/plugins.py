@@ -17,32 +17,33 @@ from pydantic import TypeAdapter, ValidationError
 from abs_service.config.problems import Problem, ProblemsError, allowed_instead, from_pydantic, unknown_key
 
 
-def available(package: str) -> list[str]:
-    """The values of `type` that name a module with `Settings`; imports all modules of the package."""
-    return sorted({name for name in _modules(package) if _is_part(package, name)} | set(_installed(package)))
+def available(*packages: str) -> list[str]:
+    """The values of `type` that name a module with `Settings`; imports all modules of the packages."""
+    own = {name for package in packages for name in _modules(package) if _is_part(package, name)}
+    return sorted(own.union(*map(_installed, packages)))
 
 
-def load(package: str, table: Any, base: Path) -> Any:
+def load(package: str, table: Any, base: Path, *others: str) -> Any:
     """The `Settings` of the module that a table's `type` names, from the other keys of the table.
 
     Args:
         package: dotted name of the package with the modules, such as `abs_service.tracker.models`.
         table: what the TOML file holds.
         base: folder that relative paths among the settings start from.
+        others: packages that have such modules as well.
 
     Raises:
         ProblemsError: no such module, unknown keys, or values out of range; all of them.
     """
+    packages = (package, *others)
     if not isinstance(table, dict) or not isinstance(table.get("type"), str):
-        example = f'{{ type = "{available(package)[0]}", … }}'
-        raise ProblemsError(
-            [Problem((), f"must be a table such as {example}; types: {', '.join(available(package))}", table)]
-        )
+        types = available(*packages)
+        example = f'{{ type = "{types[0]}", … }}'
+        raise ProblemsError([Problem((), f"must be a table such as {example}; types: {', '.join(types)}", table)])
     name = table["type"]
-    own = name in _modules(package) and _is_part(package, name)
-    module = f"{package}.{name}" if own else _installed(package).get(name)
+    module = next(filter(None, (_module(package, name) for package in packages)), None)
     if module is None:
-        raise ProblemsError([Problem(("type",), f"no such type, {allowed_instead(name, available(package))}", name)])
+        raise ProblemsError([Problem(("type",), f"no such type, {allowed_instead(name, available(*packages))}", name)])
     return settings(module, {key: value for key, value in table.items() if key != "type"}, base)
 
 
@@ -81,6 +82,12 @@ def settings(module: str, table: Any, base: Path) -> Any:
 def _nested(Settings: Any) -> dict[str, str]:
     """The fields that are tables with a `type` of their own, and the packages that the types are modules of."""
     return {field.name: field.metadata["parts"] for field in fields(Settings) if "parts" in field.metadata}
+
+
+def _module(package: str, name: str) -> str | None:
+    """Dotted name of the module of a type; None if there is none."""
+    own = name in _modules(package) and _is_part(package, name)
+    return f"{package}.{name}" if own else _installed(package).get(name)
 
 
 def _modules(package: str) -> set[str]:

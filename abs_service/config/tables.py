@@ -8,7 +8,7 @@ from pydantic import Field, FiniteFloat
 from abs_service.config.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
-from abs_service.config.values import DeviceUri, Endpoint, Name, Plugin, RelativePath, SettingsOf, Stream
+from abs_service.config.values import DeviceUri, Endpoint, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -44,7 +44,8 @@ class SensorTable(Table):
         device: name of the device that it belongs to.
         head: what the device calls it; "" if it is the sensor's name.
         camera: calibration in place of the device's own.
-        noise: `Settings` of a module of `calib.noise`; None if the sensor is recorded, but no tracker uses it.
+        noise: `Settings` of a module of `calib.noise` or `abs_service.tracker.measurements`; None if the sensor is
+            recorded, but no tracker uses it.
         texture: likewise of what it sees of the surface besides: a time-of-flight camera's amplitudes, for example.
         outlier_share: share of its measurements that come from anywhere; None for the objective's own.
         range_m: distances that a depth sensor can report at all; None for the objective's own.
@@ -55,8 +56,8 @@ class SensorTable(Table):
     device: str
     head: str = ""
     camera: CameraTable = CameraTable()
-    noise: Annotated[Any, Plugin("calib.noise")] | None = None
-    texture: Annotated[Any, Plugin("calib.noise")] | None = None
+    noise: NoiseSettings | None = None
+    texture: NoiseSettings | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Positive | None = None
     depth: DepthTable = DepthTable()

@@ -56,9 +56,10 @@ class Plugin:
     """Marks a value as a table whose `type` names a module of a package; the value is that module's `Settings`."""
 
     package: str
+    others: tuple[str, ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return _plain(lambda value, base: plugins.load(self.package, value, base), plugins.table)
+        return _plain(lambda value, base: plugins.load(self.package, value, base, *self.others), plugins.table)
 
 
 @dataclass(frozen=True)
@@ -90,4 +91,5 @@ Name = Annotated[str, AfterValidator(keys.check_name)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 DeviceUri = Annotated[str, AfterValidator(_uri)]
 Stream = Annotated[str, AfterValidator(_stream)]
+NoiseSettings = Annotated[Any, Plugin("calib.noise", ("abs_service.tracker.measurements",))]
 RelativePath = Annotated[Path, FromFile()]

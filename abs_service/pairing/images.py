@@ -1,5 +1,6 @@
 """Measurements, one type per kind of sensor: SI values, radial distances, NaN where unknown."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,13 @@ from numpy.typing import NDArray
 
 #: Shares of red, green and blue in grey (ITU-R BT.601).
 LUMA = np.array([0.299, 0.587, 0.114], np.float32)
+
+#: Channel pattern of a single-channel image, and those of the Bayer mosaics by name.
+ONE_CHANNEL = np.zeros((1, 1), np.uint8)
+BAYER_ORDERS: Mapping[str, NDArray[np.uint8]] = {
+    order: np.array(["rgb".index(letter) for letter in order], np.uint8).reshape(2, 2)
+    for order in ("rggb", "bggr", "grbg", "gbrg")
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.observation import Observer
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.elastica import heavy_elastica
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.stiffness import (

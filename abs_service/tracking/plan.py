@@ -7,6 +7,7 @@ import numpy as np
 
 from abs_service.pairing.observation import Observation
 from abs_service.tracker import status
+from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.mesh import Mesh
@@ -19,7 +20,6 @@ from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.photometric.appearance import with_appearance
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
 from abs_service.tracking.vertex_offsets import Settings as VertexOffsetSettings

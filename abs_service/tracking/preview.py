@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import DepthImage
-from abs_service.pairing.observation import Observation, Observer
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.first_rim import classified_rim
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan
 from calib.camera import Camera
 from calib.rig import Rig

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from abs_service.pairing.image_decoders import kinds
-from abs_service.pairing.observation import Observation, Observer
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.measurements import measurement
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.optimizers.base import Stop
@@ -17,9 +17,11 @@ from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking import loss_monitor
 from abs_service.tracking.growth_monitor import LEAST_GROWTH, GrowthMonitor
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, make_tracker
 from abs_service.tracking.vertex_offsets import FixedOffsets, VertexOffsets
-from calib.rig import ImageNoise, Rig, Sensor
+from calib.noise.base import ImageNoise
+from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet
 
 
@@ -134,7 +136,8 @@ class TrackingSession:
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
     """The (head, stream) of every image that the sensors' noise models require; streams are named after their kind."""
-    return list(dict.fromkeys((sensor.head, kind.value) for sensor in sensors for kind in kinds(sensor.noise)))
+    needed = ((sensor.head, kind.value) for sensor in sensors for kind in measurement(sensor.noise).frames)
+    return list(dict.fromkeys(needed))
 
 
 def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimate:

@@ -59,6 +59,20 @@ class DepthNoise(Protocol):
         ...
 
 
+@runtime_checkable
+class ImageNoise(Protocol):
+    """Gaussian noise of what a pixel shows of a vertex: colour, grey, intensity, in the sensor's unit."""
+
+    @property
+    def uniform(self) -> float:
+        """Negative log-density of an outlier [nats]."""
+        ...
+
+    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Standard deviation of measured values, in their shape."""
+        ...
+
+
 def log_density(model: DepthNoise, measured: ArrayLike, x: ArrayLike, a: ArrayLike, p: Pixels) -> NDArray[np.float64]:
     """Logarithm of eq. 18: density of measuring `measured` [m] at pixel p when the true distance is `x` [m]."""
     x, a = np.asarray(x, np.float64), np.asarray(a, np.float64)

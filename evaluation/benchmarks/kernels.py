@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.observation import Observer
+from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.detection.strip_detection import Strip
 from abs_service.tracker.mesh import Mesh
@@ -31,7 +31,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis import sparse, undistorted, warped
-from abs_service.tracker.terms.photometric.appearance import with_appearance
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import SynthesisSettings
 from calib import jit, pose
 from calib.noise.bayer import GaussianBayer

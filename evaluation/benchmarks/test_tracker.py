@@ -6,7 +6,7 @@ Compare minima of one run with each other; machines, and hours on one machine, d
 import numpy as np
 import pytest
 
-from abs_service.pairing.observation import Observation, Observer
+from abs_service.pairing.observation import Observation
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Nurbs, Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
@@ -14,6 +14,7 @@ from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from tests.calib.noise.texels import render_texture
 from tests.tracker.differences import central_differences

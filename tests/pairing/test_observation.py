@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from abs_service.pairing.images import ColorImage, DepthImage
-from abs_service.pairing.observation import ObservationError, Observer
+from abs_service.pairing.observation import ObservationError
+from abs_service.tracking.observer import Observer
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

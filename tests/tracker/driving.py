@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from abs_service import config, wiring
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, make_posterior
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors

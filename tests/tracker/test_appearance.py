@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
-from abs_service.pairing.images import ChannelImage, ColorImage, Image
+from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage, Image
+from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.terms.photometric.appearance import with_appearance
 from calib import pose
 from calib.camera import Camera
 from calib.lens import Lens

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
-from abs_service.pairing.images import ChannelImage, ColorImage
+from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
@@ -15,7 +14,7 @@ from abs_service.tracker.terms.photometric.illumination import Active, Passive, 
 from calib.noise.bayer import GaussianBayer
 from calib.noise.grey import GaussianGrey
 from calib.noise.intensity import GaussianIntensity
-from calib.rig import ImageNoise, Rig, Sensor
+from calib.rig import Rig, Sensor
 from tests import reference
 from tests.tracker.scenes import CAMERA, as_surface, in_sight, observation, sheet, sparse
 from tests.tracker.test_kernels import decided
@@ -31,12 +30,12 @@ NOISES = {
 }
 
 
-def term(noise: ImageNoise, looks: np.ndarray, share: float = SHARE) -> ChannelTerm:
+def term(noise: reference.ChannelNoise, looks: np.ndarray, share: float = SHARE) -> ChannelTerm:
     """The term of single points that look like this."""
     active = isinstance(noise, GaussianIntensity) and noise.illumination == "active"
     bounds = likelihood.Settings(share).bounds(Sensor("color", CAMERA, noise))
     light = Active(CAMERA.center) if active else Passive()
-    return ChannelTerm("color", sparse(CAMERA), looks, noise, light, bounds)  # pyright: ignore[reportArgumentType]
+    return ChannelTerm("color", sparse(CAMERA), looks, noise, light, bounds)
 
 
 def test_the_four_orders_are_what_their_names_say():

@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS
-from abs_service.pairing.images import ChannelImage
+from abs_service.pairing.images import BAYER_ORDERS, ChannelImage
 from abs_service.tracker.terms.photometric.demosaicing import demosaiced
 from drivers.simulated.sensors.bayer import Mosaic
 

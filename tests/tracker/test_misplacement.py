@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS
-from abs_service.pairing.images import ChannelImage, ColorImage
+from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models import rigid
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.objectives import likelihood

@@ -8,6 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import map_coordinates
 
+from abs_service.tracker.measurements import measurement
+from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
@@ -18,7 +20,6 @@ from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import Rim, look_up
 from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracker.terms.depth.visibility import classify
-from abs_service.tracker.terms.factory import make_term
 from calib.camera import Camera
 from calib.noise.constant import Constant
 from calib.rig import Sensor
@@ -146,7 +147,8 @@ def test_what_hides_the_rim_says_nothing_about_it():
 def test_free_space_right_beside_the_outline_is_held_against_no_vertex(outline_px: float):
     """The rim is where one pixel shows the sheet and the next one the wall: half of its vertices meet the wall."""
     sensor = Sensor("tof", CAMERA, Constant(5e-3))
-    term = make_term(sensor, MESH, sparse(CAMERA, MESH), Bounds(0.05, 1.6, 4.6), outline_px=outline_px)
+    comparison = Comparison(Bounds(0.05, 1.6, 4.6), outline_px=outline_px)
+    term = measurement(sensor.noise).term(sensor, MESH, sparse(CAMERA, MESH), comparison)
     term.observe(depth_image(picture(by=-2e-3)), moved(MESH, 0.0))
     fit = term.fit(moved(MESH, 0.0))
     assert (fit.inliers == fit.visible) == (outline_px > 0)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.posterior.curvature import search_metric
 from abs_service.tracker.posterior.posterior import REUSED_WITHIN
 from abs_service.tracker.terms.linearization import stack
+from abs_service.tracking.observer import Observer
 from tests.tracker.driving import frame_set, posterior_of
 from tests.tracker.test_tracking import RIG, SHEET, drive, tracking
 

@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.grid_mesh import grid_mesh
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.models import nurbs
@@ -14,6 +13,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.posterior.covariance import leverages, propagated, score_covariance, uncorrected_variance
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.vertex_offsets import FixedOffsets, LearntOffsets
 from evaluation.method.posterior import coverage
 from tests.tracker.driving import frame_set, posterior_of

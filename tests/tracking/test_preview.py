@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from abs_service import config, wiring
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import make_posterior
 from abs_service.tracking.preview import PreviewError, preview
 from drivers.contract.frame import FrameSet

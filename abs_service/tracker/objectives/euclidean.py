@@ -6,12 +6,13 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Gt
 
+from abs_service.tracker.measurements import measurement
+from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.base import ModelError, Surface
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
-from abs_service.tracker.terms.factory import make_term
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
@@ -48,7 +49,11 @@ class Settings:
     barrier_weight: Annotated[float, Gt(0)] = 5.0
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> "SquareSum":
-        """The fitness of a mesh in a rig."""
+        """The fitness of a mesh in a rig.
+
+        Raises:
+            ModelError: a sensor measures what there is no weight for.
+        """
         return SquareSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
 
     def _term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer) -> Term:
@@ -69,7 +74,11 @@ class Settings:
                 wrong = 1 / (1 + np.exp(self.barrier_weight))  # its log-odds are the weight
                 noise = LightBarrier(sensor.noise.length_m, wrong, wrong)
                 bounds = Bounds(np.log1p(-wrong), self.barrier_weight, self.barrier_weight)
-        return make_term(replace(sensor, noise=noise), mesh, synthesizer, bounds)
+            case _:
+                raise ModelError(
+                    f'objective = "euclidean" has no weight for sensor "{sensor.name}"; "likelihood" needs none'
+                )
+        return measurement(noise).term(sensor, mesh, synthesizer, Comparison(bounds))
 
 
 class SquareSum(TermSum):

@@ -6,11 +6,12 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge, Gt, Interval
 
+from abs_service.tracker.measurements import measurement
+from abs_service.tracker.measurements.base import Comparison
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
-from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.factory import make_term
+from abs_service.tracker.terms.base import Bounds, Term
 from abs_service.tracker.terms.photometric.texture_registration_noise import TextureRegistrationNoise
 from calib.noise.base import DepthNoise
 from calib.rig import Rig, Sensor
@@ -46,13 +47,11 @@ class Settings:
         """The likelihood of a mesh in a rig."""
         misplacement = TextureRegistrationNoise(self.misplacement_px)
         outline_px = OUTLINE_PX if self.outline_px == "auto" else self.outline_px
-        return TermSum(
-            synthesizer,
-            [
-                make_term(sensor, mesh, synthesizer, self.bounds(sensor), misplacement, outline_px)
-                for sensor in rig.sensors.values()
-            ],
-        )
+        terms: list[Term] = []
+        for sensor in rig.sensors.values():
+            comparison = Comparison(self.bounds(sensor), misplacement, outline_px)
+            terms.append(measurement(sensor.noise).term(sensor, mesh, synthesizer, comparison))
+        return TermSum(synthesizer, terms)
 
     def bounds(self, sensor: Sensor) -> Bounds:
         """Costs of the sensor's outlier model."""

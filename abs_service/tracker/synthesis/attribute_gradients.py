@@ -12,7 +12,8 @@ from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
 from calib.fisheye import KannalaBrandt
-from calib.rig import ImageNoise, Rig
+from calib.noise.base import ImageNoise
+from calib.rig import Rig
 
 
 def surroundings(mesh: Mesh, step_m: float) -> Mesh:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import SynthesisSettings
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor

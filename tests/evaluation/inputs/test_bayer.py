@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS
+from abs_service.pairing.images import BAYER_ORDERS
 from evaluation.inputs.bayer import CODES, VARIANTS, MosaicSequence, compare, select_sigmas
 
 #: What the rule of the experiment chooses for every order and variant; see docs/colour.md.

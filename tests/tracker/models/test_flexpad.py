@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models.base import ModelError
@@ -16,6 +15,7 @@ from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad, Settings
 from abs_service.tracker.models.parts import bends
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from calib import pose
 from drivers.simulated.scene.motion import Placement

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.pairing.observation import Observer
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.detection.strip_detection import Strip, find_strip
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models import gravity, posed
 from abs_service.tracker.models.gravity import Gravity
+from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.camera import Camera

@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS
-from abs_service.pairing.images import ChannelImage, ColorImage
+from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.rigid import Rigid

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.pairing.image_decoders import BAYER_ORDERS, ONE_CHANNEL
-from abs_service.pairing.images import ChannelImage, ColorImage
+from abs_service.pairing.images import BAYER_ORDERS, ONE_CHANNEL, ChannelImage, ColorImage
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
 from abs_service.tracker.terms.base import Bounds

@@ -1,7 +1,6 @@
 """Term of a sensor with one value per pixel: grey, Bayer mosaic, amplitude, infrared."""
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,18 +28,10 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
     NO_WIDENING,
     TextureRegistrationNoise,
 )
-from calib.noise.base import LOG_SQRT_2PI
+from calib.noise.base import LOG_SQRT_2PI, ImageNoise
 
 #: The texel of no measurement.
 UNKNOWN = np.array([np.nan, 0, 0, 0], np.float32)
-
-
-class ChannelNoise(Protocol):
-    """Gaussian noise of one number per pixel."""
-
-    def deviation(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Standard deviation of measured values, in their shape."""
-        ...
 
 
 class ChannelTerm:
@@ -57,7 +48,7 @@ class ChannelTerm:
         sensor: str,
         synthesizer: Synthesizer,
         appearance: NDArray[np.float32],
-        noise: ChannelNoise,
+        noise: ImageNoise,
         illumination: Illumination,
         bounds: Bounds,
         misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
