@@ -7,7 +7,7 @@ import numpy as np
 
 from abs_service.pairing.image_decoders import kinds
 from abs_service.pairing.observation import Observation, Observer
-from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
@@ -83,6 +83,8 @@ class TrackingSession:
                 self._grow(self._tracker.model.mesh, observation)
         except (DetectionError, ModelError) as error:
             errors = (str(error),)
+            if isinstance(error, UndecidedError):  # what was asked for is asked again, with more images
+                self._reinitialize_requested, self._growth_due = self._reinitialize_requested or requested, grow
         if self._tracker is None:
             return _initializing(observation, errors)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))

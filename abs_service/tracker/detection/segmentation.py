@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
@@ -35,7 +35,9 @@ def detect_object(
     sensor, image = rig.sensors[reference], observation.images.get(reference)
     if not (isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise)):
         raise DetectionError(f"no depth image from {reference} yet")
-    view = DepthView.of(subtract_mean_offset(sensor.noise, image.distance, image.amplitude), sensor.camera)
+    distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
+    pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
+    view = DepthView.of(distance, sensor.camera, pictures, observation.t_host_ns)
     _check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
     _check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
