@@ -32,6 +32,7 @@ class Estimate:
             by the σ of its noise model; near 1 if the noise model is right, NaN if nothing was measured.
         evaluations: how often the cost of a candidate was computed.
         missing: sensors that did not contribute.
+        warnings: doubts about the object that was detected, whatever the status.
     """
 
     time_s: float
@@ -48,6 +49,7 @@ class Estimate:
     residuals: Mapping[str, float]
     evaluations: int
     missing: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
 def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int) -> Estimate:
@@ -68,6 +70,7 @@ def with_mesh(found: tracker_estimate.Estimate, mesh: Mesh | None, version: int)
         residuals={fit.sensor: fit.normalized_residual for fit in found.fits},
         evaluations=found.evaluations,
         missing=found.missing,
+        warnings=found.warnings,
     )
 
 

@@ -70,6 +70,7 @@ def _estimate(state: DeformationState, mesh: DeformedMesh, topology: MeshTopolog
         residuals={one.sensor: one.normalized_residual for one in state.sensors if not one.missing},
         evaluations=state.evaluations,
         missing=tuple(one.sensor for one in state.sensors if one.missing),
+        warnings=tuple(state.warnings),
     )
 
 

@@ -43,7 +43,7 @@ def check(path: Path) -> None:
 
 
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
-    """Draws what one tracker would track; a reason why it would track nothing goes to standard error.
+    """Draws what one tracker would track; doubts about it, or why it would track nothing, go to standard error.
 
     Args:
         settings: the configuration.
@@ -67,4 +67,6 @@ def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) 
         raise PictureOptionError(f"--picture {own}: cannot be written: {error.strerror}") from None
     if seen.found is None:
         print(f"abs-service: note: {name} finds nothing to track: {seen.reason}", file=sys.stderr)
+    for doubt in seen.warnings:
+        print(f"abs-service: note: {name}: {doubt}", file=sys.stderr)
     return f"wrote {own}"

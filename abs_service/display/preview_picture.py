@@ -101,10 +101,11 @@ def title(preview: Preview, tracker: str, model: str) -> str:
 
 
 def note(preview: Preview) -> str:
-    """Reason why the first frame shows no object; "" if it does."""
-    if not preview.reason:
-        return ""
-    return preview.reason if preview.found is None else f"Not found in the first frame: {preview.reason}"
+    """Doubts about the object, and the reason why the first frame shows none; "" if there is nothing to say."""
+    if preview.found is None:
+        return preview.reason
+    late = (f"Not found in the first frame: {preview.reason}",) if preview.reason else ()
+    return ". ".join((*preview.warnings, *late))
 
 
 class _Page:

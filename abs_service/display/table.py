@@ -110,7 +110,9 @@ def _trackers(view: RigView) -> RenderableType:
         table.add_row(f" {name}", *_numbers(tracker))
         if tracker.last is not None:
             parts.append(_theta(name, tracker.last))
-            parts += [Text(f" {name}: {reason}", style="yellow") for reason in tracker.last.reasons]
+            parts += [
+                Text(f" {name}: {reason}", style="yellow") for reason in tracker.last.reasons + tracker.last.warnings
+            ]
     return Group(*parts)
 
 

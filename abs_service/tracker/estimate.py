@@ -48,6 +48,7 @@ class Estimate:
         shape: what the deformed mesh shows by itself.
         sources: exposure of every sensor that contributed.
         missing: sensors that did not contribute.
+        warnings: doubts about the object that was detected, in plain words; whatever the status.
     """
 
     seq: int
@@ -70,3 +71,4 @@ class Estimate:
     shape: ShapeQuality
     sources: Mapping[str, Source]
     missing: tuple[str, ...]
+    warnings: tuple[str, ...] = ()

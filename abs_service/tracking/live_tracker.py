@@ -192,4 +192,5 @@ class LiveTracker:
         message = "" if level == Level.OK else f"{estimate.status}: {'; '.join(estimate.reasons)}"
         self._health.report("observation", Level.OK)
         self._health.report("status", level, message)
+        self._health.report("object", Level.WARNING if estimate.warnings else Level.OK, "; ".join(estimate.warnings))
         self._noise_monitor.add(estimate)

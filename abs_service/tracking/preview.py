@@ -1,7 +1,7 @@
 """Preview of a tracker: what it would track, before it does: selected pixels, mesh and classes of the mesh's rim."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.plausibility import warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.first_rim import classified_rim
 from abs_service.tracking.observer import Observer
-from abs_service.tracking.plan import Plan
+from abs_service.tracking.plan import Plan, make_tracker
 from calib.camera import Camera
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet
@@ -62,6 +63,7 @@ class Preview:
         selected: pixels (height, width) that the region selects; none if it finds no object.
         found: the mesh made from them; None if there is none.
         reason: why the first depth image shows no object; "" if it does.
+        warnings: doubts about the object, and why tracking would not begin with the status TRACKING.
     """
 
     number: int
@@ -70,6 +72,7 @@ class Preview:
     selected: NDArray[np.bool_]
     found: FoundMesh | None
     reason: str
+    warnings: tuple[str, ...] = ()
 
 
 def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
@@ -93,7 +96,7 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
             continue
         first = first or seen
         if seen.found is not None:
-            return Preview(number, seen.camera, seen.distance, seen.selected, seen.found, first.reason)
+            return replace(seen, reason=first.reason)
     if first is None:
         raise PreviewError(f"no depth image from {plan.reference} in {number + 1} frame sets")
     return first
@@ -108,10 +111,12 @@ def _look(number: int, observation: Observation, rig: Rig, plan: Plan, region: R
     try:
         detection = detect_object(observation, rig, plan.reference, region, plan.vertices)
         selected = np.isfinite(detection.distance)
-        model = plan.model.build(detection)
+        tracker, _ = make_tracker(plan, rig, detection, observation)
     except (DetectionError, ModelError) as error:
         return Preview(number, camera, image.distance, selected, None, str(error))
+    model, first = tracker.model, tracker.track(observation, lambda: True)
     surface = model.deform(model.rest[None])
     rim, classes = classified_rim(camera, model.mesh, surface, detection.surroundings)
     found = FoundMesh(model.mesh, surface.vertices[0].T.astype(np.float64), rim.outer, classes)
-    return Preview(number, camera, image.distance, selected, found, "")
+    doubts = warnings(detection) + tuple(f"it would begin {first.status}: {reason}" for reason in first.reasons)
+    return Preview(number, camera, image.distance, selected, found, "", doubts)

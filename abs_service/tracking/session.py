@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from abs_service.pairing.observation import Observation
-from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
+from abs_service.tracker.detection.plausibility import ExtentError, warnings
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.measurements import measurement
@@ -23,6 +25,14 @@ from abs_service.tracking.vertex_offsets import FixedOffsets, VertexOffsets
 from calib.noise.base import ImageNoise
 from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet
+
+
+class _Begun(NamedTuple):
+    """A tracker of a detected object, its mesh, and doubts about the object."""
+
+    tracker: Tracker
+    mesh: Mesh
+    warnings: tuple[str, ...]
 
 
 class TrackingSession:
@@ -49,6 +59,7 @@ class TrackingSession:
         self._growth_due = False
         self._reinitialize_requested = False
         self._without_appearance: frozenset[str] = frozenset()
+        self._warnings: tuple[str, ...] = ()
 
     @property
     def model(self) -> DeformationModel | None:
@@ -72,9 +83,10 @@ class TrackingSession:
         requested, self._reinitialize_requested = self._reinitialize_requested, False
         grow, self._growth_due = self._growth_due, False
         errors: tuple[str, ...] = ()
+        doubts: tuple[str, ...] = ()
         try:
             if self._tracker is None:
-                self._adopt(*self._begin(observation), observation)
+                self._adopt(self._begin(observation), observation)
             elif (
                 requested
                 or self._loss_monitor.attempt_due(observation.t_host_ns)
@@ -85,8 +97,11 @@ class TrackingSession:
                 self._grow(self._tracker.model.mesh, observation)
         except (DetectionError, ModelError) as error:
             errors = (str(error),)
+            if isinstance(error, UndecidedError):  # what was asked for is asked again, with more images
+                self._reinitialize_requested, self._growth_due = self._reinitialize_requested or requested, grow
+            doubts = errors if isinstance(error, ExtentError) else ()
         if self._tracker is None:
-            return _initializing(observation, errors)
+            return _initializing(observation, errors, doubts)
         estimate = self._loss_monitor.with_hysteresis(self._tracker.track(observation, in_time))
         if estimate.status == Status.TRACKING and self._growth_monitor.due(estimate.fits, observation.t_host_ns):
             self._growth_due = True
@@ -94,7 +109,8 @@ class TrackingSession:
             surface = self._tracker.model.deform(estimate.theta[None])
             self._vertex_offsets.update(observation.images.get(self._plan.reference), surface, observation.t_host_ns)
         reasons = estimate.reasons + tuple(f"looked for the object again: {error}" for error in errors)
-        return estimate if estimate.status == Status.TRACKING else replace(estimate, reasons=reasons)
+        reasons = () if estimate.status == Status.TRACKING else reasons
+        return replace(estimate, reasons=reasons, warnings=self._warnings)
 
     def reinitialize(self) -> None:
         """Requests a new detection in the next frame set; thread-safe."""
@@ -106,21 +122,24 @@ class TrackingSession:
             tracker.relocate(self._detect(observation).points)
             return
         lost = tracker.model.mesh
-        begun, mesh = self._begin(observation)
-        if not requested and self._loss_monitor.differs_in_size(mesh, lost):
-            raise DetectionError(f"what is in sight has {mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
-        self._adopt(begun, mesh, observation)
+        begun = self._begin(observation)
+        if not requested and self._loss_monitor.differs_in_size(begun.mesh, lost):
+            raise DetectionError(f"what is in sight has {begun.mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
+        self._adopt(begun, observation)
 
     def _grow(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh if much more of the object is in sight; DetectionError or ModelError if that fails."""
-        begun, mesh = self._begin(observation)
-        if mesh.area > LEAST_GROWTH * old.area:
-            self._adopt(begun, mesh, observation)
+        begun = self._begin(observation)
+        if begun.mesh.area > LEAST_GROWTH * old.area:
+            self._adopt(begun, observation)
             self._loss_monitor.restart("a larger mesh was made")
 
-    def _adopt(self, tracker: Tracker, mesh: Mesh, observation: Observation) -> None:
-        self._tracker, self.mesh, self.made_ns = tracker, mesh, observation.t_host_ns
-        self._vertex_offsets = self._plan.vertex_offsets.build(tracker.model, self._rig.sensors[self._plan.reference])
+    def _adopt(self, begun: "_Begun", observation: Observation) -> None:
+        self._tracker, self.mesh, self._warnings = begun
+        self.made_ns = observation.t_host_ns
+        self._vertex_offsets = self._plan.vertex_offsets.build(
+            begun.tracker.model, self._rig.sensors[self._plan.reference]
+        )
         # Their appearance is unknown: once one of them delivers images, mesh and appearance are built again.
         sensors = self._rig.sensors
         self._without_appearance = frozenset(n for n in observation.missing if isinstance(sensors[n].noise, ImageNoise))
@@ -130,8 +149,9 @@ class TrackingSession:
     def _detect(self, observation: Observation) -> InitialDetection:
         return detect_object(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
 
-    def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
-        return make_tracker(self._plan, self._rig, self._detect(observation), observation)
+    def _begin(self, observation: Observation) -> "_Begun":
+        detection = self._detect(observation)
+        return _Begun(*make_tracker(self._plan, self._rig, detection, observation), warnings(detection))
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
@@ -140,7 +160,7 @@ def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
     return list(dict.fromkeys(needed))
 
 
-def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimate:
+def _initializing(observation: Observation, reasons: tuple[str, ...], warnings: tuple[str, ...]) -> Estimate:
     return Estimate(
         seq=observation.seq,
         t_host_ns=observation.t_host_ns,
@@ -162,4 +182,5 @@ def _initializing(observation: Observation, reasons: tuple[str, ...]) -> Estimat
         shape=ShapeQuality(),
         sources=observation.sources,
         missing=observation.missing,
+        warnings=warnings,
     )

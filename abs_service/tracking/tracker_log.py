@@ -24,6 +24,7 @@ class EstimateReport:
         stamp: wall-clock time of the exposure, RFC 3339.
         status: INITIALIZING, TRACKING, DEGRADED or LOST.
         reasons: why it is not TRACKING.
+        warnings: doubts about the object that was detected.
         theta: parameters of the deformation, SI units.
         error_mm: mean distance of the vertices from where they truly are [mm].
         surface_mm: mean distance of the vertices from the true surface [mm].
@@ -39,6 +40,7 @@ class EstimateReport:
     stamp: str
     status: str
     reasons: tuple[str, ...]
+    warnings: tuple[str, ...]
     theta: tuple[float, ...]
     error_mm: float | None
     surface_mm: float | None
@@ -151,6 +153,7 @@ class TrackerLog:
             stamp=state.header.stamp.ToJsonString(),
             status=DeformationState.Status.Name(state.status).removeprefix("STATUS_"),
             reasons=tuple(state.reasons),
+            warnings=tuple(state.warnings),
             theta=tuple(state.theta),
             error_mm=errors.vertex_mm if errors else None,
             surface_mm=errors.surface_mm if errors else None,

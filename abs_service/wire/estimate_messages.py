@@ -112,6 +112,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         stretch=estimate.shape.stretch,
         folded_share=estimate.shape.folded_share,
         deviation_m=estimate.shape.deviation_m,
+        warnings=estimate.warnings,
     )
 
 

@@ -125,6 +125,15 @@ def test_what_is_not_found_is_said_in_words_and_in_the_picture(tmp_path, capsys,
     assert not has(picture, REGION)
 
 
+def test_doubts_about_the_object_are_said_before_it_is_tracked(tmp_path, capsys):
+    text = RIG + 'region = { type = "box", lowest = [-9.0, -9.0, 0.0], highest = [9.0, 9.0, 9.0] }\n'
+    (tmp_path / "rig.toml").write_text(text)
+    picture = tmp_path / "first.png"
+    assert cli.main(["check", str(tmp_path / "rig.toml"), "--picture", str(picture)]) == Exit.OK
+    assert "note: sheet: the object fills " in capsys.readouterr().err
+    assert count(drawn(picture), WARNING) > 20
+
+
 @pytest.mark.parametrize("command", ["replay", "check"])
 @pytest.mark.parametrize(
     ("name", "problem"),

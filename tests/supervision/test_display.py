@@ -27,6 +27,7 @@ def report(**changes):
             "stamp": "2026-01-02T03:04:05.250Z",
             "status": "TRACKING",
             "reasons": (),
+            "warnings": (),
             "theta": tuple(0.125 * i for i in range(48)),
             "error_mm": 2.345,
             "surface_mm": 0.987,
@@ -229,7 +230,7 @@ def test_json_is_one_object_per_estimate_and_nothing_else():
         display.estimate(report(error_mm=None, surface_mm=None))
         display.close(view(RigState(["sheet"], Clock())))
     first, second = map(json.loads, out.getvalue().splitlines())
-    assert first == report().as_dict() | {"theta": list(report().theta), "reasons": []}
+    assert first == report().as_dict() | {"theta": list(report().theta), "reasons": [], "warnings": []}
     assert second["error_mm"] is None
     assert notes.getvalue().startswith("something\n")
 

@@ -14,6 +14,7 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.detection.regions import box
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
 from abs_service.tracking.noise_monitor import NoiseMonitor
@@ -31,7 +32,7 @@ MEMBERS = streams(RIG.sensors.values())
 class Bench:
     """A live tracker on a loopback bus with a clock that only the test moves."""
 
-    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000):
+    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, **parts):
         self.now_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
@@ -39,7 +40,7 @@ class Bench:
         self.health = Health(self.bus, "track/sheet", self.headers)
         frames = FrameSubscriber(self.bus, MEMBERS)
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
-        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2)))
+        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
         self.live = LiveTracker(
             self.tracking,
             self.sets,
@@ -247,3 +248,32 @@ def test_the_budget_bounds_the_search_of_all_but_the_first_frame():
     assert [state.generations for state in bench.states] == [2, 1]
     assert bench.states[1].solve_ms >= 10
     assert [state.budget_ms for state in bench.states] == [5, 5]
+
+
+def test_doubts_about_the_object_are_in_every_state_and_in_health():
+    bench = Bench(region=box.Settings((-9.0, -9.0, 0.0), (9.0, 9.0, 9.0)))
+    for k in range(2):
+        bench.expose(k)
+        bench.live.process_next()
+    first, second = bench.states
+    (doubt,) = first.warnings
+    assert "is the region right?" in doubt
+    assert list(second.warnings) == [doubt]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert doubt in said.message
+
+
+def test_a_wrong_depth_scale_is_a_warning_until_it_is_right(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, scale=frame.scale * 1e-3))
+    bench.live.process_next()
+    (state,) = bench.states
+    assert state.status == DeformationState.STATUS_INITIALIZING
+    assert "is the depth scale right?" in state.warnings[0]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert state.warnings[0] in said.message
+    bench.expose(1, lambda frame: dataclasses.replace(frame, epoch=1))
+    bench.live.process_next()
+    assert list(bench.states[1].warnings) == []
+    assert bench.said.level == Message.LEVEL_OK

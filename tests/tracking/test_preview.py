@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from abs_service import config, wiring
+from abs_service.tracker.detection.regions import box
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.terms.depth.depth import DepthTerm
@@ -102,3 +103,21 @@ def test_a_mesh_that_cannot_be_made_leaves_the_selected_pixels():
 def test_without_a_depth_image_there_is_no_preview():
     with pytest.raises(PreviewError, match="no depth image from tof in 0 frame sets"):
         preview([], RIG, PLAN)
+
+
+def test_a_surface_that_nothing_holds_is_told_before_it_is_tracked():
+    """A part of a flat wall: no colour camera, and no free edge."""
+    (frames,) = frame_sets(30)
+    wall = {key: replace(f, data=np.full_like(f.data, f.data.max())) for key, f in frames.frames.items()}
+    region = box.Settings((-0.2, -0.15, 0.0), (0.2, 0.15, 5.0))
+    seen = preview([replace(frames, frames=wall)], RIG, replace(PLAN, region=region))
+    assert seen.found is not None
+    (doubt,) = seen.warnings
+    assert doubt.startswith("it would begin DEGRADED: nothing holds the surface along itself")
+
+
+def test_a_sheet_raises_no_doubts_and_the_whole_scene_does():
+    assert preview(frame_sets(30), RIG, PLAN).warnings == ()
+    everything = box.Settings((-9.0, -9.0, 0.0), (9.0, 9.0, 9.0))
+    seen = preview(frame_sets(30), RIG, replace(PLAN, region=everything))
+    assert any("is the region right?" in doubt for doubt in seen.warnings)

@@ -1,12 +1,45 @@
-"""Input of a region: the first depth image, its points and the camera that measured it."""
+"""Input of a region: one depth image, its points, the camera that measured it, and the colours of its pixels."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
 from calib.camera import Camera
+from calib.warp.errors import WarpError
+from calib.warp.pictures import PictureLookup
+
+#: A colour image (height, width, 3), red, green, blue in 0…255, and the camera that took it.
+Picture = tuple[Camera, NDArray[np.uint8]]
+
+
+class PixelColors:
+    """Colours of a depth image's pixels, resampled when they are first asked for: most regions need none.
+
+    Args:
+        distance: radial distances (height, width) [m], NaN without return.
+        camera: the camera that measured them.
+        pictures: colour images of the same moment.
+    """
+
+    def __init__(self, distance: NDArray[np.float32], camera: Camera, pictures: Sequence[Picture]):
+        self._distance, self._camera, self._pictures = distance, camera, pictures
+
+    @cached_property
+    def rgb(self) -> NDArray[np.float32]:
+        """Red, green, blue (height, width, 3) in 0…255 by the camera that sees most pixels; NaN where it sees none."""
+        unseen = np.full((*self._distance.shape, 3), np.nan, np.float32)
+        seen = [self._resampled(*picture) for picture in self._pictures]
+        return max(seen, key=lambda rgb: int(np.isfinite(rgb).sum()), default=unseen)
+
+    def _resampled(self, camera: Camera, picture: NDArray[np.uint8]) -> NDArray[np.float32]:
+        try:
+            return PictureLookup(self._camera, camera).look(self._distance).blended(picture)
+        except WarpError:  # the camera looks elsewhere, or there is no return
+            return np.full((*self._distance.shape, 3), np.nan, np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -17,16 +50,22 @@ class DepthView:
         points_r: rig coordinates of every pixel (height, width, 3) [m], NaN without return.
         distance: radial distances (height, width) [m], NaN without return.
         camera: the camera that measured them.
+        colors: of the pixels.
+        t_ns: time of the image, CLOCK_MONOTONIC [ns].
     """
 
     points_r: NDArray[np.float64]
     distance: NDArray[np.float32]
     camera: Camera
+    colors: PixelColors
+    t_ns: int
 
     @classmethod
-    def of(cls, distance: NDArray[np.float32], camera: Camera) -> "DepthView":
-        """The view of radial distances (height, width) [m], NaN without return."""
-        return cls(camera.unproject(distance), distance, camera)
+    def of(
+        cls, distance: NDArray[np.float32], camera: Camera, pictures: Sequence[Picture] = (), t_ns: int = 0
+    ) -> "DepthView":
+        """The view of radial distances (height, width) [m], NaN without return; other arguments as in the class."""
+        return cls(camera.unproject(distance), distance, camera, PixelColors(distance, camera, pictures), t_ns)
 
     @property
     def measured(self) -> NDArray[np.bool_]:
@@ -44,4 +83,4 @@ def limited(view: DepthView, within: NDArray[np.bool_]) -> DepthView:
         raise DetectionError(f"the mask is {within.shape[::-1]} pixels, the depth image {view.distance.shape[::-1]}")
     points_r = np.where(within[..., None], view.points_r, np.nan)
     distance = np.where(within, view.distance, np.nan).astype(np.float32, copy=False)
-    return DepthView(points_r, distance, view.camera)
+    return replace(view, points_r=points_r, distance=distance)

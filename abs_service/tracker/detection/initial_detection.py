@@ -13,6 +13,10 @@ class DetectionError(ValueError):
     """The object is not in view, or too little of it is visible to track it."""
 
 
+class UndecidedError(DetectionError):
+    """More images are needed to say where the object is."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class InitialDetection:
     """One depth image, segmented.

@@ -1,27 +1,15 @@
 """Segmentation of the object in a depth image by a region."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from abs_service.pairing.images import DepthImage
+from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, check_extent
 from abs_service.tracker.detection.regions.base import Region
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
-
-#: Range of the extent of an object [m]; outside, the distances have the wrong unit.
-SMALLEST_M, LARGEST_M = 0.005, 20.0
-
-#: The same for everything in sight, which is checked first: with the wrong unit, no region finds anything sensible.
-LARGEST_SCENE_M = 200.0
-
-#: Percentiles of the coordinates between which the extent is measured, because some pixels at the rim are wrong.
-EXTENT_PERCENT = (2, 98)
-
-#: Number of points for the extent; more are slower but not more accurate.
-MOST_POINTS = 5000
 
 
 def detect_object(
@@ -35,33 +23,11 @@ def detect_object(
     sensor, image = rig.sensors[reference], observation.images.get(reference)
     if not (isinstance(image, DepthImage) and isinstance(sensor.noise, DepthNoise)):
         raise DetectionError(f"no depth image from {reference} yet")
-    view = DepthView.of(subtract_mean_offset(sensor.noise, image.distance, image.amplitude), sensor.camera)
-    _check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
+    distance = subtract_mean_offset(sensor.noise, image.distance, image.amplitude)
+    pictures = [(rig.sensors[n].camera, i.rgb) for n, i in observation.images.items() if isinstance(i, ColorImage)]
+    view = DepthView.of(distance, sensor.camera, pictures, observation.t_host_ns)
+    check_extent(view.points_r[view.measured], "everything in sight", LARGEST_SCENE_M, sensor.head)
     inside = region.select(view)
-    _check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
+    check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
     distance = np.where(inside, view.distance, np.nan).astype(np.float32)
     return InitialDetection(distance, sensor.camera, vertices, view.distance)
-
-
-def _check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:
-    """Checks the diagonal of the bounding box of points (k, 3) [m], without the outermost ones.
-
-    Args:
-        points: the points; none is in order, because then the region has more to say.
-        what: their name in the message.
-        largest: largest possible diagonal [m].
-        sensor: name of the sensor that measured them.
-
-    Raises:
-        DetectionError: the diagonal is impossible.
-    """
-    if not len(points):
-        return
-    low, high = np.percentile(points[:: len(points) // MOST_POINTS + 1], EXTENT_PERCENT, axis=0)
-    extent = float(np.linalg.norm(high - low))
-    if not SMALLEST_M <= extent <= largest:
-        wide = f"{extent * 1e3:.2g} mm" if extent < 1 else f"{extent:.0f} m"
-        raise DetectionError(
-            f"{what} would be {wide} wide: is the depth scale right? The device, depth_scale of imported images or "
-            f"sensors.{sensor}.depth.scale determines it"
-        )

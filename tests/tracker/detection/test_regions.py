@@ -1,5 +1,7 @@
 """The regions nearest, box and mask select the pixels of the object."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -27,7 +29,8 @@ def selected(region, distance):
 
 def selected_of(region, points):
     """The pixels that a region selects of points in the rig."""
-    return region.build().select(DepthView(points, np.ones(SHAPE, np.float32), CAMERA))
+    view = DepthView.of(np.ones(SHAPE, np.float32), CAMERA)
+    return region.build().select(replace(view, points_r=points))
 
 
 NEAR = (slice(10, 30), slice(5, 25), 1.0)

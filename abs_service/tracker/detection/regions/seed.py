@@ -1,42 +1,69 @@
-"""The connected surface at a pixel."""
+"""The connected surface at a pixel, of a colour, or that moves."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-from annotated_types import Ge, Gt
+from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_segments import surface_at
+from abs_service.tracker.detection.color_growth import grown_by_color
 from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
 from abs_service.tracker.detection.within import Restricted, restricted
+
+Level = Annotated[int, Ge(0), Le(255)]
 
 
 @dataclass(frozen=True)
 class Settings:
-    """TOML keys of the region.
+    """TOML keys of the region; one of pixel, color and motion_s says where the object is.
 
     Attributes:
         pixel: column and row of a pixel of the object in the depth image [px].
+        color: red, green, blue of the object; the largest surface of about this colour is it.
+        motion_s: the object is what moved within so many seconds [s].
+        grow: where the object ends at the seed's surface: at steps in distance ("depth"), or at edges of its colours,
+            too ("color").
+        least_motion_m: how much nearer than before a moved surface is [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
-        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        least_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
     """
 
-    pixel: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]]
+    pixel: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
+    color: tuple[Level, Level, Level] | None = None
+    motion_s: Annotated[float, Ge(0.5)] | None = None
+    grow: Literal["depth", "color"] = "depth"
+    least_motion_m: Annotated[float, Gt(0)] = 0.02
     largest_step_m: Annotated[float, Gt(0)] = 0.04
     least_pixels: Annotated[int, Ge(16)] = 16
     within: Path | None = None
 
+    def __post_init__(self) -> None:
+        self._seed()
+
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        return restricted(self._at_pixel, self.within)
+        seed, surfaces = self._seed(), Surfaces(self.largest_step_m, self.least_pixels)
 
-    def _at_pixel(self, view: DepthView) -> NDArray[np.bool_]:
-        """Pixels (height, width) of the connected surface at the pixel, or nearest to it within a few pixels.
+        def select(view: DepthView) -> NDArray[np.bool_]:
+            seeded = seed(view, surfaces)
+            return seeded.surface if self.grow == "depth" else grown_by_color(seeded, view.colors.rgb)
 
-        Raises:
-            DetectionError: the pixel is outside the image, or there is no surface near it.
-        """
-        return surface_at(self.pixel, view.distance, self.largest_step_m, self.least_pixels)
+        return restricted(select, self.within)
+
+    def _seed(self) -> Seed:
+        match self.pixel, self.color, self.motion_s:
+            case (_, _) as pixel, None, None:
+                return PixelSeed(pixel)
+            case None, (_, _, _) as color, None:
+                return ColorSeed(color)
+            case None, None, float() | int() as seconds:
+                return MotionSeed(seconds, self.least_motion_m)
+        given = [name for name in ("pixel", "color", "motion_s") if getattr(self, name) is not None]
+        raise DetectionError(
+            f"one of pixel, color and motion_s says where the object is, not {' and '.join(given) or 'none'}"
+        )

@@ -1,0 +1,84 @@
+"""Doubts about a detected object: impossible sizes are refused, a region that looks like the scene is told."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+
+#: Range of the extent of an object [m]; outside, the distances have the wrong unit.
+SMALLEST_M, LARGEST_M = 0.005, 20.0
+
+#: The same for everything in sight, which is checked first: with the wrong unit, no region finds anything sensible.
+LARGEST_SCENE_M = 200.0
+
+#: Percentiles of the coordinates between which the extent is measured, because some pixels at the rim are wrong.
+EXTENT_PERCENT = (2, 98)
+
+#: Number of points for the extent; more are slower but not more accurate.
+MOST_POINTS = 5000
+
+#: A surface that spans the image is the scene if it has more than this share of the measured pixels, and of all.
+SCENE_OF_MEASURED, SCENE_OF_IMAGE = 1 / 2, 1 / 3
+
+#: Share of the width or height at each end that a surface may leave out and still span the image: structured light
+#: sensors have no returns in the outer 7 % of an image that is registered to another camera.
+SCENE_MARGIN = 0.08
+
+
+class ExtentError(DetectionError):
+    """What was detected, or everything in sight, has an impossible size: the distances have the wrong unit."""
+
+
+def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:
+    """Checks the diagonal of the bounding box of points (k, 3) [m], without the outermost ones.
+
+    Args:
+        points: the points; none is in order, because then the region has more to say.
+        what: their name in the message.
+        largest: largest possible diagonal [m].
+        sensor: name of the sensor that measured them.
+
+    Raises:
+        ExtentError: the diagonal is impossible.
+    """
+    if not len(points):
+        return
+    low, high = np.percentile(points[:: len(points) // MOST_POINTS + 1], EXTENT_PERCENT, axis=0)
+    extent = float(np.linalg.norm(high - low))
+    if not SMALLEST_M <= extent <= largest:
+        wide = f"{extent * 1e3:.2g} mm" if extent < 1 else f"{extent:.0f} m"
+        raise ExtentError(
+            f"{what} would be {wide} wide: is the depth scale right? The device, depth_scale of imported images or "
+            f"sensors.{sensor}.depth.scale determines it"
+        )
+
+
+def is_scene(surface: NDArray[np.bool_], measured: NDArray[np.bool_]) -> bool:
+    """True if a surface spans the image and is the larger part of it: everything in sight is connected.
+
+    Args:
+        surface: its pixels (height, width).
+        measured: pixels (height, width) with a return.
+    """
+    pixels = np.count_nonzero(surface)
+    if pixels <= SCENE_OF_MEASURED * np.count_nonzero(measured) or pixels <= SCENE_OF_IMAGE * surface.size:
+        return False
+    rows, columns = np.nonzero(surface)
+    return _spans(columns, surface.shape[1]) or _spans(rows, surface.shape[0])
+
+
+def warnings(detection: InitialDetection) -> tuple[str, ...]:
+    """Doubts about an object that was found, in plain words, for `check`, health and the state alike."""
+    inside, measured = np.isfinite(detection.distance), np.isfinite(detection.surroundings)
+    if not (measured.size and is_scene(inside, measured)):
+        return ()
+    return (
+        f"the object fills {np.mean(inside):.0%} of the image, {inside.sum() / measured.sum():.0%} of all returns, "
+        "from side to side: is the region right?",
+    )
+
+
+def _spans(places: NDArray[np.int64], size: int) -> bool:
+    """True if columns or rows (k,) reach from one end of an image of this size to the other."""
+    margin = SCENE_MARGIN * size
+    return bool(places.min() <= margin and places.max() >= size - 1 - margin)
