@@ -39,6 +39,7 @@ class TrackingSession:
         self._rig = rig
         self._plan = plan
         self._region = plan.region.build()
+        self._template = plan.template.build(plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
@@ -129,7 +130,7 @@ class TrackingSession:
         return detect_object(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
 
     def _begin(self, observation: Observation) -> tuple[Tracker, Mesh]:
-        return make_tracker(self._plan, self._rig, self._detect(observation), observation)
+        return make_tracker(self._plan, self._template, self._rig, self._detect(observation), observation)
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:

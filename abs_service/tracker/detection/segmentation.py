@@ -40,7 +40,16 @@ def detect_object(
     inside = region.select(view)
     _check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
     distance = np.where(inside, view.distance, np.nan).astype(np.float32)
-    return InitialDetection(distance, sensor.camera, vertices, view.distance)
+    deviation = _median_deviation(sensor.noise, image, inside)
+    return InitialDetection(distance, sensor.camera, vertices, view.distance, deviation)
+
+
+def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:
+    """Median standard deviation [m] of the distances at the pixels of a mask (height, width), of some of them."""
+    rows, columns = (places[:: np.count_nonzero(inside) // MOST_POINTS + 1] for places in np.nonzero(inside))
+    distance, amplitude = (values[rows, columns].astype(np.float64) for values in (image.distance, image.amplitude))
+    deviation = noise.deviation(distance, amplitude, (rows, columns))
+    return float(np.nanmedian(deviation)) if np.isfinite(deviation).any() else 0.0
 
 
 def _check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:

@@ -6,9 +6,14 @@ import numpy as np
 
 from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.principal_axes import principal_axes
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.pose import Pose
+
+#: A mesh is flat if its thickness is at most this share of its long side, and a rectangle if its area is at least this
+#: share of that of the rectangle around it.
+FLAT, LEAST_AREA = 0.005, 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,3 +56,15 @@ class Sheet:
         positions = pose.transform(self.T_rp, np.column_stack([flat, np.zeros(len(flat))]))
         faces = triangles(np.arange(rows * columns).reshape(rows, columns)).astype(np.int32)
         return Mesh(positions, faces, np.full((len(flat), 3), np.nan, np.float32), chart)
+
+
+def rectangle_of(mesh: Mesh) -> Sheet | None:
+    """The flat rectangle that a mesh covers, its z axis against the normals of the mesh; None if it is none."""
+    center, axes = principal_axes(mesh.vertices)
+    width, height, thickness = np.ptp((mesh.vertices - center) @ axes, axis=0).tolist()
+    if thickness > FLAT * width or mesh.area < LEAST_AREA * width * height:
+        return None
+    z = -np.sign(axes[:, 2] @ mesh.normals.sum(axis=0)) * axes[:, 2]
+    T_rp = np.eye(4)
+    T_rp[:3] = np.column_stack([axes[:, 0], np.cross(z, axes[:, 0]), z, center])
+    return Sheet(T_rp, width, height)

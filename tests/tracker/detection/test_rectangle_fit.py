@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.rectangle_fit import LEAST_PIXELS, find_sheet
+from abs_service.tracker.detection.rectangle_fit import LIMITS, find_sheet
 from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models.flexpad import Settings
 from calib import pose
@@ -127,7 +127,7 @@ def test_a_bent_sheet_is_not_yet_one(direction):
 def test_a_few_pixels_are_no_sheet():
     distance = np.full((240, 320), np.nan)
     distance[100:110, 100:115] = 1.0
-    assert f"has 150 pixels, a sheet needs {LEAST_PIXELS}" in refused(distance)
+    assert f"has 150 pixels, a sheet needs {LIMITS.least_pixels}" in refused(distance)
 
 
 def test_nothing_is_no_sheet():

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.pairing.images import LUMA, ChannelImage, ColorImage, Image
+from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
 from abs_service.tracker.terms.photometric.demosaicing import demosaiced
@@ -26,7 +27,7 @@ Values = NDArray[np.float64]
 LEAST_COSINE = 0.2
 
 
-def with_appearance(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
+def with_appearance(mesh: Mesh, images: Mapping[str, Image], rig: Rig, sight: Sight = ALL_SEEN) -> Mesh:
     """The mesh with its colours, and with its appearance in every imaging sensor.
 
     The appearance comes from the sensor's own image, because no two cameras agree on a colour; for vertices that it
@@ -37,6 +38,9 @@ def with_appearance(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
         mesh: the mesh at the time of the images.
         images: images of that moment, by sensor name.
         rig: the sensors.
+        sight: what a template knows. Vertices that the first depth image does not show get no appearance from the
+            images. Colours of the template count for all vertices in place of the images', which only say how bright
+            they are in each sensor and channel; infra-red and amplitudes, of which a template knows nothing, excepted.
     """
     own = {name: _seen(image, rig.sensors[name].camera, mesh) for name, image in images.items()}
     colors = _colors(mesh, own, rig)
@@ -54,8 +58,24 @@ def with_appearance(mesh: Mesh, images: Mapping[str, Image], rig: Rig) -> Mesh:
                 appearance[name] = seen / _brightness(sensor.camera, mesh)
             case GaussianIntensity(illumination="passive"):
                 appearance[name] = seen + np.zeros((len(mesh.vertices), 1))
+    seen, known = sight.seen(mesh)[:, None], sight.colors(mesh).astype(np.float64)
+    colors = _painted(np.where(seen, colors, np.nan), known)
+    for name, values in appearance.items():
+        visible = np.where(seen, values, np.nan)
+        is_picture = isinstance(rig.sensors[name].noise, (GaussianColor, GaussianGrey, GaussianBayer))
+        own_colors = known @ LUMA[:, None] if values.shape[1] == 1 else known
+        appearance[name] = _painted(visible, own_colors) if is_picture else visible
     as_single = {name: values.astype(np.float32) for name, values in appearance.items()}
     return replace(mesh, colors=colors.astype(np.float32), appearance=as_single)
+
+
+def _painted(measured: Values, known: Values) -> Values:
+    """Known colours (n, channels) as bright as measured ones, in the median; where unknown, the measured ones."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(known > 0, measured / known, np.nan)
+    compared = np.isfinite(ratio)
+    gain = [np.median(ratio[one, c]) if (one := compared[:, c]).any() else 1.0 for c in range(known.shape[1])]
+    return _known(known * gain, measured)
 
 
 def _colors(mesh: Mesh, own: Mapping[str, Values], rig: Rig) -> Values:
