@@ -42,6 +42,13 @@ class Box:
         return np.where(enter <= leave, enter, np.nan)
 
 
+def print_of(points):
+    """Red, green, blue (…, 3) at points (…, 3) of an object [m]: smooth waves, of no symmetry."""
+    x, y, z = np.moveaxis(points, -1, 0)
+    red, green = np.sin(x / 0.012 + 1) * np.cos(y / 0.015), np.sin(y / 0.011 + z / 0.013 + 2 * np.cos(x / 0.03))
+    return 120 + 80 * np.stack([red, green, np.cos(x / 0.02 + z / 0.02)], axis=-1)
+
+
 @dataclass(frozen=True)
 class Scene:
     """A shape at a pose, before a wall and perhaps behind a board.
@@ -77,6 +84,11 @@ class Scene:
         noisy = self.seen(camera)[0]
         noisy = noisy + np.random.default_rng(seed).normal(0, SIGMA_M, noisy.shape)
         return noisy * camera.rays()[..., 2]
+
+    def image(self, camera=CAMERA):
+        """Colour image: the `print_of` the object on black."""
+        points = self.seen(camera)[1]
+        return np.where(np.isfinite(points[..., :1]), np.nan_to_num(print_of(points)), 0).astype(np.uint8)
 
     def mask(self, camera=CAMERA):
         """Pixels of the object, without those at its rim."""

@@ -1,14 +1,13 @@
 """An object of known shape: its mesh, placed where the first depth image shows it."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
-import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.paint import NO_PAINT, Paint
 from abs_service.tracker.detection.registration import register
 from abs_service.tracker.detection.samples import Samples
 from abs_service.tracker.detection.templates.base import BindsToMesh, Model_co, ModelSettings, Sight
@@ -25,12 +24,14 @@ class KnownObject:
 
     Args:
         mesh: in the object's own frame [m].
-        samples: dense points of its surface, for the registration and for the colours between the vertices.
+        samples: points of its surface, for the registration.
+        paint: its colours.
     """
 
-    def __init__(self, mesh: Mesh, samples: Samples):
+    def __init__(self, mesh: Mesh, samples: Samples, paint: Paint = NO_PAINT):
         self._mesh = mesh
         self._samples = samples
+        self._paint = paint
 
     def bind(self, model: ModelSettings[Model_co], detection: InitialDetection) -> tuple[Model_co, Sight]:
         """The model bound to the mesh where the registration finds it; see `Template`."""
@@ -40,7 +41,7 @@ class KnownObject:
         mesh = replace(self._mesh, vertices=pose.transform(T_ro, self._mesh.vertices))
         if not self._samples.is_closed:
             mesh = _towards(detection.camera.center, mesh)
-        return model.of_mesh(mesh), FirstSight(detection, self._samples, T_ro)
+        return model.of_mesh(mesh), FirstSight(detection, self._paint, T_ro)
 
 
 def _towards(center: NDArray[np.float64], mesh: Mesh) -> Mesh:
@@ -55,12 +56,12 @@ class FirstSight:
 
     Attributes:
         detection: the first depth image.
-        samples: points of the surface with the template's colours.
+        paint: the template's colours.
         T_ro: pose of the object.
     """
 
     detection: InitialDetection
-    samples: Samples
+    paint: Paint
     T_ro: Pose
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
@@ -73,9 +74,5 @@ class FirstSight:
         return facing & (np.abs(measured - away) < agreement)  # False for NaN
 
     def colors(self, mesh: Mesh) -> NDArray[np.float32]:
-        """Colours (n, 3) of the nearest sample of every vertex."""
-        return self.samples.colors[self._tree.query(mesh.vertices)[1]].astype(np.float32)
-
-    @cached_property
-    def _tree(self) -> "scipy.spatial.KDTree":
-        return scipy.spatial.KDTree(pose.transform(self.T_ro, self.samples.points))
+        """Colours (n, 3) of the vertices by the template."""
+        return self.paint.at(pose.transform(pose.inverse(self.T_ro), mesh.vertices), mesh.normals @ self.T_ro[:3, :3])

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.known_object import KnownObject
+from abs_service.tracker.detection.paint import NO_PAINT, PointPaint
 from abs_service.tracker.detection.principal_axes import extents, principal_axes
 from abs_service.tracker.detection.resampling import evenly_spread, triangulated
 from abs_service.tracker.detection.samples import Samples
@@ -19,8 +20,8 @@ from abs_service.tracker.mesh import Mesh, edge_lengths
 #: Formats that are read, by the ending of the name.
 FORMATS = (".obj", ".ply", ".stl")
 
-#: Number of sample points for registration and colours; more are slower and not more accurate.
-SAMPLES = 1500
+#: Number of sample points for the registration; more are slower and not more accurate. And of points with colours.
+SAMPLES, PAINTED = 1500, 10_000
 
 #: The vertices of the file are kept if there are so many times as many as asked for.
 FEWEST, MOST = 0.5, 2.0
@@ -65,18 +66,17 @@ def load(path: Path, metres: float, vertices: int) -> KnownObject:
     """
     content = _read(path)
     given = _checked(_mesh(content, metres), path)
-    is_closed = _is_closed(given)
-    spacing = np.sqrt(given.area / max(vertices, SAMPLES))
+    is_painted = bool(np.isfinite(given.colors).all())
+    spacing = np.sqrt(given.area / max(vertices, PAINTED if is_painted else SAMPLES))
     dense = _mesh(_divided(content, FINENESS * spacing / metres), metres)
     chosen = evenly_spread(dense, SAMPLES)
-    samples = Samples(
-        dense.vertices[chosen], dense.normals[chosen], dense.colors[chosen].astype(float), dense.area, is_closed
-    )
+    samples = Samples(dense.vertices[chosen], dense.normals[chosen], dense.area, _is_closed(given))
+    paint = PointPaint(dense.vertices, dense.normals, dense.colors.astype(np.float64)) if is_painted else NO_PAINT
     if FEWEST * vertices <= len(given.vertices) <= MOST * vertices:
-        return KnownObject(given, samples)
+        return KnownObject(given, samples, paint)
     kept, faces = triangulated(dense, evenly_spread(dense, vertices))
     coarse = replace(dense, vertices=dense.vertices[kept], faces=faces, colors=dense.colors[kept])
-    return KnownObject(replace(coarse, chart=dense.chart[kept]), samples)
+    return KnownObject(replace(coarse, chart=dense.chart[kept]), samples, paint)
 
 
 def _read(path: Path) -> _Content:

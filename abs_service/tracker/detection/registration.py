@@ -26,6 +26,9 @@ Points = NDArray[np.float64]
 #: Stages of the fit: number of points and of samples, of steps, and of the best poses that go on to the next stage.
 STAGES = ((150, 4, 24), (150, 8, 5), (1200, 15, 5))
 
+#: Poses whose rotations differ by less are the same [rad].
+SAME_TURN = np.deg2rad(5.0)
+
 #: Starts whose costs differ by less are alike, as those of a symmetric object: the most upright one is taken.
 ALIKE = 1.03
 
@@ -105,12 +108,22 @@ def register(samples: Samples, detection: InitialDetection) -> Pose:
     poses, costs, thinned = _starts(scene, samples), [0.0], (scene, samples)
     for count, steps, best in STAGES:
         thinned = scene.thinned(count), samples.thinned(count)
-        fits = sorted((_fitted(*thinned, T_ro, steps) for T_ro in poses), key=lambda fit: fit[1])[:best]
+        fits = sorted((_fitted(*thinned, T_ro, steps) for T_ro in poses), key=lambda fit: fit[1])
+        fits = _distinct(fits)[:best]
         poses, costs = [T_ro for T_ro, _ in fits], [cost for _, cost in fits]
     alike = [T_ro for T_ro, cost in zip(poses, costs) if cost <= ALIKE * costs[0]]
     T_ro = min(alike, key=lambda T_ro: _turn(scene.camera, T_ro))
     _check(_match(*thinned, T_ro), samples, scene, detection.deviation)
     return T_ro
+
+
+def _distinct(fits: list[tuple[Pose, float]]) -> list[tuple[Pose, float]]:
+    """Those of poses and their costs, the best first, that differ in rotation from all better ones."""
+    kept: list[tuple[Pose, float]] = []
+    for T_ro, cost in fits:
+        if all(np.trace(other[:3, :3].T @ T_ro[:3, :3]) < 1 + 2 * np.cos(SAME_TURN) for other, _ in kept):
+            kept.append((T_ro, cost))
+    return kept
 
 
 def _scene(detection: InitialDetection) -> Scene:

@@ -16,7 +16,7 @@ MOST_CANDIDATES = 12_000
 
 #: Turned away from each other, two points count as this many spacings apart, so that both sides of a thin body have
 #: vertices.
-SIDES_APART = 2.0
+SIDES_APART = 1.0
 
 
 def evenly_spread(mesh: Mesh, count: int) -> NDArray[np.intp]:

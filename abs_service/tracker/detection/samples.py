@@ -13,14 +13,12 @@ class Samples:
     Attributes:
         points: positions (n, 3) [m].
         normals: unit normals (n, 3), outwards if the surface is closed.
-        colors: red, green, blue (n, 3) in 0…255; NaN where unknown.
         area: of the surface [m²].
         is_closed: True for the surface of a body, which is seen from outside only; otherwise either side may be seen.
     """
 
     points: NDArray[np.float64]
     normals: NDArray[np.float64]
-    colors: NDArray[np.float64]
     area: float
     is_closed: bool
 
@@ -31,7 +29,7 @@ class Samples:
 
     def thinned(self, count: int) -> "Samples":
         """The first `count` of them."""
-        return replace(self, points=self.points[:count], normals=self.normals[:count], colors=self.colors[:count])
+        return replace(self, points=self.points[:count], normals=self.normals[:count])
 
 
 def farthest_first(points: NDArray[np.float64], count: int) -> NDArray[np.intp]:

@@ -88,7 +88,7 @@ class Settings:
         return FlexPad(sheet, detection.vertices, self.least_radius_m, self.bend_deviation)
 
     def of_mesh(self, mesh: Mesh) -> "FlexPad":
-        """The model of a flat rectangular mesh, with vertices of its own, as many.
+        """The model of a flat rectangular mesh, with about as many vertices on a regular grid.
 
         Raises:
             ModelError: the mesh is no flat rectangle, or not of the given size, or too large for the least radius.
