@@ -4,6 +4,9 @@ import pytest
 
 from abs_service import cli, config
 from abs_service.supervision.exit_codes import Exit
+from abs_service.tracker.detection.templates import sheet
+from abs_service.tracking.preview import preview
+from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
 
 
 def rig_file(folder, template, model='{ type = "rigid" }', more=""):
@@ -47,7 +50,12 @@ def test_what_cannot_be_used_is_refused(tmp_path, capsys, arguments, message):
     assert message in error
 
 
-def test_the_simulated_sheet_is_found_by_its_size_and_drawn(tmp_path, capsys):
+def test_the_simulated_sheet_is_found_by_its_size_and_drawn(tmp_path):
     path = rig_file(tmp_path, '{ type = "sheet", size = [0.2, 0.3] }', '{ type = "nurbs" }')
-    assert cli.main(["check", str(path), "--picture", str(tmp_path / "first.svg")]) == Exit.OK, capsys.readouterr().err
-    assert "300 × 200" in (tmp_path / "first.svg").read_text(encoding="utf-8") or capsys.readouterr()
+    assert cli.main(["check", str(path), "--picture", str(tmp_path / "first.png")]) == Exit.OK
+    assert (tmp_path / "first.png").stat().st_size > 10_000
+    simulation = simulate("simulated://sheet?seed=1")
+    plan = default_plan(template=sheet.Settings((0.2, 0.3)))
+    seen = preview([frame_set(simulation.expose(0)[0], 0)], rig_of(simulation), plan)
+    assert seen.found is not None, seen.reason
+    assert seen.found.extents == pytest.approx((0.3, 0.2, 0.0), abs=0.002)
