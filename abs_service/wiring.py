@@ -4,9 +4,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from abs_service.config import ServiceConfig, plugins
+from abs_service.config.tables import TrackerTable
 from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.detection.templates import first_image
+from abs_service.tracker.detection.templates.base import BindsToMesh
 from abs_service.tracker.measurements import measurement
-from abs_service.tracker.models import nurbs
+from abs_service.tracker.models import nurbs, posed
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import streams
 from calib.camera import Camera
@@ -44,10 +47,12 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
             f"needs a model whose vertices have offsets: "
             f'"nurbs", not "{model_name(config, tracker)}"; leave it out or set it to 0'
         )
+    _check_template(tracker, table)
     return Plan(
         reference=reference,
         model=table.model,
         region=table.region,
+        template=table.template,
         synthesis=table.synthesis,
         objective=table.objective,
         optimizer=table.optimizer,
@@ -58,6 +63,25 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
         reinitialization=table.reinitialization,
         vertex_offsets=table.vertex_offsets,
     )
+
+
+def _check_template(tracker: str, table: TrackerTable) -> None:
+    """PlanError if a tracker's template does not go with its other parts."""
+    if isinstance(table.template, first_image.Settings):
+        return
+    kind, model = plugins.table(table.template)["type"], table.model
+    while isinstance(model, posed.Settings):
+        model = model.shape
+    if not isinstance(model, BindsToMesh):
+        raise PlanError(
+            f'trackers.{tracker}.template.type = "{kind}": the model "{plugins.table(model)["type"]}" finds its object '
+            'by itself and cannot be bound to a mesh; "rigid", "nurbs" and "flexpad" can, or leave template out'
+        )
+    if table.reinitialization.keep_s:
+        raise PlanError(
+            f"trackers.{tracker}.reinitialization.keep_s = {table.reinitialization.keep_s:g}: with a template, every "
+            "detection has the same mesh; leave keep_s out or set it to 0"
+        )
 
 
 def model_name(config: ServiceConfig, tracker: str) -> str:

@@ -48,8 +48,9 @@ class Tracker:
         outlier_share: share of the depths that come from anywhere.
         vertices: about how many vertices the mesh has.
         region: where the object is in the first frame, unless `track` is given a mask.
+        template: what is known of its shape: `{"type": "sheet", "size": (0.297, 0.21)}`, `{"type": "mesh", "path": …}`.
         synthesis, objective, optimizer, priors, vertex_offsets, status, reinitialization: tables like those of a
-            tracker in a rig file, as is `region`: `priors={"stretch": 0.1}`.
+            tracker in a rig file, as are `region` and `template`: `priors={"stretch": 0.1}`.
         budget_evaluations: how often a search may compute the cost of a candidate per frame.
         budget_ms: time that a search may take [ms]; None: as long as it needs, with equal results from equal images.
         geometry: length in depth images: "z" along the optical axis, or "radial" from the camera centre.
@@ -74,6 +75,7 @@ class Tracker:
         outlier_share: float | None = None,
         vertices: int | None = None,
         region: Table | None = None,
+        template: Table | None = None,
         synthesis: Table | None = None,
         objective: Table | None = None,
         optimizer: Table | None = None,
@@ -90,7 +92,7 @@ class Tracker:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
         noise = noise_models.StructuredLight() if noise is None else noise
         sensor = {"noise": noise, "texture": texture, "range_m": range_m, "outlier_share": outlier_share}
-        parts = {"model": model, "region": region, "synthesis": synthesis, "objective": objective}
+        parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}
         cameras = {arguments.DEPTH: depth}
@@ -132,6 +134,7 @@ class Tracker:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
             self._region = _RegionOrMask(plan.region.build())
+            self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from error
         if budget_ms is not None and not budget_ms > 0:
@@ -139,7 +142,6 @@ class Tracker:
         self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
         self._budget_ns = np.inf if budget_ms is None else budget_ms * 1e6
         self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
-        self._session = TrackingSession(rig, replace(plan, region=self._region))
 
     def track(
         self,

@@ -92,6 +92,8 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
             _check_streams(wiring.noises(rig, name), streams)
         with _noting(f"trackers.{name}.region", problems):
             tracker.region.build()
+        with _noting(f"trackers.{name}.template", problems):
+            tracker.template.build(tracker.mesh.vertices)
     if problems:
         raise CheckError("\n".join([f"{source}: cannot work", *(f"  {problem}" for problem in problems)]))
     return {
@@ -216,7 +218,8 @@ def _camera_text(camera: Mapping[str, str]) -> str:
 def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:
     tracker = rig.trackers[name]
     parts = {
-        part: plugins.table(getattr(tracker, part))["type"] for part in ("model", "region", "objective", "optimizer")
+        part: plugins.table(getattr(tracker, part))["type"]
+        for part in ("model", "region", "template", "objective", "optimizer")
     }
     reference = "/".join(rig.reference(name))
     return {"sensors": list(tracker.sensors), "reference": reference, "vertices": tracker.mesh.vertices, **parts}

@@ -89,6 +89,7 @@ class TrackerTable(Table):
         sensors: names of the sensors whose measurements count.
         reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
         model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
+        template: likewise of `abs_service.tracker.detection.templates`.
         mesh: the triangle mesh.
         priors, vertex_offsets: `Settings` of `tracker.posterior.priors` and `tracking.vertex_offsets`.
         status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
@@ -100,6 +101,7 @@ class TrackerTable(Table):
     reference: Stream | Literal[""] = ""
     model: Annotated[Any, Plugin("abs_service.tracker.models")]
     region: Annotated[Any, Plugin("abs_service.tracker.detection.regions")] = Field(default={"type": "nearest"})
+    template: Annotated[Any, Plugin("abs_service.tracker.detection.templates")] = Field(default={"type": "first_image"})
     mesh: MeshTable = MeshTable()
     synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})

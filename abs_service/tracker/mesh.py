@@ -22,6 +22,8 @@ class Mesh:
             light. At the points of the synthesis, mostly the vertices; NaN where unknown.
         deviation: standard deviation (n,) [m] of the vertices along their normals, from the noise of the measurement
             that they were made from; one number () if it is the same for all.
+        is_complete: True if the mesh ends where the object does, as that of a template; one made from an image ends a
+            little before.
     """
 
     vertices: NDArray[np.float64]
@@ -30,6 +32,7 @@ class Mesh:
     chart: NDArray[np.float64]
     appearance: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
     deviation: NDArray[np.float64] = field(default_factory=lambda: np.zeros(()))
+    is_complete: bool = False
 
     def appearance_of(self, sensor: str) -> NDArray[np.float32]:
         """Appearance in a sensor at the points of its synthesis; defaults to the vertices' colours."""
@@ -61,9 +64,8 @@ class Mesh:
         place[order] = np.arange(len(order), dtype=np.int32)
         appearance = {sensor: values[order] for sensor, values in self.appearance.items()}
         deviation = np.broadcast_to(self.deviation, len(order))[order]
-        return Mesh(
-            self.vertices[order], place[self.faces], self.colors[order], self.chart[order], appearance, deviation
-        )
+        ordered = self.vertices[order], place[self.faces], self.colors[order], self.chart[order]
+        return Mesh(*ordered, appearance, deviation, self.is_complete)
 
 
 def area_vectors(vertices: NDArray[np.floating], faces: NDArray[np.int32]) -> NDArray[np.floating]:

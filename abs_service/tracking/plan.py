@@ -10,6 +10,8 @@ from abs_service.tracker import status
 from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions.base import Region
+from abs_service.tracker.detection.templates import first_image
+from abs_service.tracker.detection.templates.base import ALL_SEEN, Sight, Template
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
@@ -71,6 +73,14 @@ class RegionSettings(Protocol):
         ...
 
 
+class TemplateSettings(Protocol):
+    """`Settings` of a module of `abs_service.tracker.detection.templates`."""
+
+    def build(self, vertices: int) -> Template:
+        """The template, for a mesh of about `vertices` vertices."""
+        ...
+
+
 @dataclass(frozen=True)
 class Plan:
     """The settings of all parts of a tracker.
@@ -81,6 +91,7 @@ class Plan:
         evaluations: maximum number of cost evaluations per frame.
         vertices: approximate number of vertices of the mesh.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
+        template: settings of what is known of the object's shape.
         seed: seed of the search; equal seeds and frame sets result in equal estimates.
     """
 
@@ -96,15 +107,18 @@ class Plan:
     status: status.Settings
     reinitialization: loss_monitor.Settings
     vertex_offsets: VertexOffsetSettings = field(default_factory=VertexOffsetSettings)
+    template: TemplateSettings = field(default_factory=first_image.Settings)
     seed: int = 0
 
 
-def make_posterior(plan: Plan, rig: Rig, model: DeformationModel, observation: Observation) -> tuple[Posterior, Mesh]:
-    """Posterior of a model, and its mesh with the appearance from the observation."""
+def make_posterior(
+    plan: Plan, rig: Rig, model: DeformationModel, observation: Observation, sight: Sight = ALL_SEEN
+) -> tuple[Posterior, Mesh]:
+    """Posterior of a model, and its mesh with the appearance from the observation and from what a template knows."""
     synthesizer = plan.synthesis.build(rig, model.mesh)
     mesh = replace(
-        with_appearance(model.mesh, observation.images, rig),
-        appearance=with_appearance(synthesizer.canvas, observation.images, rig).appearance,
+        with_appearance(model.mesh, observation.images, rig, sight),
+        appearance=with_appearance(synthesizer.canvas, observation.images, rig, sight).appearance,
     )
     posterior = Posterior(
         model,
@@ -116,14 +130,16 @@ def make_posterior(plan: Plan, rig: Rig, model: DeformationModel, observation: O
     return posterior, mesh
 
 
-def make_tracker(plan: Plan, rig: Rig, detection: InitialDetection, observation: Observation) -> tuple[Tracker, Mesh]:
-    """A tracker of the detected object, and its mesh.
+def make_tracker(
+    plan: Plan, template: Template, rig: Rig, detection: InitialDetection, observation: Observation
+) -> tuple[Tracker, Mesh]:
+    """A tracker of the detected object, and its mesh; the template is that of the plan.
 
     Raises:
-        DetectionError: the model finds no object of its kind.
+        DetectionError: the model finds no object of its kind, or the template another one.
         ModelError: the model cannot be built from the object.
     """
-    model = plan.model.build(detection)
-    posterior, mesh = make_posterior(plan, rig, model, observation)
+    model, sight = template.bind(plan.model, detection)
+    posterior, mesh = make_posterior(plan, rig, model, observation, sight)
     optimizer = plan.optimizer.build(posterior.dimension, np.random.default_rng(plan.seed))
     return Tracker(model, posterior, optimizer, plan.evaluations, plan.status), mesh

@@ -12,6 +12,7 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import warnings
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
+from abs_service.tracker.detection.templates.base import Template
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.terms.depth.first_rim import classified_rim
@@ -87,11 +88,11 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
         PreviewError: the reference sensor delivers no depth image.
         ObservationError: the frames do not fit the rig.
     """
-    observer, region = Observer(rig), plan.region.build()
+    observer, region, template = Observer(rig), plan.region.build(), plan.template.build(plan.vertices)
     first: Preview | None = None
     number = -1
     for number, frames in enumerate(frame_sets):
-        seen = _look(number, observer.observe(frames), rig, plan, region)
+        seen = _look(number, observer.observe(frames), rig, plan, region, template)
         if seen is None:
             continue
         first = first or seen
@@ -102,7 +103,9 @@ def preview(frame_sets: Iterable[FrameSet], rig: Rig, plan: Plan) -> Preview:
     return first
 
 
-def _look(number: int, observation: Observation, rig: Rig, plan: Plan, region: Region) -> Preview | None:
+def _look(
+    number: int, observation: Observation, rig: Rig, plan: Plan, region: Region, template: Template
+) -> Preview | None:
     """Preview of one observation; None without a depth image of the reference sensor."""
     image, camera = observation.images.get(plan.reference), rig.sensors[plan.reference].camera
     if not isinstance(image, DepthImage):
@@ -111,7 +114,7 @@ def _look(number: int, observation: Observation, rig: Rig, plan: Plan, region: R
     try:
         detection = detect_object(observation, rig, plan.reference, region, plan.vertices)
         selected = np.isfinite(detection.distance)
-        tracker, _ = make_tracker(plan, rig, detection, observation)
+        tracker, _ = make_tracker(plan, template, rig, detection, observation)
     except (DetectionError, ModelError) as error:
         return Preview(number, camera, image.distance, selected, None, str(error))
     model, first = tracker.model, tracker.track(observation, lambda: True)

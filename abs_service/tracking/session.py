@@ -51,6 +51,7 @@ class TrackingSession:
         self._rig = rig
         self._plan = plan
         self._region = plan.region.build()
+        self._template = plan.template.build(plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
@@ -151,7 +152,7 @@ class TrackingSession:
 
     def _begin(self, observation: Observation) -> "_Begun":
         detection = self._detect(observation)
-        return _Begun(*make_tracker(self._plan, self._rig, detection, observation), warnings(detection))
+        return _Begun(*make_tracker(self._plan, self._template, self._rig, detection, observation), warnings(detection))
 
 
 def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from abs_service.tracker.detection.regions import nearest
+from abs_service.tracker.detection.templates import first_image
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from calib.camera import Camera
@@ -34,7 +35,7 @@ def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
     for camera in (_CAMERA, _DISTORTED, _FISHEYE):
         rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
         frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
-        tracking = TrackingSession(rig, replace(plan, region=nearest.Settings()))
+        tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
         for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
             tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 

@@ -13,6 +13,7 @@ PACKAGES = {
     "optimizer": "abs_service.tracker.optimizers",
     "objective": "abs_service.tracker.objectives",
     "region": "abs_service.tracker.detection.regions",
+    "template": "abs_service.tracker.detection.templates",
     "depth": "calib.noise",
     "picture": "calib.noise",
 }
@@ -42,6 +43,7 @@ reference = "tof/depth"
 sensors = ["tof", "other"]
 model = $model
 region = $region
+template = $template
 synthesis = $synthesis
 objective = $objective
 optimizer = $optimizer
@@ -57,6 +59,7 @@ USUAL = {
     "size": "tof=88x72&color=128x96",
     "model": '{ type = "nurbs" }',
     "region": '{ type = "nearest" }',
+    "template": '{ type = "first_image" }',
     "synthesis": '{ type = "sparse" }',
     "objective": '{ type = "likelihood" }',
     "optimizer": '{ type = "cma", generations = 3 }',
@@ -130,6 +133,9 @@ OPTIONS = {
         _option("region.seed", 'pixel = [44, 36], within = "mask.png"'),
         _option("region.above_plane", "clearance_m = 0.03"),
         _option("region.distance", "farthest_m = 1.2"),
+        _option("template.first_image"),
+        _option("template.sheet", "size = [0.2, 0.3]"),
+        _option("template.mesh", 'path = "sheet.ply", unit = "mm"'),
         _option("depth.constant", "sigma = 0.0045"),
         _option("depth.gaussian_polynomial", "sigma = [[0.002, 0.0], [0.0025, 0.0]]"),
         _option("depth.tof_amplitude", "sigma = [0.0015, 0.0005], sigma_amplitude = 9.0"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+import trimesh
 
 from abs_service import cli, config, wiring
 from abs_service.config import plugins
@@ -48,6 +49,9 @@ def folder(tmp_path_factory):
     PerPixel(Constant(0.0045), *own, domain[0]).save(made / "own.npz")
     depth = parse(f"simulated://sheet?seed=3&sensors=tof&tof={WIDTH}x{HEIGHT}").build().frames(28)[0]
     cv2.imwrite(str(made / "mask.png"), np.where(depth.si() < 1.2, 255, 0).astype(np.uint8))
+    trimesh.Trimesh([[-150, -100, 0], [150, -100, 0], [150, 100, 0], [-150, 100, 0]], [[0, 2, 1], [0, 3, 2]]).export(
+        made / "sheet.ply"
+    )
     return made
 
 
@@ -95,7 +99,7 @@ def test_every_part_has_a_rig_in_which_it_runs():
 def parts(rig):
     """`Settings` of all exchangeable parts."""
     tracker = rig.trackers["object"]
-    chosen = [getattr(tracker, name) for name in ("model", "region", "synthesis", "objective", "optimizer")]
+    chosen = [getattr(tracker, name) for name in ("model", "region", "template", "synthesis", "objective", "optimizer")]
     return [*chosen, *(sensor.noise for sensor in rig.sensors.values())]
 
 

@@ -26,12 +26,14 @@ class InitialDetection:
         camera: the camera that measured them.
         vertices: approximate number of vertices of the mesh to be built.
         surroundings: the same image without segmentation; empty if unknown.
+        deviation: standard deviation of a distance of the object by the sensor's noise model, median [m]; 0 if unknown.
     """
 
     distance: NDArray[np.float32]
     camera: Camera
     vertices: int
     surroundings: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 0), np.float32))
+    deviation: float = 0.0
 
     @property
     def points(self) -> NDArray[np.float64]:

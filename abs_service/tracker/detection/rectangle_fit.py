@@ -1,5 +1,7 @@
 """Detection of a flat rectangular sheet in a depth image."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,24 +12,32 @@ from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
 
-#: Minimum number of pixels; the sides of a smaller sheet cannot be fitted.
-LEAST_PIXELS = 200
-
 #: Maximum number of points for the fits of plane and paraboloid; more are slower but not more accurate.
 MOST_POINTS = 5000
 
-#: Largest height of a fitted paraboloid over the object for it to be flat [m].
-LARGEST_BOW_M = 0.02
 
-#: Lower bound of the inlier distance from the plane, for small noise [m].
-LEAST_GAP_M = 0.01
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds of the detection.
 
-#: Minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels 0.96 and more, a
-#: sheet of which a finger occludes 6 % has 0.94.
-LEAST_OVERLAP = 0.93
+    Attributes:
+        least_pixels: minimum number of pixels; the sides of a smaller sheet cannot be fitted.
+        largest_bow_m: largest height of a fitted paraboloid over the object for it to be flat [m].
+        least_gap_m: lower bound of the largest distance of the sheet's pixels from its plane, for small noise [m].
+        least_overlap: minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels
+            0.96 and more, a sheet of which a finger occludes 6 % has 0.94.
+    """
+
+    least_pixels: int = 200
+    largest_bow_m: float = 0.02
+    least_gap_m: float = 0.01
+    least_overlap: float = 0.93
 
 
-def find_sheet(detection: InitialDetection) -> Sheet:
+LIMITS = Limits()
+
+
+def find_sheet(detection: InitialDetection, limits: Limits = LIMITS) -> Sheet:
     """Fits a plane to the points of a sheet, and a rectangle to its outline on that plane.
 
     The x axis points right if the long side is nearer to horizontal in the image, otherwise up.
@@ -37,18 +47,20 @@ def find_sheet(detection: InitialDetection) -> Sheet:
     """
     camera = detection.camera
     seen = np.isfinite(detection.distance)
-    if np.count_nonzero(seen) < LEAST_PIXELS:
-        raise DetectionError(f"the object has {np.count_nonzero(seen)} pixels, a sheet needs {LEAST_PIXELS}")
+    if np.count_nonzero(seen) < limits.least_pixels:
+        raise DetectionError(
+            f"the object has {np.count_nonzero(seen)} pixels, a sheet needs least_pixels = {limits.least_pixels}"
+        )
     window = _window(seen)
     rows, columns = np.indices(seen.shape)[:, *window]
     rays = camera.directions(np.stack([columns, rows], axis=-1)) @ camera.T_rs[:3, :3].T
     points = camera.center + rays * detection.distance[window][..., None]
     T_rp = _plane(points[seen[window]], camera)
-    pixels = _pixels_on_plane(pose.transform(pose.inverse(T_rp), points))
+    pixels = _pixels_on_plane(pose.transform(pose.inverse(T_rp), points), limits)
     corner = np.array([columns[0, 0], rows[0, 0]])
     outline_rays = camera.directions(corner + _outline(pixels)) @ camera.T_rs[:3, :3].T
     sheet = _rectangle(_meet(outline_rays, camera.center, T_rp), T_rp)
-    _check_overlap(pixels, _meet(rays, camera.center, sheet.T_rp), sheet)
+    _check_overlap(pixels, _meet(rays, camera.center, sheet.T_rp), sheet, limits.least_overlap)
     return sheet
 
 
@@ -76,25 +88,25 @@ def _plane(points: NDArray[np.float64], camera: Camera) -> Pose:
     return T_rp
 
 
-def _pixels_on_plane(points_p: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _pixels_on_plane(points_p: NDArray[np.float64], limits: Limits) -> NDArray[np.bool_]:
     """The largest connected component of pixels (height, width) near the plane z = 0; specks are ignored.
 
     Raises:
         DetectionError: the points (height, width, 3), NaN without return, do not lie on a plane.
     """
     valid = points_p[np.isfinite(points_p[..., 2])]
-    _check_flat(valid)
-    gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), LEAST_GAP_M)
+    _check_flat(valid, limits.largest_bow_m)
+    gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), limits.least_gap_m)
     near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # False for NaN
     labels, statistics = cv2.connectedComponentsWithStats(cv2.medianBlur(near, 3))[1:3]
     return np.asarray(labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
 
 
-def _check_flat(points_p: NDArray[np.float64]) -> None:
+def _check_flat(points_p: NDArray[np.float64], largest_bow_m: float) -> None:
     """Fits a paraboloid to points (k, 3), which averages their noise.
 
     Raises:
-        DetectionError: its height over the points exceeds `LARGEST_BOW_M`.
+        DetectionError: its height over the points exceeds `largest_bow_m`.
     """
     a, b, z = points_p[:: len(points_p) // MOST_POINTS + 1].T
     arch = np.column_stack([a * a, a * b, b * b])
@@ -104,8 +116,11 @@ def _check_flat(points_p: NDArray[np.float64]) -> None:
         weight = 1 / np.sqrt(np.maximum(np.abs(z - terms @ coefficients), 1e-3))
         coefficients = np.linalg.lstsq(terms * weight[:, None], z * weight, rcond=None)[0]
     bow = float(np.ptp(arch @ coefficients[:3]))
-    if bow > LARGEST_BOW_M:
-        raise DetectionError(f"the object arches by {bow * 1e3:.0f} mm; a sheet must be flat to be found")
+    if bow > largest_bow_m:
+        raise DetectionError(
+            f"the object arches by {bow * 1e3:.0f} mm, more than largest_bow_m = {largest_bow_m:g} m; a sheet must be "
+            "flat to be found"
+        )
 
 
 def _outline(pixels: NDArray[np.bool_]) -> NDArray[np.float64]:
@@ -152,16 +167,16 @@ def _axes(angle: float) -> NDArray[np.float64]:
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
-def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet) -> None:
+def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet, least_overlap: float) -> None:
     """Compares the object's pixels (height, width) with those whose points (height, width, 2) are in the rectangle.
 
     Raises:
-        DetectionError: their overlap is below `LEAST_OVERLAP`.
+        DetectionError: their overlap is below `least_overlap`.
     """
     rectangle = np.all(np.abs(places) < (sheet.width / 2, sheet.height / 2), axis=-1)
     overlap = np.count_nonzero(pixels & rectangle) / np.count_nonzero(pixels | rectangle)
-    if overlap < LEAST_OVERLAP:
+    if overlap < least_overlap:
         raise DetectionError(
             f"the object is no rectangle: it has {overlap:.0%} in common with one of "
-            f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, a sheet {LEAST_OVERLAP:.0%} at least"
+            f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, a sheet least_overlap = {least_overlap:g} at least"
         )

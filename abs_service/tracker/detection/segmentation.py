@@ -1,12 +1,13 @@
 """Segmentation of the object in a depth image by a region."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, check_extent
+from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MOST_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
@@ -30,4 +31,13 @@ def detect_object(
     inside = region.select(view)
     check_extent(view.points_r[inside], "the object", LARGEST_M, sensor.head)
     distance = np.where(inside, view.distance, np.nan).astype(np.float32)
-    return InitialDetection(distance, sensor.camera, vertices, view.distance)
+    deviation = _median_deviation(sensor.noise, image, inside)
+    return InitialDetection(distance, sensor.camera, vertices, view.distance, deviation)
+
+
+def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:
+    """Median standard deviation [m] of the distances at the pixels of a mask (height, width), of some of them."""
+    rows, columns = (places[:: np.count_nonzero(inside) // MOST_POINTS + 1] for places in np.nonzero(inside))
+    distance, amplitude = (values[rows, columns].astype(np.float64) for values in (image.distance, image.amplitude))
+    deviation = noise.deviation(distance, amplitude, (rows, columns))
+    return float(np.nanmedian(deviation)) if np.isfinite(deviation).any() else 0.0

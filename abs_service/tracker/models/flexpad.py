@@ -8,9 +8,10 @@ from annotated_types import Gt, Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.detection.rectangle_fit import find_sheet
-from abs_service.tracker.detection.sheet_mesh import Sheet
-from abs_service.tracker.models.base import BOARD, SparseJacobian, Surface
+from abs_service.tracker.detection.rectangle_fit import Limits, find_sheet
+from abs_service.tracker.detection.sheet_mesh import Sheet, rectangle_of
+from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import bends
 from abs_service.tracker.models.parts.bends import bend, roll, slopes
 from abs_service.tracker.models.parts.rigid_transform import place
@@ -28,6 +29,9 @@ FULL_HEIGHT = 0.5
 #: Standard deviation of the height map's parameter before any measurement.
 HEIGHT_DEVIATION = 0.2
 
+#: Largest relative difference between given sides and those of a template.
+SAME_SIZE = 0.01
+
 #: Components of the diagonal directions along x and y, √½.
 _ROOT = np.float32(np.sqrt(0.5))
 
@@ -42,6 +46,13 @@ class Settings:
         least_radius_m: radius [m] of the sheet when a bend is 2, its largest value.
         bend_deviation: prior standard deviation of a bend. Opposite bends of neighbouring directions nearly cancel, so
             measurements alone do not determine their common magnitude.
+        least_pixels: the sheet must have so many pixels to be found.
+        largest_bow_m: largest height by which it may arch over them [m].
+        least_gap_m: pixels within this distance of its plane, or within four deviations if that is more, are its [m].
+        least_overlap: least share of the pixels of the sheet or of the rectangle around it that both have in common.
+
+    The last four are thresholds of the detection in the first depth image; with a template, `size_tolerance` and they
+    do not count.
     """
 
     width_m: Annotated[float, Interval(ge=0, le=10)] = 0.0
@@ -49,6 +60,10 @@ class Settings:
     size_tolerance: Annotated[float, Interval(ge=0.05, lt=1)] = 0.15
     least_radius_m: Annotated[float, Gt(0)] = 0.1
     bend_deviation: Annotated[float, Gt(0)] = 1.0
+    least_pixels: Annotated[int, Interval(ge=50)] = Limits.least_pixels
+    largest_bow_m: Annotated[float, Interval(gt=0, le=1)] = Limits.largest_bow_m
+    least_gap_m: Annotated[float, Interval(gt=0, le=0.1)] = Limits.least_gap_m
+    least_overlap: Annotated[float, Interval(ge=0.5, lt=1)] = Limits.least_overlap
 
     def __post_init__(self) -> None:
         if (self.width_m == 0) != (self.height_m == 0):
@@ -66,10 +81,29 @@ class Settings:
             DetectionError: the object is not a flat rectangle, or not of the given size.
             ModelError: the sheet is too large for the least radius.
         """
-        sheet = find_sheet(detection)
+        limits = Limits(self.least_pixels, self.largest_bow_m, self.least_gap_m, self.least_overlap)
+        sheet = find_sheet(detection, limits)
         if self.width_m:
             sheet = sheet.of_size(self.width_m, self.height_m, self.size_tolerance)
         return FlexPad(sheet, detection.vertices, self.least_radius_m, self.bend_deviation)
+
+    def of_mesh(self, mesh: Mesh) -> "FlexPad":
+        """The model of a flat rectangular mesh, with about as many vertices on a regular grid.
+
+        Raises:
+            ModelError: the mesh is no flat rectangle, or not of the given size, or too large for the least radius.
+        """
+        sheet = rectangle_of(mesh)
+        if sheet is None:
+            raise ModelError("flexpad is a flat rectangle, and the template is none; nurbs and rigid follow others")
+        if self.width_m and not np.allclose(
+            (sheet.width, sheet.height), sorted((self.width_m, self.height_m))[::-1], rtol=SAME_SIZE
+        ):
+            raise ModelError(
+                f"the template is {sheet.width:.3f} m × {sheet.height:.3f} m, width_m × height_m is {self.width_m:g} m "
+                f"× {self.height_m:g} m; leave the latter out"
+            )
+        return FlexPad(sheet, len(mesh.vertices), self.least_radius_m, self.bend_deviation)
 
 
 class FlexPad:

@@ -76,8 +76,10 @@ class Settings:
         """Fits the rest surface to the mesh by least squares and binds every vertex to it.
 
         Raises:
-            ModelError: too few control points for the degree, or the mesh cannot be bound to such a surface.
+            ModelError: too few control points for the degree, or the mesh cannot be bound to such a surface, as that of
+                a closed body.
         """
+        binding.check_chart(mesh)
         shape = derived_shape(mesh, self.degree) if self.control_points == "auto" else self.control_points
         if min(shape) <= self.degree:
             raise ModelError(

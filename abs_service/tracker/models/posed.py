@@ -8,6 +8,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import InitialDetection
+from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from calib import pose
 from calib.jit import kernel, prange
@@ -41,6 +42,14 @@ class Settings:
             ModelError, DetectionError: the shape cannot be built.
         """
         return Posed(self.shape.build(detection))
+
+    def of_mesh(self, mesh: Mesh) -> "Posed":
+        """The model of a mesh: its shape with a pose.
+
+        Raises:
+            ModelError: the shape cannot be bound to it.
+        """
+        return Posed(self.shape.of_mesh(mesh))
 
 
 class Posed:

@@ -28,7 +28,11 @@ class Settings:
         Raises:
             DetectionError: the object is too small.
         """
-        return Rigid(grid_mesh(detection))
+        return self.of_mesh(grid_mesh(detection))
+
+    def of_mesh(self, mesh: Mesh) -> "Rigid":
+        """The rigid model of any mesh."""
+        return Rigid(mesh)
 
 
 class Rigid:

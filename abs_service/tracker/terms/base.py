@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.linearization import Linear
 from calib.noise.fit.truncation import deviation_within
 
@@ -58,8 +59,10 @@ class SensorFit:
 
     Attributes:
         sensor: its name.
-        visible: number of vertices that face the sensor and lie inside its image without a known occluder.
-        occluded: number of vertices behind the mesh's own surface, behind an occluder, or in a hole of the measurement.
+        visible: number of vertices that face the sensor and lie inside its image without a known occluder, and whose
+            appearance is known if it measures that.
+        occluded: number of vertices behind the mesh's own surface, behind an occluder, or in a hole of the measurement;
+            those that are turned away, such as the back of a body, are neither.
         samples: number of visible vertices with a measurement.
         inliers: number of samples that their noise explains.
         mean_log_likelihood: minus the mean cost of a vertex; a log-likelihood if the objective is a likelihood.
@@ -125,6 +128,14 @@ def occluded_share(fits: Sequence[SensorFit]) -> float:
     """
     shares = [fit.occluded / (fit.occluded + fit.visible) for fit in fits if fit.occluded + fit.visible > 1]
     return min(shares, default=0.0)
+
+
+def facing(view: View, surface: Surface) -> NDArray[np.bool_]:
+    """True for the samples (m,) of a population of one that are turned towards a view's camera."""
+    vertices, normals = (
+        view.spread(surface, part[0].T.astype(np.float64)) for part in (surface.vertices, surface.normals)
+    )
+    return np.asarray(np.einsum("ni,ni->n", normals, vertices - view.camera.center) < 0)
 
 
 class Term(Protocol):

@@ -10,15 +10,37 @@ from abs_service.tracker.models.parts import spline
 #: Largest distance [m] between a vertex and the normal of its closest surface point; the vertex moves onto the normal.
 BINDING_TOLERANCE_M = 1e-2
 
+#: Largest share of a mesh's area, seen on its chart, that may lie behind the rest of it.
+LARGEST_FOLD = 0.02
+
+
+def check_chart(mesh: Mesh) -> None:
+    """Checks that a mesh can be flattened onto its chart.
+
+    Raises:
+        ModelError: parts of the mesh lie on top of each other there.
+    """
+    signed = _chart_areas(mesh)
+    backwards = min(np.sum(signed[signed > 0]), -np.sum(signed[signed < 0])) / np.sum(np.abs(signed))
+    if backwards > LARGEST_FOLD:
+        raise ModelError(
+            f"nurbs is a surface with one side, like a sheet or a relief: {backwards:.0%} of the mesh's area lies "
+            f"behind the rest, seen along its shortest axis ({LARGEST_FOLD:.0%} allowed); rigid follows a closed body"
+        )
+
 
 def chart_parameters(mesh: Mesh, margin: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Surface parameters (n,) of the vertices: u along the chart's first axis; N̂ is oriented like their normals."""
     low, size = mesh.chart.min(axis=0), np.ptp(mesh.chart, axis=0)
     u, w = ((mesh.chart - low) / size * (1 - 2 * margin) + margin).T
+    return (u, w) if np.sum(_chart_areas(mesh)) > 0 else (u, 1 - w)
+
+
+def _chart_areas(mesh: Mesh) -> NDArray[np.float64]:
+    """Signed areas (m,) of the faces on the chart, twice."""
     chart = mesh.chart[mesh.faces]
     (a, b), (c, d) = (chart[:, 1] - chart[:, 0]).T, (chart[:, 2] - chart[:, 0]).T
-    turn = np.sum(a * d - b * c)
-    return (u, w) if turn > 0 else (u, 1 - w)
+    return a * d - b * c
 
 
 def fit_control_points(

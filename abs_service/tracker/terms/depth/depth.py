@@ -10,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
@@ -168,7 +168,7 @@ class DepthTerm:
         residual, _, cost = self._residuals(seen)
         measured, pixel = cost < np.inf, seen.pixel[0]
         free = (self._free_m.ravel()[pixel] > 0) & (pixel > 0)
-        hidden = (pixel < 0) | self._obscured[pixel]
+        hidden = ((pixel < 0) & facing(self._view, surface)) | self._obscured[pixel]
         mean = -float(self._measured_cost(surface, seen)[0]) / residual.size
         size = np.where(free, np.inf, np.abs(residual))
         visible = (pixel > 0) & ~(hidden | self._doubtful[pixel])

@@ -20,10 +20,12 @@ class Rim:
     Attributes:
         outer: their indices (k,); corners, which have no neighbour inside, are left out.
         inner: for each, the nearest vertex (k,) inside that it shares an edge with.
+        is_end: True if the object is known to end at the outer vertices.
     """
 
     outer: NDArray[np.intp]
     inner: NDArray[np.intp]
+    is_end: bool = False
 
     @classmethod
     def of(cls, mesh: Mesh) -> "Rim":
@@ -37,7 +39,7 @@ class Rim:
         length = np.linalg.norm(mesh.vertices[across[:, 0]] - mesh.vertices[across[:, 1]], axis=1)
         across = across[np.argsort(length, kind="stable")]
         outer, nearest = np.unique(across[:, 0], return_index=True)
-        return cls(outer.astype(np.intp), across[nearest, 1].astype(np.intp))
+        return cls(outer.astype(np.intp), across[nearest, 1].astype(np.intp), mesh.is_complete)
 
 
 @kernel

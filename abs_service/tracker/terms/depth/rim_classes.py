@@ -40,7 +40,8 @@ def classify_rim(
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
 
-    The gap is relative to the distance from the inner vertex; 0 unless the class is FREE.
+    The gap is relative to the distance from the inner vertex; 0 unless the class is FREE, and where the object is known
+    to end at the outer vertices.
 
     Args:
         camera: the depth camera.
@@ -63,7 +64,8 @@ def classify_rim(
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
-    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, LARGEST_GAP_STEPS), 0.0)
+    largest = 0.0 if rim.is_end else LARGEST_GAP_STEPS
+    gap = np.where(classes == RimClass.FREE, np.clip(beyond, 0.0, largest), 0.0)
     return classes, gap.astype(np.float32)
 
 

@@ -9,7 +9,7 @@ from abs_service.pairing.images import ChannelImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
-from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import channel_slopes
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel_cost import (
@@ -124,10 +124,13 @@ class ChannelTerm:
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
         residual = self._residuals(surface)[0]
-        pixel = self._view.synthesize(surface).pixel[0]
-        hidden = (pixel < 0) | np.isinf(self._texture[pixel, VALUE])
+        seen = self._view.synthesize(surface)
+        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=1)
+        hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, VALUE])
         mean = -float(self.cost(surface)[0]) / len(residual)
-        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean)
+        return summarize(
+            self.sensor, (pixel > 0) & known & ~hidden, hidden, np.isfinite(residual), np.abs(residual), mean
+        )
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""

@@ -7,7 +7,7 @@ from abs_service.pairing.images import ColorImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered
-from abs_service.tracker.terms.base import Bounds, SensorFit, summarize
+from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.gradients import color_rows
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.shadow import Shadow
@@ -105,11 +105,12 @@ class ColorTerm:
     def fit(self, surface: Surface) -> SensorFit:
         """Agreement of the sensor with a population of one."""
         residual, measured = self._residuals(surface)
-        pixel = self._view.synthesize(surface).pixel[0]
-        hidden = (pixel < 0) | np.isinf(self._texture[pixel, 0])
+        seen = self._view.synthesize(surface)
+        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=1)
+        hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, 0])
         mean = -float(self.cost(surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
-        return summarize(self.sensor, (pixel > 0) & ~hidden, hidden, measured, size, mean, channels=3)
+        return summarize(self.sensor, (pixel > 0) & known & ~hidden, hidden, measured, size, mean, channels=3)
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""
