@@ -13,7 +13,7 @@ from abs_service import config, wiring
 from abs_service.pairing.images import DepthImage
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.base import DeformationModel
-from abs_service.tracker.objectives import euclidean
+from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import ModelSettings, Plan
 from abs_service.tracking.session import TrackingSession
@@ -28,6 +28,10 @@ from evaluation.scenes.exposure import LabeledExposure
 #: The Euclidean fitness clamps differences of distances to this value [m]. The published fitness has no bound; this one
 #: is above all errors here, and keeps the cost finite when the object is lost.
 CUTOFF_M = 0.1
+
+#: The likelihood of the pixels alone. The outline, which it has by default, is left out where it is compared with the
+#: Euclidean fitness, which has none, as the paper had none: what is compared is what it is worth to know σ and μ.
+PIXELS_ALONE = likelihood.Settings(outline_px=0.0)
 
 #: First exposure in which simulated sheets move; before, they rest in their initial pose.
 FIRST_MOVING = 40

@@ -1,4 +1,10 @@
-"""Joint calibration of cameras on published boards and on simulated rigs: the tables of docs/calibration.md."""
+"""Joint calibration of cameras on published boards and on simulated rigs: the tables of docs/calibration.md.
+
+Statistic: number of rigs whose true parameters lie inside their joint 95 % region; root mean square error of a coarse
+camera's pose by corners over that by corners and planes. Published boards are reported without a goal.
+Goals: as many inside as a binomial distribution of 95 % has in 99.5 % of the cases; at least a factor of 2.
+Seeds: of the rigs, 0, 1, …; the context's is not used.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -2,6 +2,10 @@
 
 The same as `abs-service calibrate noise --target`. The head has an offset of 12 mm, a bias on dark surfaces, and
 wiggling.
+
+Statistic: 99th percentile over the board's pixels of the error of σ and of μ, the largest of the seeds.
+Goals: 10 % and 1 mm.
+Seeds: 3, 4 and 5; the context's is not used.
 """
 
 from dataclasses import dataclass

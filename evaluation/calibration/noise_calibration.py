@@ -2,6 +2,10 @@
 
 Real data are sl_rgbd_deform_petit (frames 200 to 319 of a PrimeSense-type sensor; hands squeeze a toy on a table) and
 tof_ifm_o3r (one frame of an ifm O3R); without them there are the simulated walls alone.
+
+Statistic: 99th percentile over all pixels of the error of σ and of μ, of every head.
+Goals: 10 % and 1 mm; nothing is known of the real sensors, so they are reported without a goal.
+Seeds: of the walls, from their distance and material; the context's is not used.
 """
 
 import math

@@ -2,6 +2,9 @@
 
 Samples are those of `tests/calib/noise/laws.py`: 20 000 from the simulator, 5 % of them uniform outliers, and as many
 held out. Errors are the largest over the domain, in the worst of the seeds; all other statistics are means.
+
+Goals: the sensor's own law is found to 10 % of σ and 1 mm of μ, in the worst of the seeds.
+Seeds: ten sets of samples, 0 to 9; those held out have 100 more; the context's is not used.
 """
 
 from collections.abc import Callable, Mapping

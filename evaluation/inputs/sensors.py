@@ -2,6 +2,10 @@
 
 The same frames of one simulated sheet for all combinations. A colour camera and a light barrier measure no distance,
 which initial detection needs; so there are twelve combinations, not fifteen.
+
+Statistic: mean vertex error over all frames and sequences, with a sensor more over without it; likewise of the surface.
+Goal: at most 1.05 for every sensor that is added to every combination.
+Seeds: twelve sequences, with seeds that follow the context's.
 """
 
 import itertools

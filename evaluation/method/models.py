@@ -2,6 +2,9 @@
 
 Everything is as in the demo's configuration except the model, the search (`cma` unless stated) and the texture
 registration noise. Means over the frames of a sequence, then mean and standard deviation over the seeds.
+
+Goal: 95 % of the frames are TRACKING in every case; errors are reported without a goal.
+Seeds: five sequences, with the context's seed + 1 to + 5.
 """
 
 from collections.abc import Sequence

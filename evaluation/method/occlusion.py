@@ -2,6 +2,11 @@
 
 The same frames with and without the hand. The simulator's geometry decides which vertices are occluded in the
 time-of-flight head, not the tracker.
+
+Statistic: mean vertex error of the visible vertices with the hand over that without, in the frames in which it hides
+part of the sheet, of every seed.
+Goal: at most 1.5, the largest of the seeds.
+Seeds: the context's + 1 to + 3.
 """
 
 from dataclasses import asdict, dataclass

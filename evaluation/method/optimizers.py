@@ -3,6 +3,10 @@
 The scenes: the demo's sheet; three times as fast; with a hand in front of it; and turned by 90° within a quarter of a
 second, which no motion prior predicts. Without `budget_ms` the search ignores the clock. Times are CPU times of a whole
 frame on one core, without capture and publication.
+
+Statistic: mean vertex error over the frames of all seeds.
+Goal: the default search has at most 1.1 times the error of the best one, in every scene.
+Seeds: the context's + 1 to + 3.
 """
 
 import time

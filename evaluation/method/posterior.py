@@ -7,6 +7,10 @@ first, which defines the material points:
 - Θ against its covariance, in all directions, and in those directions alone in which the sensors contribute more than
   the priors (χ² with as many degrees of freedom as directions). The true Θ is the one whose mesh is nearest to all
   material points; the remaining distance is no error of Θ.
+
+Statistic: share of vertices and frames inside, of every seed; of Θ, mean of the seeds.
+Goals: 90 to 99 %; for vertices in every seed.
+Seeds: the context's + 1, 2, 3, 11, 12, 13 and 14.
 """
 
 from dataclasses import asdict, dataclass

@@ -1,4 +1,10 @@
-"""E6: models of 100 dimensions and more, and what accuracy a budget buys."""
+"""E6: models of 100 dimensions and more, and what accuracy a budget buys.
+
+Statistic: mean vertex error of all frames and sequences.
+Goals: 108 dimensions have at most 0.67 of the error of 48, and at most 1.5 mm; the default search has at most 1.1 times
+the error of the best CMA-ES.
+Seeds: two sequences, with the context's seed + 1 and + 2.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

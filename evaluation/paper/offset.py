@@ -1,4 +1,9 @@
-"""E3: a mean offset over the whole image, which the likelihood compensates and the Euclidean fitness does not."""
+"""E3: a mean offset over the whole image, which the likelihood compensates and the Euclidean fitness does not.
+
+Statistic: mean vertex and surface error of all sequences.
+Goals: with the offset known, at most 1.15 times the error without one; the Euclidean fitness errs by 0.9 of it or more.
+Seeds: three sequences, with the context's seed + 1 to + 3.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,13 +14,13 @@ from numpy.typing import NDArray
 from abs_service.report import plots
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import flexpad, nurbs
-from abs_service.tracker.objectives import likelihood
 from abs_service.tracking.plan import ModelSettings, ObjectiveSettings
 from calib.noise.tof_amplitude import TofAmplitude
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
 from evaluation.paper.wall_calibration import calibrated_noise
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
+    PIXELS_ALONE,
     TrackedSequence,
     demo_plan,
     demo_rig,
@@ -93,9 +98,9 @@ def run(settings: Settings, context: Context) -> Findings:
     rig = demo_rig(simulate("simulated://sheet"))
     equal = euclidean_fitness(mean_deviation(with_noise(rig, "tof", without), "tof", plain[0][0], BETWEEN_M))
     cases = {
-        _REFERENCE: Case(plain, without, likelihood.Settings()),
-        _KNOWN: Case(shifted, known, likelihood.Settings()),
-        _UNKNOWN: Case(shifted, without, likelihood.Settings()),
+        _REFERENCE: Case(plain, without, PIXELS_ALONE),
+        _KNOWN: Case(shifted, known, PIXELS_ALONE),
+        _UNKNOWN: Case(shifted, without, PIXELS_ALONE),
         _SQUARES: Case(shifted, without, equal),
     }
     found: dict[str, dict[str, list[TrackedSequence]]] = {}

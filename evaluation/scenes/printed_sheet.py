@@ -78,10 +78,13 @@ class PrintedSheet:
         """Noise-free view of a sheet with control points (4, 4, 3)."""
         return self._renderer.render(Sheet(self._dense.points(control), self._reflectivity, self._color))
 
-    def frames(self, count: int, generator: np.random.Generator) -> Iterator[FrameSet]:
-        """Distance, amplitude and grey image of `count` frames; the first is the mean of many exposures at rest."""
+    def frames(self, count: int, generator: np.random.Generator, rest: int = REST) -> Iterator[FrameSet]:
+        """Distance, amplitude and grey image of `count` frames; the first is the mean of `rest` exposures.
+
+        Equal generators draw equal noise, whatever `rest` is.
+        """
         for k in range(count):
-            view, exposures = self.view(self.control(k)), REST if k == 0 else 1
+            view, exposures = self.view(self.control(k)), rest if k == 0 else 1
             t_ns = round((k + 1) * 1e9 / RATE_HZ)
             frames = frame_set(self.sensor.measure(view, generator, exposures), k, t_ns)
             noise = GREY_DEVIATION * generator.standard_normal(view.share.shape) / np.sqrt(exposures)

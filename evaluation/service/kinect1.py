@@ -1,4 +1,9 @@
-"""CPU time and losses of receiving a Kinect v1, through unmodified libusb from an emulated camera."""
+"""CPU time and losses of receiving a Kinect v1, through unmodified libusb from an emulated camera.
+
+Statistic: share of whole images among those that no packet was lost of and that were in time; CPU time of a stream.
+Goal: at least 99 % in every case.
+Seeds: none; one run of 20 s for each case.
+"""
 
 import json
 import sys

@@ -1,4 +1,11 @@
-"""E9: input warping (section 3.2 of the paper): what it costs in accuracy, what it saves, and how right it is."""
+"""E9: input warping (section 3.2 of the paper): what it costs in accuracy, what it saves, and how right it is.
+
+Statistic: mean vertex and surface error and time of a candidate, warped over direct; share of the warped image that is
+filled, its bias, the 95th percentile of its error, and its time.
+Goals: error of vertices at most 1.5, of the surface 1.1, time 0.5 times; 95 % filled, bias 0.1 mm, 95 % of the errors
+within 1.5 mm, 15 ms.
+Seeds: three sequences and as many noises, with seeds that follow the context's.
+"""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -3,19 +3,22 @@
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.grid_mesh import triangles
+from calib import pose
 from evaluation.scenes.bent_sheet import SIDE, SheetFrame
 
 #: Coherent point drift is tuned for points that are about one apart: it gets them in units of 100 mm.
 UNIT_M = 0.1
 
 ALPHA, BETA, ITERATIONS = 1.0, 1.0, 50
+
+#: Points farther apart do not correspond, in the same units; the plain Gauss–Newton fit has the same bound.
+GATE = 1.0
 
 
 #: Moves its second argument (n, 3) to its first (k, 3), both in units, with a package.
@@ -107,6 +110,21 @@ def _mesh(vertices: NDArray[np.float64]) -> Any:
     return import_module("trimesh").Trimesh(vertices, faces, process=False)
 
 
+def _open3d_icp(module: Any, cloud: NDArray[np.float64], source: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rigid: all that Open3D's registrations are."""
+    points, registration = module.geometry.PointCloud, module.pipelines.registration
+    vectors = module.utility.Vector3dVector
+    found = registration.registration_icp(
+        points(vectors(source)),
+        points(vectors(cloud)),
+        GATE,
+        np.eye(4),
+        registration.TransformationEstimationPointToPoint(),
+        registration.ICPConvergenceCriteria(max_iteration=ITERATIONS),
+    )
+    return pose.transform(found.transformation, source)
+
+
 #: What a row is called, the package that it needs, and its registration.
 KNOWN: Mapping[str, tuple[str, Registration]] = {
     "pycpd": ("pycpd", _pycpd),
@@ -115,6 +133,7 @@ KNOWN: Mapping[str, tuple[str, Registration]] = {
     "rustcpd, rank 60, k 10, f32": ("rustcpd", _rustcpd_fast),
     "trimesh nricp_amberg": ("trimesh.registration", _amberg),
     "trimesh nricp_sumner": ("trimesh.registration", _sumner),
+    "Open3D, rigid ICP": ("open3d", _open3d_icp),
 }
 
 
@@ -123,5 +142,14 @@ def installed(names: Sequence[str]) -> dict[str, Callable[[NDArray[np.float64]],
     return {
         name: partial(PointSets, package=package, register=register)
         for name, (package, register) in KNOWN.items()
-        if name in names and find_spec(package.partition(".")[0])
+        if name in names and _imports(package)
     }
+
+
+def _imports(package: str) -> bool:
+    """True if a package can be used: Open3D may be installed and lack a library of the system."""
+    try:
+        import_module(package)
+    except ImportError:
+        return False
+    return True

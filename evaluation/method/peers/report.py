@@ -29,10 +29,21 @@ _TITLES = {
     "spin": "Turning by 90° about the line of sight in 0.25 s",
 }
 
+#: What has to be said of some scenes.
+_ABOUT = {
+    "hole": (
+        "Nobody tells ours of the hole. Gauss–Newton is here twice: once it takes the hole for what is beside the "
+        "sheet; once it is told which pixels the hole has. Point sets are the points that were measured.",
+    ),
+    "turn": ("The sheet keeps its bend while it turns, so that rigid registration has the right model here.",),
+    "spin": ("The sheet keeps its bend while it turns, so that rigid registration has the right model here.",),
+}
+
 
 def sections(
     scenes: Mapping[str, SheetScene],
     found: Mapping[str, Rows],
+    repeated: Mapping[str, Rows],
     leapt: Rows,
     missing: Sequence[str],
     slow: Sequence[str],
@@ -42,6 +53,7 @@ def sections(
     Args:
         scenes: by name.
         found: what every tracker made of every scene.
+        repeated: what some made of sequences with other seeds.
         leapt: what some made of sheets that leapt.
         missing: packages that are not installed.
         slow: competitors that follow a few frames only.
@@ -57,16 +69,20 @@ def sections(
         "error: distance of every vertex from its own material; surface error: from the nearest point of the surface."
     ]
     if missing:
-        said.append(f"Not installed here, so left out: {', '.join(missing)} (`make all`).")
+        said.append(f"Cannot be imported here, so left out: {', '.join(missing)} (see docs/evaluation.md).")
     if slow:
-        said.append(f"TrackedRun ten frames of one seed only, because they take so long: {', '.join(slow)}.")
+        said.append(f"Tracked ten frames of one seed only, because they take so long: {', '.join(slow)}.")
     about = Section("What is compared", tuple(said))
     return (
         about,
         *(
-            Section(_TITLES[name], (_table(_TITLES[name], rows), _curves(name, rows), _worst(scenes[name], rows)))
+            Section(
+                _TITLES[name],
+                (*_ABOUT.get(name, ()), _table(_TITLES[name], rows), _curves(name, rows), _worst(scenes[name], rows)),
+            )
             for name, rows in found.items()
         ),
+        _other_seeds(repeated),
         _leaps(leapt),
     )
 
@@ -113,6 +129,15 @@ def _row(runs: Sequence[TrackedRun]) -> tuple[float, ...]:
 
 def _table(caption: str, rows: Rows) -> Table:
     return Table(caption, _COLUMNS, tuple((title, *_row(runs)) for title, runs in rows.items()))
+
+
+def _other_seeds(repeated: Mapping[str, Rows]) -> Section:
+    rows = tuple(
+        (name, title, len(runs), *_row(runs)) for name, found in repeated.items() for title, runs in found.items()
+    )
+    text = "Sequences with noise of other seeds, which no goal refers to: what the choice of the seeds is worth."
+    columns = (Column("scene"), _COLUMNS[0], Column("sequences"), *_COLUMNS[1:])
+    return Section("Other seeds", (text, Table("The same scenes with other seeds", columns, rows)))
 
 
 def _leaps(leapt: Rows) -> Section:

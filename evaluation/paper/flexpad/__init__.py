@@ -2,6 +2,14 @@
 
 The simulator rolls a sheet onto a cylinder, exactly and with code of its own. If the bent direction is one of FlexPad's
 four and the cylinder touches the sheet's centre, both sides of that direction are bent alike and all others are flat.
+
+Statistic: ratio of a sequence's error to that of the likelihood without the outline, which the Euclidean fitness does
+not have either; mean over eight sequences, with its standard deviation and smallest; errors of the surface (mean of the
+frames) and of the eight bends (root mean square).
+Goals: below as `LEAST_…` and `MOST_…`. Until 2026-11-23 they were ratios of 1, which hardly can be missed; the present
+ones were set before they were first run, by one who knew the earlier figures, so another seed is reported as well.
+Seeds: two motions of each direction, drawn from the context's seed; results.md has seeds 0 and 2 (1 shares half of
+them with 0).
 """
 
 from dataclasses import dataclass, replace
@@ -27,12 +35,13 @@ from drivers.simulated.sensors.optics import OPTICS
 from drivers.simulated.sensors.time_of_flight import TimeOfFlight
 from drivers.simulated.shapes.rectangle import Rectangle
 from drivers.simulated.simulation import Simulation
-from evaluation.experiment import Context, Findings, at_least
+from evaluation.experiment import Context, Findings, Goal, at_least, at_most
 from evaluation.paper.flexpad import report
 from evaluation.paper.flexpad.report import Errors, Tracked
 from evaluation.paper.wall_calibration import calibrated_noise
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
+    PIXELS_ALONE,
     TrackedSequence,
     demo_plan,
     euclidean_fitness,
@@ -58,6 +67,11 @@ BETWEEN_M = 1.3
 BOUND = 4.2
 
 MODEL = flexpad.Settings(WIDTH, HEIGHT)
+
+#: Goals: least ratios Euclidean / likelihood, plain (the paper's of E1) and bounded, mean and in every sequence;
+#: largest error of the likelihood's surface [mm] and of its bends, which reach 1.3 here.
+LEAST_PLAIN, LEAST_BOUNDED, LEAST_ANYWHERE = 1.92, 1.2, 1.0
+MOST_SURFACE_MM, MOST_BEND = 0.75, 0.05
 
 
 @dataclass(frozen=True)
@@ -161,16 +175,22 @@ def run(settings: Settings, context: Context) -> Findings:
         published = cma_es.Settings(population=16, generations=400)
         searches = {"hybrid": hybrid.Settings(), "CMA-ES, 400 × 16 at most": published}
         budgets = {name: _track(bents[0], few, noise, search) for name, search in searches.items()}
-    goals = (
-        at_least("Surface error, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "surface_mm"), 1.0),
-        at_least("Error of the bends, Euclidean / likelihood", report.ratio(tracked, "Euclidean", "bend"), 1.0),
-        at_least(
-            "Surface error, Euclidean that is bounded like the likelihood / likelihood",
-            report.ratio(tracked, "Euclidean, bounded", "surface_mm"),
-            1.0,
-        ),
+    return Findings(_goals(tracked), report.sections(tracked, budgets, sequences[0]), report.values(tracked))
+
+
+def _goals(tracked: list[Tracked]) -> tuple[Goal, ...]:
+    plain, bounded = (report.ratios(tracked, name, "surface_mm") for name in ("Euclidean", "Euclidean, bounded"))
+    surface, bend = (
+        float(np.mean([one.figures("likelihood")[key] for one in tracked])) for key in ("surface_mm", "bend")
     )
-    return Findings(goals, report.sections(tracked, budgets, sequences[0]), report.values(tracked))
+    limited = "Surface error, Euclidean that is bounded like the likelihood / likelihood"
+    return (
+        at_least("Surface error, Euclidean / likelihood", float(np.mean(plain)), LEAST_PLAIN),
+        at_least(limited, float(np.mean(bounded)), LEAST_BOUNDED),
+        at_least(f"{limited}, in the worst sequence", min(bounded), LEAST_ANYWHERE),
+        at_most("Surface error of the likelihood", surface, MOST_SURFACE_MM, "mm"),
+        at_most("Error of its bends", bend, MOST_BEND),
+    )
 
 
 def _track(bent: Bent, exposures: list[LabeledExposure], noise: TofAmplitude, search: OptimizerSettings) -> Tracked:
@@ -180,7 +200,8 @@ def _track(bent: Bent, exposures: list[LabeledExposure], noise: TofAmplitude, se
     fitness = {
         "Euclidean": plain,
         "Euclidean, bounded": replace(plain, cutoff_m=BOUND * deviation),
-        "likelihood": likelihood.Settings(),
+        "likelihood": PIXELS_ALONE,
+        "likelihood with the outline": likelihood.Settings(),
     }
     plans = {name: demo_plan(MODEL, objective=objective, optimizer=search) for name, objective in fitness.items()}
     followed = {name: track(rig, plan, exposures) for name, plan in plans.items()}

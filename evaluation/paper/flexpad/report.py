@@ -79,9 +79,9 @@ COLUMNS: Mapping[str, Column] = {
 }
 
 
-def ratio(tracked: Sequence[Tracked], fitness: str, figure_: str) -> float:
-    """Mean, over the sequences, of a figure's ratio to that of the likelihood."""
-    return float(np.mean(_ratios(tracked, fitness, figure_)))
+def ratios(tracked: Sequence[Tracked], fitness: str, figure_: str) -> list[float]:
+    """A figure's ratio to that of the likelihood, of every sequence."""
+    return [one.figures(fitness)[figure_] / one.figures("likelihood")[figure_] for one in tracked]
 
 
 def values(tracked: Sequence[Tracked]) -> dict[str, Any]:
@@ -103,22 +103,19 @@ def sections(
     return Section("The scene", (about, _scene(exposures))), found, *searched
 
 
-def _ratios(tracked: Sequence[Tracked], fitness: str, figure_: str) -> list[float]:
-    return [one.figures(fitness)[figure_] / one.figures("likelihood")[figure_] for one in tracked]
-
-
 def _means(tracked: Sequence[Tracked]) -> Table:
     columns = (
         Column("fitness"),
         *COLUMNS.values(),
         Column("surface / likelihood's", "", ".2f"),
         Column("SD", "", ".2f"),
+        Column("smallest", "", ".2f"),
     )
     rows = []
     for fitness in tracked[0].followed:
         means = [float(np.mean([one.figures(fitness)[name] for one in tracked])) for name in COLUMNS]
-        ratios = _ratios(tracked, fitness, "surface_mm")
-        rows.append((fitness, *means, float(np.mean(ratios)), float(np.std(ratios))))
+        of_surface = ratios(tracked, fitness, "surface_mm")
+        rows.append((fitness, *means, float(np.mean(of_surface)), float(np.std(of_surface)), min(of_surface)))
     return Table(f"Errors of Θ and of the mesh, means of {len(tracked)} sequences", columns, tuple(rows))
 
 

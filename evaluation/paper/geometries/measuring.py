@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.tracker import status
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.estimate import Status
-from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior import priors
 from abs_service.tracker.synthesis import sparse
@@ -20,11 +20,16 @@ from calib.noise.base import DepthNoise
 from evaluation.paper.geometries import bound
 from evaluation.paper.geometries.bound import Bound, Priors
 from evaluation.paper.geometries.known_sheet import KnownSheet, rig_of
+from evaluation.paper.geometries.sensor import PLAIN
 from evaluation.scenes.geometries import MovingSheet
-from evaluation.scenes.printed_sheet import GREY_DEVIATION, Print, PrintedSheet
+from evaluation.scenes.printed_sheet import GREY_DEVIATION, REST, Print, PrintedSheet
 from evaluation.scenes.time_of_flight import TimeOfFlight
+from evaluation.sequences import PIXELS_ALONE
 
 Array = NDArray[np.float64]
+
+#: What the compared fitness functions are called, and variants of them begin with.
+LIKELIHOOD, EUCLIDEAN = "likelihood", "Euclidean"
 
 #: No search is limited.
 EVALUATIONS = 1_000_000
@@ -51,6 +56,9 @@ class Variant:
         priors: their deviations.
         vertices, inset: of its mesh, see `KnownSheet`.
         optimizer: its search.
+        noise: calibration that it is given, of `Job.noises`.
+        rest: exposures that its first frame is the mean of.
+        outline_px: deviation of the outline in the likelihood [px]; 0: none, as in the Euclidean fitness.
     """
 
     likelihood: bool
@@ -59,6 +67,9 @@ class Variant:
     vertices: int = 600
     inset: float = 0.02
     optimizer: OptimizerSettings = field(default_factory=hybrid.Settings)
+    noise: str = PLAIN
+    rest: int = REST
+    outline_px: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +96,7 @@ class Job:
     Attributes:
         name, seed: of the sequence; the seed draws its noise.
         sheet, sensor, texture: what is before which camera.
-        noise: noise model of the camera's calibration.
+        noises: calibrations of the camera, by name.
         known: the sheet at rest.
         variants: the trackers, by name.
         bound_frames: frames at which bounds are computed.
@@ -96,7 +107,7 @@ class Job:
     sheet: MovingSheet
     sensor: TimeOfFlight
     texture: Print
-    noise: DepthNoise
+    noises: Mapping[str, DepthNoise]
     known: KnownSheet
     variants: Mapping[str, Variant]
     bound_frames: tuple[int, ...]
@@ -134,11 +145,13 @@ def measure(job: Job) -> SequenceResult:
     tracked = dict.fromkeys(trackers, 0)
     theta: dict[str, Array] = {}
     most = max(variant.frames for variant in job.variants.values())
+    counts = {variant.rest for variant in job.variants.values()}
+    first = {rest: next(scene.frames(1, np.random.default_rng(job.seed), rest)) for rest in counts}
     for k, frames in enumerate(scene.frames(most, np.random.default_rng(job.seed))):
         truth = scene.control(k)
         for name, variant in job.variants.items():
             if k < variant.frames:
-                estimate = trackers[name].track(frames, lambda: True)
+                estimate = trackers[name].track(frames if k else first[variant.rest], lambda: True)
                 theta[name] = estimate.theta.reshape(truth.shape)
                 errors[name].append(_errors_mm(theta[name], truth))
                 tracked[name] += estimate.status == Status.TRACKING
@@ -173,7 +186,7 @@ def _tracking(job: Job, variant: Variant, mean: float) -> TrackingSession:
         model=replace(job.known, vertices=variant.vertices, inset=variant.inset),
         region=nearest.Settings(),
         synthesis=sparse.Settings(),
-        objective=likelihood.Settings() if variant.likelihood else squares,
+        objective=replace(PIXELS_ALONE, outline_px=variant.outline_px) if variant.likelihood else squares,
         optimizer=variant.optimizer,
         evaluations=EVALUATIONS,
         vertices=variant.vertices,
@@ -182,7 +195,7 @@ def _tracking(job: Job, variant: Variant, mean: float) -> TrackingSession:
         reinitialization=loss_monitor.Settings(),
         seed=job.seed,
     )
-    return TrackingSession(rig_of(job.noise), plan)
+    return TrackingSession(rig_of(job.noises[variant.noise]), plan)
 
 
 def _errors_mm(control: Array, truth: Array) -> tuple[float, float]:

@@ -1,10 +1,11 @@
 """The camera of E1 with its true errors, and its calibration (section 5.1 of the paper)."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from calib.noise import per_pixel, tof_amplitude
+from calib.noise import gaussian_polynomial, per_pixel, tof_amplitude
 from calib.noise.fit.samples import Samples, from_images
 from calib.noise.fit.shrinkage import Repeats
 from calib.noise.per_pixel import PerPixel
@@ -29,6 +30,13 @@ REGION_PX = 8
 #: Deviation of the logarithm of the pixels' own factors on the deviation.
 SCATTER = 0.3
 
+#: Calibrations by name: a law of the truth's form without mean offsets of the pixels; with them; polynomials in
+#: distance and amplitude as law, the paper's form and not the truth's, without offsets; and with them.
+PLAIN, OFFSETS, POLYNOMIAL, BOTH = "plain", "offsets", "polynomial", "both"
+
+#: Degrees of the polynomials of σ and of μ in distance and amplitude.
+DEGREES = (1, 3)
+
 
 def true_sensor(generator: np.random.Generator) -> TimeOfFlight:
     """A camera whose light falls off to the corners, and whose pixels differ; it has no mean offset."""
@@ -38,11 +46,11 @@ def true_sensor(generator: np.random.Generator) -> TimeOfFlight:
     return TimeOfFlight(factor, illumination=1 - (1 - CORNER) * radius**2)
 
 
-def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator) -> PerPixel:
-    """Noise model of a camera, fitted to static sequences of walls: a law of the image, and factors of the pixels.
+def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator) -> Mapping[str, PerPixel]:
+    """Noise models of a camera by name, fitted to static sequences of walls: a law, and maps of the pixels.
 
-    The form is the one that `abs-service calibrate noise` selects for such a sensor, fitted by the same functions. Mean
-    offsets of the pixels are left out: the sensor has none, so they would be noise of the calibration.
+    The form of `PLAIN` is the one that `abs-service calibrate noise` selects for such a sensor, fitted by the same
+    functions. Mean offsets of the pixels are left out of it: the sensor has none, so they are noise of the calibration.
 
     Args:
         sensor: the camera.
@@ -51,9 +59,20 @@ def calibrated(sensor: TimeOfFlight, frames: int, generator: np.random.Generator
     """
     walls = [(depth, material) for depth in DISTANCES for material in MATERIALS]
     found = together([_static(sensor, Wall(depth, material), frames, generator) for depth, material in walls])
-    law = tof_amplitude.fit(thinned(found.samples, LARGEST, generator))
-    labels = blocks(SR4000.height, SR4000.width, REGION_PX)
-    model = per_pixel.fit(found.means, law, labels, repeats=found.repeats)
+    few, labels = thinned(found.samples, LARGEST, generator), blocks(SR4000.height, SR4000.width, REGION_PX)
+    true_form, polynomial = (
+        per_pixel.fit(found.means, law, labels, repeats=found.repeats)
+        for law in (tof_amplitude.fit(few), gaussian_polynomial.fit(few, DEGREES, DEGREES))
+    )
+    return {
+        PLAIN: _without_offsets(true_form),
+        OFFSETS: true_form,
+        POLYNOMIAL: _without_offsets(polynomial),
+        BOTH: polynomial,
+    }
+
+
+def _without_offsets(model: PerPixel) -> PerPixel:
     return replace(model, offset=np.zeros_like(model.offset))
 
 

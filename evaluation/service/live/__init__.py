@@ -1,6 +1,12 @@
 """The service from end to end, started as by a user and observed from outside.
 
 Observed are the messages on the bus, the operating system's statistics and the finished recording.
+
+Statistic: losses; percentiles of the ages of all estimates; the slope of each process's memory, with its interval of
+95 % confidence; the quickest of the starts.
+Goals: no loss; the bounds below. Memory meets its goal if the interval's upper end is below the bound: what cannot be
+told from growth is missed. Until 2026-11-23 it was the lower end, which a noisy measurement always met.
+Seeds: one run with the context's seed.
 """
 
 import os
@@ -20,7 +26,7 @@ from evaluation.service.live.trend import Trend, rolling_minimum, trend
 TITLE = "End to end: losses, ages, processors, memory and start"
 
 #: Bounds of the goals: median and 99th percentile of the age [ms], start and help [s], growth of memory [MB/min].
-P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.1
+P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.3
 
 #: The recorder holds the index of a file until the next one begins, at this rate after two minutes; with a margin [s].
 FILE_S = 150.0
@@ -85,7 +91,11 @@ def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[Start
         at_most("Age at publication, p99", float(np.percentile(published_ms, 99)), P99_MS, "ms"),
         at_most("Start to the first estimate, the quickest", min(one.first_s for one in starts), START_S, "s"),
         at_most("--help, the quickest", min(help_s), HELP_S, "s"),
-        *(_flat(name, one) for name, one in growth.items() if settings.duration_s - settings.warm_up_s >= LEAST_S),
+        *(
+            memory_goal(name, one)
+            for name, one in growth.items()
+            if settings.duration_s - settings.warm_up_s >= LEAST_S
+        ),
     )
     ages_ms = {"publication": published_ms, "arrival at the subscriber": arrived_ms}
     wanted_ms = {"p50": P50_MS, "p99": P99_MS}
@@ -125,10 +135,10 @@ def _growth(seen: ObservedRun, process: str, from_s: float) -> Trend:
     return trend(seen.times_s[late] / 60, rolling_minimum(held, samples))
 
 
-def _flat(process: str, growth: Trend) -> Goal:
-    """Goal on memory: the confidence interval of its growth rate includes an allowed value."""
-    what = f"Growth of the memory of {process}, lower end of its 95 % interval"
-    return at_most(what, growth.slope - growth.half_width, GROWTH_MB_MIN, "MB/min")
+def memory_goal(process: str, growth: Trend) -> Goal:
+    """Goal on memory: it grows by no more than is allowed, with 95 % confidence."""
+    what = f"Growth of the memory of {process}, upper end of its 95 % interval"
+    return at_most(what, growth.slope + growth.half_width, GROWTH_MB_MIN, "MB/min")
 
 
 def _drawn_ages(seen: ObservedRun, arrived_ms: NDArray[np.float64], wanted_ms: Mapping[str, float]) -> Picture:

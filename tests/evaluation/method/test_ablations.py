@@ -7,6 +7,7 @@ from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.optimizers.base import Budget, Optimizer
 from evaluation.experiment import Context
 from evaluation.method import ablations
+from evaluation.method.ablations import plain_cma
 from evaluation.method.ablations.cold_start import Cold, Forgetful
 from tests.tracker.problems import linear, minimize
 
@@ -30,6 +31,32 @@ def test_a_cold_search_begins_where_the_first_frame_began():
     warm = starts(Forgetful(hybrid.Settings(tolerance=1e-6)).build(2, np.random.default_rng(0)))
     cold = starts(Cold(hybrid.Settings(tolerance=1e-6)).build(2, np.random.default_rng(0)))
     assert warm[0] == warm[1] < cold[0] == cold[1]
+
+
+@pytest.mark.parametrize(
+    "begin", [plain_cma.in_theta, plain_cma.after_newton, plain_cma.in_metric, plain_cma.in_metric_after_newton]
+)
+def test_every_way_to_begin_ends_at_the_minimum(begin: plain_cma.Begin):
+    problem, budget = linear(0.1 * TARGET, np.full(2, 1e3)), Budget(10**6, lambda: True)
+    search = plain_cma.Settings(begin, population=12, generations=200).build(2, np.random.default_rng(0))
+    found = minimize(problem, search.explore(problem, np.zeros(2), budget), budget)
+    np.testing.assert_allclose(found.theta, 0.1 * TARGET, atol=3e-3)
+
+
+def test_a_newton_step_is_at_the_minimum_of_a_linear_problem():
+    problem = linear(TARGET, np.ones(2))
+    for begin in (plain_cma.after_newton, plain_cma.in_metric_after_newton):
+        np.testing.assert_allclose(begin(problem, np.zeros(2))[0], np.outer([0, 0.5, 1], TARGET), atol=1e-6)
+    np.testing.assert_allclose(plain_cma.in_theta(problem, TARGET)[0], TARGET[None])
+
+
+def test_the_paper_s_search_starts_at_the_last_solution_and_not_at_the_prediction():
+    problem = linear(TARGET, np.ones(2))
+    search = plain_cma.FromLast(hybrid.Settings(tolerance=1e-9)).build(2, np.random.default_rng(0))
+    budget = Budget(10**6, lambda: True)
+    found = minimize(problem, search.explore(problem, np.zeros(2), budget), budget)
+    first = next(search.follow(problem, np.array([50.0, 50.0]), budget))
+    np.testing.assert_allclose(first[0], found.theta, atol=1e-6)
 
 
 @pytest.mark.slow

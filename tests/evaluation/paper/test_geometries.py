@@ -10,7 +10,7 @@ from abs_service.tracker.detection.initial_detection import InitialDetection
 from calib.noise.base import pixels_where
 from evaluation.experiment import Context
 from evaluation.paper import geometries
-from evaluation.paper.geometries import bound, measuring, sensor
+from evaluation.paper.geometries import bound, measuring, sensor, undone
 from evaluation.paper.geometries.bound import Priors
 from evaluation.paper.geometries.known_sheet import KnownSheet
 from evaluation.scenes.geometries import GEOMETRIES, Motion, MovingSheet
@@ -60,7 +60,8 @@ def test_the_known_sheet_has_the_true_control_points() -> None:
 def test_calibration_finds_how_every_pixel_errs() -> None:
     generator = np.random.default_rng(0)
     camera = sensor.true_sensor(generator)
-    model = sensor.calibrated(camera, 8, generator)
+    models = sensor.calibrated(camera, 8, generator)
+    model = models[sensor.PLAIN]
     view = Renderer(SR4000, Wall(1.0, 0.3)).render()
     amplitude = camera.amplitude(view)
     everywhere = np.ones(view.distance.shape, bool)
@@ -69,6 +70,10 @@ def test_calibration_finds_how_every_pixel_errs() -> None:
     # From 15 × 8 measurements, a deviation is known to 1 / √240; pixels alone would scatter by 30 %.
     assert np.sqrt(np.mean(error**2)) < 0.09
     assert abs(error.mean()) < 0.03
+    offsets = {name: np.abs(one.offset).max() for name, one in models.items()}
+    assert offsets[sensor.PLAIN] == offsets[sensor.POLYNOMIAL] == 0
+    assert offsets[sensor.OFFSETS] > 1e-4
+    assert offsets[sensor.BOTH] > 1e-4
 
 
 def test_the_bound_is_the_scatter_of_weighted_least_squares() -> None:
@@ -116,17 +121,19 @@ def test_a_vertex_reads_the_pixel_that_it_falls_on() -> None:
 def test_the_likelihood_comes_near_the_bound_and_profits_from_the_noise_model() -> None:
     """Less than the quick experiment: one geometry, few frames."""
     little = dataclasses.replace(
-        geometries.QUICK, geometries=1, frames=12, prior_frames=3, mesh_frames=3, calibration_frames=4
+        geometries.QUICK, geometries=1, frames=12, prior_frames=3, undone_frames=4, mesh_frames=3, calibration_frames=4
     )
     findings = geometries.run(little, Context(seed=0))
     assert findings.values["tracked"] == [1.0]
     assert findings.values["ratio_mean"] > 1.3
     assert max(findings.values["to_bound"]) < 1.5
+    assert set(findings.values["ratio_undone"]) == {one.name for one in undone.CONDITIONS}
     json.dumps(findings.values)
     assert [section.title for section in findings.sections] == [
         "Geometries",
+        "What makes it easier, undone",
         "The bound",
         "What each prior contributes",
-        "Other meshes, and the paper's search",
+        "Other meshes, the outline, and the paper's search",
         "Pictures",
     ]

@@ -18,7 +18,7 @@ from evaluation.experiment import Context
 from evaluation.service import live
 from evaluation.service.live import losses, proc, recording, subscriber
 from evaluation.service.live.rig import write_rig
-from evaluation.service.live.trend import rolling_minimum, trend
+from evaluation.service.live.trend import Trend, rolling_minimum, trend
 
 MINUTES = np.arange(600.0) / 60
 
@@ -42,6 +42,13 @@ def test_one_step_is_no_steady_growth():
     found = trend(MINUTES, 300 + 2.0 * (MINUTES > 1.5))
     assert found.slope > 0.1
     assert found.slope - found.half_width < 0.1
+
+
+@pytest.mark.parametrize(
+    ("growth", "met"), [(Trend(0.0, 0.2), True), (Trend(0.0, 0.5), False), (Trend(0.5, 0.1), False)]
+)
+def test_memory_must_be_known_not_to_grow(growth, met):
+    assert live.memory_goal("track", growth).met == met
 
 
 def test_usage_of_this_process():
