@@ -13,6 +13,7 @@ from abs_service.tracker.models import nurbs, posed
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import streams
 from calib.camera import Camera
+from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.base import DepthNoise, ImageNoise
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial
@@ -103,23 +104,27 @@ def noises(config: ServiceConfig, tracker: str) -> dict[str, Noise]:
         table = config.sensors[name]
         if table.noise is None:
             raise PlanError(f'sensor "{name}" of tracker "{tracker}" has no noise model')
-        models[name] = noise(table.noise, table.range_m)
+        models[name] = noise(table.noise, table.range_m, table.no_return)
         if table.texture is not None:
             made = texture(table.texture)
             models[f"{name}/{measurement(made).frames[0]}"] = made
     return models
 
 
-def noise(settings: Any, range_m: float | None) -> Noise:
+def noise(settings: Any, range_m: float | None, no_return: NoReturn) -> Noise:
     """The noise model of one sensor, from the `Settings` of a module of `calib.noise`.
 
     Raises:
-        PlanError: `range_m` is given for a sensor that measures no distances.
+        PlanError: `range_m` or `no_return` is given for a sensor that measures no distances.
         NoiseError: the model cannot be made.
     """
     made = settings.build()
-    if range_m is not None and not isinstance(made, DepthNoise):
+    if isinstance(made, DepthNoise):
+        return made
+    if range_m is not None:
         raise PlanError(f"range_m = {range_m:g} is for sensors that measure distances")
+    if no_return != CAUTIOUS:
+        raise PlanError(f"no_return = {plugins.plain(no_return)} is for sensors that measure distances")
     return made
 
 
@@ -151,7 +156,9 @@ def rig(config: ServiceConfig, tracker: str, cameras: Mapping[str, Camera]) -> R
         _check_size(head, model, cameras[head])
         table = config.sensors[head]
         depth = (table.depth.offset, table.depth.scale) if isinstance(model, DepthNoise) else ()
-        sensors[name] = Sensor(name, cameras[head], model, table.outlier_share, table.range_m, *depth)
+        sensors[name] = Sensor(
+            name, cameras[head], model, table.outlier_share, table.range_m, *depth, no_return=table.no_return
+        )
     return Rig(config.name, sensors)
 
 

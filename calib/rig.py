@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from calib.camera import Camera
+from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.base import DepthNoise, ImageNoise
 from calib.noise.binary import LightBarrier
 
@@ -17,14 +18,15 @@ class Sensor:
 
     A head that delivers two kinds, such as a time-of-flight camera with amplitudes, is two sensors with one camera.
 
-    name: name in the rig: the head's, `tof`; with the stream, `tof/amplitude`, for the second of a head.
+    Attributes:
+        name: name in the rig: the head's, `tof`; with the stream, `tof/amplitude`, for the second of a head.
+        camera: of the head.
         noise: noise model of the measurement; its type determines the kind of measurement.
         outlier_share: fraction of outliers among the measurements, 0…1; None for the objective's default.
         range_m: largest distance that a depth sensor reports [m]; None for the default.
-            depth_offset, depth_scale: systematic error of a depth sensor, which measures (1 + scale) · distance +
-                offset [1, m]; the noise model describes the remaining error.
         depth_offset, depth_scale: a depth sensor measures (1 + scale) · distance + offset [1, m]; the noise model is
             about what is left when that is taken off.
+        no_return: probability that a depth sensor has no return from a surface.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Sensor:
     range_m: float | None = None
     depth_offset: float = 0.0
     depth_scale: float = 0.0
+    no_return: NoReturn = CAUTIOUS
 
     @property
     def head(self) -> str:

@@ -46,6 +46,7 @@ class Tracker:
             picture of the surface.
         range_m: largest distance that the depth camera can report.
         outlier_share: share of the depths that come from anywhere.
+        no_return: probability of no return from a surface, `{"share": 0.02, "per_m": 0.5, "grazing": 3.0}`.
         vertices: about how many vertices the mesh has.
         region: where the object is in the first frame, unless `track` is given a mask.
         template: what is known of its shape: `{"type": "sheet", "size": (0.297, 0.21)}`, `{"type": "mesh", "path": …}`.
@@ -73,6 +74,7 @@ class Tracker:
         texture: NoisePart | None = None,
         range_m: float | None = None,
         outlier_share: float | None = None,
+        no_return: Table | None = None,
         vertices: int | None = None,
         region: Table | None = None,
         template: Table | None = None,
@@ -92,6 +94,7 @@ class Tracker:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
         noise = noise_models.StructuredLight() if noise is None else noise
         sensor = {"noise": noise, "texture": texture, "range_m": range_m, "outlier_share": outlier_share}
+        sensor |= {"no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}

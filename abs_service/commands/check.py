@@ -82,7 +82,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
     for name, sensor in rig.sensors.items():
         with _noting(f"sensors.{name}.noise", problems):
             if sensor.noise is not None:
-                wiring.noise(sensor.noise, sensor.range_m)
+                wiring.noise(sensor.noise, sensor.range_m, sensor.no_return)
         with _noting(f"sensors.{name}.texture", problems):
             if sensor.texture is not None:
                 wiring.texture(sensor.texture)

@@ -1,15 +1,15 @@
 """Tables of a calibration file, and its provenance in a merged configuration."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
-from abs_service.config.values import Name, NoiseSettings
+from abs_service.config.values import Name, NoiseSettings, SettingsOf
 
 #: Keys of a sensor in a calibration file that are keys of the same sensor in a rig file.
-SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "depth", "time_offset_ms")
+SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "no_return", "depth", "time_offset_ms")
 
 
 class DepthTable(Table):
@@ -86,6 +86,7 @@ class CalibratedSensor(SensorEvidence):
     texture: NoiseSettings | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    no_return: Annotated[Any, SettingsOf("calib.no_return")] | None = None
     depth: DepthTable | None = None
     time_offset_ms: FiniteFloat | None = None
 

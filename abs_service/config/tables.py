@@ -49,6 +49,7 @@ class SensorTable(Table):
         texture: likewise of what it sees of the surface besides: a time-of-flight camera's amplitudes, for example.
         outlier_share: share of its measurements that come from anywhere; None for the objective's own.
         range_m: distances that a depth sensor can report at all; None for the objective's own.
+        no_return: `Settings` of `calib.no_return`, how often a depth sensor has no return from a surface.
         depth: systematic error of its distances.
         time_offset_ms: what has to be added to its exposures' times to get those of the others.
     """
@@ -60,6 +61,7 @@ class SensorTable(Table):
     texture: NoiseSettings | None = None
     outlier_share: Annotated[float, Field(gt=0, lt=1)] | None = None
     range_m: Positive | None = None
+    no_return: Annotated[Any, SettingsOf("calib.no_return")] = Field(default={})
     depth: DepthTable = DepthTable()
     time_offset_ms: FiniteFloat = 0.0
 

@@ -26,6 +26,7 @@ class Static:
         mean: mean distance of each pixel [m]; NaN if never static.
         variance: variance of its distances [m²].
         count: number of distances used.
+        returns: number of frames with a return.
         brightness: mean amplitude of each pixel; NaN without.
         rays: unit directions (height, width, 3).
         steps: quantisation of the distances.
@@ -39,6 +40,7 @@ class Static:
     mean: NDArray[np.float64]
     variance: NDArray[np.float64]
     count: NDArray[np.int64]
+    returns: NDArray[np.int64]
     brightness: NDArray[np.float64]
     rays: NDArray[np.float64]
     steps: Steps
@@ -103,6 +105,7 @@ def reduce(
         (mean * counts).sum(axis=0) / total,
         variance,
         counts.sum(axis=0),
+        np.isfinite(distance).sum(axis=0),
         (brightness * counts).sum(axis=0) / total,
         np.asarray(rays, np.float64),
         steps,

@@ -7,6 +7,7 @@ and the simulator's ray casting.
 - **Slides.** A sheet swings for 30 frames; then it lies farther along itself by some centimetres from one frame to the
   next. A frame is wrong if it is TRACKING while the median error of the vertices' material points exceeds 5 mm and
   three of the claimed standard deviations. The statistic is the longest row of wrong frames.
+- **Dropouts.** The same while the sensor loses three of ten returns, pixel by pixel, and the tracker is not told.
 - **Creeps.** A flat sheet on a table is drawn along itself by 2 mm a frame; no edge is free, and nothing is printed
   on it.
 - **Coverage.** Share of the vertices' material points inside their 95 % regions, by quarters of a sequence: with colour
@@ -36,6 +37,9 @@ SLIDE_FRAME, FRAMES_AFTER, WRONG_M = 30, 30, 5e-3
 
 #: The wall behind the table's sheet [m], and how far it is drawn in a frame [m].
 TABLE, CREEP_M = Wall(1.002), 2e-3
+
+#: Share of the returns that single pixels lose, and how far a sheet slides meanwhile [m].
+DROPOUTS, DROPOUT_SLIDE_M = 0.3, 0.04
 
 #: Outlines with which coverage is measured.
 OUTLINES = {"auto": likelihood.Settings(), "none": likelihood.Settings(outline_px=0.0)}
@@ -132,9 +136,16 @@ def sequences(settings: Settings, seed: int) -> Iterator[tuple[str, SheetScene, 
     """Name, scene, and whether the background gives no return."""
     for by in settings.slides_m:
         for empty in (False, True):
-            name = f"slides by {by * 1e3:.0f} mm, {'no return' if empty else 'a wall'} behind"
+            name = f"slides by {by * 1e3:.0f} mm, {_behind(empty)} behind"
             yield name, SheetScene(name, Slide(by)), empty
+    for empty in (False, True):
+        name = f"slides by {DROPOUT_SLIDE_M * 1e3:.0f} mm, {DROPOUTS:.0%} dropouts, {_behind(empty)} behind"
+        yield name, SheetScene(name, Slide(DROPOUT_SLIDE_M), dropouts=DROPOUTS), empty
     yield "creeps on a table", SheetScene("table", creep, wall=TABLE), False
+
+
+def _behind(empty: bool) -> str:
+    return "no return" if empty else "a wall"
 
 
 def run(settings: Settings, context: Context) -> Findings:

@@ -84,6 +84,7 @@ class SheetScene:
         sigma: standard deviation of the ray lengths [m].
         hole: columns and rows of a window in the middle of the image without returns [px]; zero: none.
         wall: what is behind the sheet.
+        dropouts: share of the pixels without a return, in all frames but the first, each independently.
     """
 
     name: str
@@ -91,6 +92,7 @@ class SheetScene:
     sigma: float = 5e-3
     hole: tuple[int, int] = (0, 0)
     wall: Wall = WALL
+    dropouts: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,9 +131,16 @@ def render_frames(scene: SheetScene, indices: Iterable[int], generator: np.rando
         state = scene.motion(k * INTERVAL_S)
         view = renderer.render(Sheet(state.points(dense)))
         measured = view.distance + scene.sigma * generator.standard_normal(hole.shape)
-        distance = np.where(hole, np.nan, measured).astype(np.float32)
-        frames.append(SheetFrame(round(k * INTERVAL_S * 1e9), distance, (view.share > 0) & ~hole, hole, state))
+        sheet = (view.share > 0) & ~hole
+        lost = hole | _dropouts(scene.dropouts if k else 0.0, hole.shape, generator)
+        distance = np.where(lost, np.nan, measured).astype(np.float32)
+        frames.append(SheetFrame(round(k * INTERVAL_S * 1e9), distance, sheet, hole, state))
     return frames
+
+
+def _dropouts(share: float, shape: tuple[int, ...], generator: np.random.Generator) -> NDArray[np.bool_]:
+    """A share of the pixels; without any, nothing is drawn, so that scenes stay what they are."""
+    return generator.random(shape) < share if share else np.zeros(shape, np.bool_)
 
 
 def _eased(t: float, begin: float, duration: float) -> float:

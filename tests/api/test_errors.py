@@ -56,6 +56,7 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
         ({"noise": a.noise.Color()}, r'noise: sensor "depth" finds the object, so it needs a noise model of distances'),
         ({"vertices": 2}, r"^Tracker: vertices = 2: must be greater than or equal to 4"),
         ({"range_m": 0}, r"^Tracker: range_m = 0: must be greater than 0"),
+        ({"no_return": {"share": 1.5}}, r"^Tracker: no_return\.share = 1\.5: must be less than 1"),
         ({"priors": {"strech": 0.1}}, r"^Tracker: priors\.strech: unknown key, did you mean \"stretch\"\?"),
         ({"color_noise": a.noise.Color()}, r"color_noise is given without the camera: color=Camera"),
         ({"color": CAMERA, "color_noise": a.noise.Color(0)}, r"^Tracker: color_noise\.sigma = 0: must be greater"),

@@ -16,6 +16,7 @@ from abs_service.calibration.shots import sequences
 from abs_service.cli import main
 from abs_service.config import plugins
 from abs_service.supervision.exit_codes import Exit
+from calib.no_return import NoReturn
 from calib.noise.base import NoiseError
 from calib.noise.per_pixel import PerPixel
 from calib.noise.tof_amplitude import TofAmplitude
@@ -88,6 +89,7 @@ def test_one_sequence_before_anything_tells_the_scatter_in_time_and_no_more() ->
     measured = result.model.deviation(x, x, (np.zeros(2, int), np.zeros(2, int)))
     np.testing.assert_allclose(measured, expected, rtol=0.2)
     assert result.kind is Kind.MEAN
+    assert not result.missing.targets
     assert not result.by_sequence
 
 
@@ -109,7 +111,8 @@ def test_exposure_settings_are_kept_apart_and_sequences_need_one_sensor() -> Non
 
 @pytest.mark.slow
 def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path, capsys) -> None:
-    sources = [f"simulated://wall?sensors=tof&tof=32x24&rate=200&distance={d}&pattern=0.006" for d in (0.8, 1.2, 1.6)]
+    wall = "simulated://wall?sensors=tof&tof=32x24&rate=200&reflectivity=0.14&pattern=0.006"
+    sources = [f"{wall}&distance={d}" for d in (0.8, 1.2, 1.6)]  # the last is nearly too faint to return
     options = ["--frames", "12", "--out", str(tmp_path / "lab-1.2"), "--json"]
     code = main(["calibrate", "noise", *sources, *options, "--distance-m", "0.8", "1.2", "1.6"])
     said = json.loads(capsys.readouterr().out)
@@ -117,10 +120,13 @@ def test_the_command_writes_a_table_for_the_rig_file_and_a_report(tmp_path: Path
     assert said["values"]["reference"] == "known distance"
     assert said["values"]["fixed_pattern_m"] == pytest.approx(0.006, rel=0.15)
     assert {path.name for path in tmp_path.iterdir()} >= {"lab-1.2.toml", "lab-1.2.html", "lab-1.2.json"}
-    table = tomllib.loads((tmp_path / "lab-1.2.toml").read_text(encoding="utf-8"))["sensors"]["tof"]["noise"]
-    model = plugins.load("calib.noise", table, tmp_path).build()
+    tables = tomllib.loads((tmp_path / "lab-1.2.toml").read_text(encoding="utf-8"))["sensors"]["tof"]
+    model = plugins.load("calib.noise", tables["noise"], tmp_path).build()
     assert isinstance(model, PerPixel)
     assert model.shape == (24, 32)
+    law = plugins.settings("calib.no_return", tables["no_return"], tmp_path)
+    assert law == NoReturn(**said["values"]["no_return"])
+    assert law.probability(1.7, 0.95) > 2 * law.probability(0.8, 1.0)
     page = (tmp_path / "lab-1.2.html").read_text(encoding="utf-8")
     assert page.count("<figure>") >= 5
     assert "--distance-m 0.8 1.2 1.6" in page

@@ -83,6 +83,11 @@ def test_a_mistake_for_scripts(checked):
             'range_m = 3.0\nnoise = { type = "color" }',
             "sensors.tof.noise: range_m = 3 is for sensors that measure distances",
         ),
+        (
+            'noise = { type = "gaussian_polynomial", sigma = [[0.005]] }',
+            'no_return = { share = 0.1 }\nnoise = { type = "color" }',
+            "is for sensors that measure distances",
+        ),
     ],
 )
 def test_what_reads_well_and_cannot_work_is_named(checked, good, bad, message):

@@ -149,6 +149,10 @@ CASES = {
         '[sensors.ir]\ndevice = "sim"\noutlier_share = 1.0\n',
         "sensors.ir.outlier_share = 1.0: must be less than 1",
     ),
+    "a sensor that returns less than never": (
+        '[sensors.ir]\ndevice = "sim"\nno_return = { grazing = -1.0 }\n',
+        "sensors.ir.no_return.grazing = -1.0: must be greater than or equal to 0",
+    ),
     "a noise model's key": (
         '[sensors.ir]\ndevice = "sim"\nnoise = { type = "color", sigm = 3 }\n',
         'sensors.ir.noise.sigm: unknown key, did you mean "sigma"? allowed: sigma',

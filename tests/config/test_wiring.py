@@ -9,6 +9,7 @@ import pytest
 
 from abs_service import config, wiring
 from calib.camera import Camera
+from calib.no_return import NoReturn
 
 TOF = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
 COLOR = Camera(320, 240, 340.0, 340.0, 159.5, 119.5)
@@ -26,11 +27,12 @@ def test_a_sensor_without_a_camera_is_named():
 
 def test_the_outlier_settings_of_a_sensor_are_published_with_its_noise_model():
     text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
-    own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\n")
+    own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\nno_return.grazing = 2\n")
     rig = wiring.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})
     tof, color = rig.sensors["tof"], rig.sensors["color"]
     assert (tof.outlier_share, tof.range_m) == (0.2, 7.5)
     assert (color.outlier_share, color.range_m) == (None, None)
+    assert (tof.no_return, color.no_return) == (NoReturn(grazing=2.0), NoReturn())
 
 
 def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_path):

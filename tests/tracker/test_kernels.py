@@ -17,7 +17,7 @@ from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, write_constants
+from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, depth_cost, write_constants
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from calib import pose
 from calib.camera import Camera
@@ -221,12 +221,34 @@ def test_pixels_that_say_nothing_of_distances_become_constants(seed):
     texture = generator.normal(size=(top + height + 3, left + width + 4, 8)).astype(np.float32)
     silent = generator.uniform(size=(height, width)) < 0.3
     free_m = (generator.uniform(0, 0.5, (height, width)) * (generator.uniform(size=(height, width)) < 0.3)).astype("f4")
+    missing = generator.uniform(size=(height, width)) < 0.3
     expected = texture.copy()
     inner = expected[1 + top : 1 + top + height, 1 + left : 1 + left + width]
+    inner[missing] = np.eye(8)[6] * -2.5 + np.eye(8)[7]
     inner[silent] = np.eye(8)[6] * -2.5
     inner[free_m > 0] = np.eye(8)[6] * (7.0 + free_m[free_m > 0, None] / FREE_SCALE_M)
-    write_constants(silent, free_m, -2.5, 7.0, top, left, texture)
+    write_constants(silent, missing, free_m, -2.5, 7.0, top, left, texture)
     np.testing.assert_allclose(texture, expected, rtol=1e-5)
+
+
+@few
+@given(seeds)
+def test_a_missing_return_costs_a_sample_its_own_surprise(seed):
+    """In a population; beside it, a texel of constant cost and a measurement, each costs what it did."""
+    generator = np.random.default_rng(seed)
+    n, members = 40, 3
+    agreeing, constant, measured = (np.zeros(8, np.float32) for _ in range(3))
+    agreeing[6:], constant[6] = (-2.5, 1.0), 3.5
+    measured[[0, 3, 6]] = 1.0, 200.0, -3.0
+    texture = np.stack([constant, agreeing, measured])
+    pixel = generator.integers(-1, 3, (members, n)).astype(np.int32)
+    distance = generator.normal(1.0, 5e-3, (members, n)).astype(np.float32)
+    surprise = generator.uniform(0, 7, (generator.choice([1, members]), n)).astype(np.float32)
+    out = np.empty(members)
+    depth_cost(pixel, distance, surprise, texture, 0.05, 4.6, out)
+    measurement = np.minimum(0.05 + 0.5 * (200 * (1.0 - distance.astype(float))) ** 2 - 3.0, 4.6)
+    expected = np.select([pixel == 0, pixel == 1, pixel == 2], [0.05 + 3.5, 0.05 - 2.5 + surprise, measurement], 0.0)
+    np.testing.assert_allclose(out, expected.sum(axis=1), rtol=1e-4)
 
 
 @few

@@ -12,7 +12,7 @@ from abs_service.calibration.shots import sequences as recorded
 from calib.noise.base import DepthNoise, NoiseError
 from calib.noise.fit.polynomial import Span
 from calib.noise.fit.samples import domain
-from calib.sequences import parts, reference
+from calib.sequences import missing, parts, reference
 from calib.sequences.candidates import Candidate, of_image, of_places
 from calib.sequences.evidence import Evidence, gather, together
 from calib.sequences.parts import Parts
@@ -57,6 +57,7 @@ class NoiseCalibration:
         distances, amplitudes: domain; the latter NaN without amplitudes.
         steps: quantisation of the distances.
         boards: board poses of every sequence; empty if the true distances have another source.
+        missing: missing returns of every target, and their law.
     """
 
     statics: tuple[Static, ...]
@@ -73,6 +74,7 @@ class NoiseCalibration:
     amplitudes: Span
     steps: Steps
     boards: tuple[StaticBoard, ...]
+    missing: missing.Missing
 
     @property
     def kind(self) -> Kind:
@@ -131,6 +133,7 @@ def calibrate(
         _amplitudes(everything.samples.amplitude),
         steps,
         tuple(one for one in targets if isinstance(one, StaticBoard)),
+        missing.learn(statics, references, targets, region),
     )
 
 

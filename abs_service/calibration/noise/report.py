@@ -1,5 +1,7 @@
 """Report of a noise calibration: verdicts, model comparison, error components, and plots."""
 
+from dataclasses import asdict
+
 import numpy as np
 
 from abs_service.calibration.noise import plots, verdicts
@@ -32,6 +34,7 @@ def report(
         Section("Models", (_models(found),)),
         Section("Error components", (_WHAT, _parts(found))),
         *_boards(found),
+        *_missing(found),
         Section("Distance and amplitude", (_over(found),)),
         Section("Pixels", tuple(_maps(found))),
         Section("Residuals", (_residuals(found),)),
@@ -63,6 +66,7 @@ def values(found: NoiseCalibration) -> dict[str, object]:
         "variance": found.chosen.quality.variance,
         "outlier_share": found.chosen.quality.outlier_share,
         "fixed_pattern_m": _pattern_deviation(found),
+        "no_return": asdict(found.missing.law) if found.missing.targets else None,
         "step_digit_m": found.steps.digit,
         "step_growth_per_m": found.steps.growth,
     }
@@ -82,6 +86,22 @@ def _boards(found: NoiseCalibration) -> tuple[Section, ...]:
         for static, one, board in zip(found.statics, found.references, found.boards)
     )  # fmt: skip
     return (Section("Boards", (Table("Board poses from the mean images of the sequences", columns, rows),)),)
+
+
+def _missing(found: NoiseCalibration) -> tuple[Section, ...]:
+    """Missing returns of every target, and what the law says."""
+    if not found.missing.targets:
+        return ()
+    columns = (
+        Column("sequence"), Column("pixels"), Column("distance", "m", ".3f"), Column("angle", "°", ".0f"),
+        Column("missing", "", ".2%"), Column("by the law", "", ".2%"),
+    )  # fmt: skip
+    rows = tuple(
+        (one.name, len(one.share), float(np.mean(one.distance)), float(np.degrees(np.arccos(one.cosine)).mean()),
+         float(np.mean(one.share)), float(np.mean(found.missing.law.probability(one.distance, one.cosine))))
+        for one in found.missing.targets
+    )  # fmt: skip
+    return (Section("Missing returns", (Table("Share of the targets' returns that are missing", columns, rows),)),)
 
 
 def _models(found: NoiseCalibration) -> Table:

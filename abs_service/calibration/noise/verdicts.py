@@ -33,6 +33,7 @@ def verdicts(found: NoiseCalibration) -> tuple[Verdict, ...]:
         _agreement(found),
         *_boards(found),
         *_undetermined(found),
+        *_missing(found),
         _places(found),
         _outside(found),
         *_steps(found),
@@ -93,7 +94,8 @@ def _undetermined(found: NoiseCalibration) -> list[Verdict]:
             Verdict(
                 Level.DOUBTFUL,
                 "Only the temporal part of the noise is determined: no distance was given and no flat target fills the "
-                "image. The mean offset and the fixed pattern are unknown, and taken as zero.",
+                "image. The mean offset and the fixed pattern are unknown, and taken as zero; how often returns are "
+                "missing is not determined either.",
                 "Record a flat target at known distances, and give them with --distance-m, or a board, with --target.",
             )
         )
@@ -122,6 +124,22 @@ def _undetermined(found: NoiseCalibration) -> list[Verdict]:
         )
         said.append(Verdict(Level.DOUBTFUL, text, "Record at least three sequences."))
     return said
+
+
+def _missing(found: NoiseCalibration) -> list[Verdict]:
+    """How often returns are missing, where targets tell."""
+    if not found.missing.targets:
+        return []
+    share, distance, cosine = (
+        np.concatenate([getattr(one, name) for one in found.missing.targets])
+        for name in ("share", "distance", "cosine")
+    )
+    text = (
+        f"{np.mean(share):.2%} of the targets' returns are missing, at {distance.min():.2f} to {distance.max():.2f} m, "
+        f"seen at up to {np.degrees(np.arccos(cosine.min())):.0f}° from the front. The probability of no return is "
+        f"{found.missing.law.share:.2%} from the front at 1 m; no_return says how it grows."
+    )
+    return [Verdict(Level.GOOD, text)]
 
 
 def _places(found: NoiseCalibration) -> Verdict:

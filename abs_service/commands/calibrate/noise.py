@@ -16,7 +16,8 @@ With --target, a calibration board at rest is looked for in the mean image of ea
 infrared image, or that of another sensor whose camera and pose are known. Its pose tells the real distances, as well as
 the report says.
 
-Writes OUT.toml (a table [sensors.NAME.noise] to copy into the rig file), OUT.npz (maps of pixels, if they are worth
+Writes OUT.toml (tables [sensors.NAME.noise] and, if a target tells how often returns are missing,
+[sensors.NAME.no_return], to copy into the rig file), OUT.npz (maps of pixels, if they are worth
 it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
 """
 
@@ -185,6 +186,8 @@ def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path) ->
         else:
             table = plugins.table(model)
         text = toml_text.table(("sensors", sensor, "noise"), table, "written by abs-service calibrate noise")
+        if found.missing.targets:
+            text += "\n" + toml_text.table(("sensors", sensor, "no_return"), plugins.plain(found.missing.law))
         toml.write_text(text, encoding="utf-8")
     except OSError as error:
         raise NoiseOptionError(f"--out {out}: cannot be written: {error.strerror}") from error

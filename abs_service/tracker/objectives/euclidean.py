@@ -13,6 +13,7 @@ from abs_service.tracker.models.base import ModelError, Surface
 from abs_service.tracker.objectives.base import TermSum
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
+from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
 from calib.noise.bayer import GaussianBayer
 from calib.noise.binary import LightBarrier
@@ -96,4 +97,4 @@ def _deviation(weight: float) -> float:
 def _bounds(cutoff: float, channels: int, sigma: float) -> Bounds:
     """Bounds that cancel the normaliser of the density, so that costs are the weighted squares alone."""
     normalizer = channels * (np.log(sigma) + LOG_SQRT_2PI)
-    return Bounds(-normalizer, cutoff + normalizer, cutoff)
+    return Bounds(-normalizer, cutoff + normalizer, cutoff, NEVER)

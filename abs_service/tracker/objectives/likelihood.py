@@ -58,4 +58,4 @@ class Settings:
         share = sensor.outlier_share or self.outlier_share
         range_m = sensor.range_m or self.range_m
         uniform = float(np.log(range_m)) if isinstance(sensor.noise, DepthNoise) else sensor.noise.uniform
-        return Bounds(-np.log1p(-share), uniform, uniform - np.log(share))
+        return Bounds(-np.log1p(-share), uniform, uniform - np.log(share), sensor.no_return)

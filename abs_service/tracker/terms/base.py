@@ -11,6 +11,7 @@ from abs_service.pairing.images import Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import View
 from abs_service.tracker.terms.linearization import Linear
+from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.fit.truncation import deviation_within
 
 #: Residuals up to this many deviations count as explained by the sensor's noise.
@@ -25,11 +26,13 @@ class Bounds:
         inlier: added to the cost of an inlier.
         uniform: cost of a vertex without a measurement, or with one that it cannot explain.
         outlier: upper bound of the cost of a measurement.
+        no_return: probability that a depth sensor has no return from a surface; bounds the cost of a missing one.
     """
 
     inlier: float
     uniform: float
     outlier: float
+    no_return: NoReturn = CAUTIOUS
 
 
 @dataclass(frozen=True, slots=True)

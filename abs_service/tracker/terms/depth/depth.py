@@ -11,12 +11,13 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.depth.background import Background
+from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
     depth_cost,
     distances,
     median_inlier_cost,
+    missing_cost,
     normalize,
     write_constants,
 )
@@ -59,6 +60,7 @@ class DepthTerm:
         self._view = synthesizer.view(sensor, np.zeros((vertices, 0), np.float32))
         self._outline = outline(self._view.camera)
         self._background = Background()
+        self._missing = np.zeros((1, vertices), np.float32)
         # Cost of no measurement, unbounded, so that leaving the image does not lower the cost.
         beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
         self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
@@ -81,14 +83,16 @@ class DepthTerm:
         distances(texels, distance)
         expected = self._view.render(predicted)[window]
         height, width = texture.shape[0] - 2, texture.shape[1] - 2
-        empty = self._background.observe(np.isnan(distance), np.isfinite(expected), window, (height, width))
-        seen = classify(distance, expected, self._view.camera.fx, empty)
+        missing = np.isnan(distance)
+        single = dropouts(missing)
+        empty = self._background.observe(missing & ~single, np.isfinite(expected), window, (height, width))
+        seen = classify(distance, expected, self._view.camera.fx, empty, single)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
-        self._obscured = placed(window, seen.foreground | seen.hole, height, width).ravel()
+        self._obscured = placed(window, seen.foreground | seen.hole | seen.dropout, height, width).ravel()
         self._doubtful = placed(window, doubtful, height, width).ravel()
         self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)
-        self._mask_pixels(texture, seen, doubtful)
+        self._explain_pixels(texture, seen, doubtful, predicted)
         self._texture = texture.reshape(-1, 8)
 
     def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
@@ -109,17 +113,22 @@ class DepthTerm:
     def hide(self, points: NDArray[np.float64]) -> None:
         """Does nothing: a depth sensor detects occluders in its own image."""
 
-    def _mask_pixels(self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_]) -> None:
+    def _explain_pixels(
+        self, texture: NDArray[np.float32], seen: Visibility, doubtful: NDArray[np.bool_], predicted: Surface
+    ) -> None:
         """Writes constant costs into the texture (height + 2, width + 2, 8) at pixels without a usable distance.
 
         Behind an occluder, in a hole, and next to an outline with a term of its own, a vertex costs the mean of an
         inlier, so that the cost has no gradient there. In free space it costs an outlier plus a penalty proportional to
-        the distance from the object.
+        the distance from the object. At other missing returns it costs the more, the less likely they are.
         """
-        masked = seen.foreground | seen.hole | doubtful
-        agreeing = median_inlier_cost(within(texture, self._window), seen.object) if masked.any() else 0.0
+        if not seen.object.any():
+            return
+        masked, missing = seen.foreground | seen.hole | doubtful, np.isnan(self._distance)
+        agreeing = median_inlier_cost(within(texture, self._window), seen.object)
         free_m, outlier = within(self._free_m, self._window), self._bounds.outlier - self._bounds.inlier
-        write_constants(masked, free_m, agreeing, outlier, *corner(self._window), texture)
+        write_constants(masked, missing, free_m, agreeing, outlier, *corner(self._window), texture)
+        self._missing = missing_cost(self._bounds.no_return, predicted, self._view.camera.center, outlier - agreeing)
 
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """−Σ_v log φ (population,) plus the cost of the outline."""
@@ -128,7 +137,8 @@ class DepthTerm:
     def _measured_cost(self, surface: Surface, seen: Synthesis) -> NDArray[np.float64]:
         """Cost (population,) of the distances; the density is the larger of inlier and outlier density."""
         out = np.empty(len(seen.pixel))
-        depth_cost(seen.pixel, seen.distance, self._texture, self._bounds.inlier, self._bounds.outlier, out)
+        missing = self._view.carry(surface, self._missing)
+        depth_cost(seen.pixel, seen.distance, missing, self._texture, self._bounds.inlier, self._bounds.outlier, out)
         return self._view.balance(out, surface, self._bounds.inlier + self._bounds.uniform)
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Together:

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.models.base import Surface
 from calib.jit import kernel, prange
+from calib.no_return import NoReturn
 from calib.noise.base import WINDOW_M
 
 #: A vertex in free space costs one unit of log-likelihood more for every so many metres from the object: the outline
@@ -12,6 +14,24 @@ FREE_SCALE_M = 0.01
 
 #: Texels are gathered so many at a time, and then compared all at once.
 _TILE = 32
+
+
+def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64], most: float) -> NDArray[np.float32]:
+    """Cost (1, n) of a missing return at each vertex beyond that of a measurement that agrees, at most `most` [nats].
+
+    It is −log p of a missing return minus −log(1 − p) of a return, so it is 0 where no return is as likely as one.
+    Distance and angle are those of the predicted mesh, the same for all candidates.
+
+    Args:
+        law: probability of no return.
+        predicted: the predicted surface, a population of one.
+        center: of the camera (3,) [m].
+        most: upper bound [nats].
+    """
+    sight = predicted.vertices[0] - center[:, None]
+    distance = np.linalg.norm(sight, axis=0)
+    cosine = -np.einsum("in,in->n", predicted.normals[0], sight) / distance
+    return np.clip(-law.log_odds(distance, np.clip(cosine, 0, 1)), 0, most)[None].astype(np.float32)
 
 
 @kernel
@@ -37,6 +57,7 @@ def distances(texels: NDArray[np.float32], found: NDArray[np.float32]) -> None:
 @kernel
 def write_constants(
     masked: NDArray[np.bool_],
+    missing: NDArray[np.bool_],
     free_m: NDArray[np.float32],
     agreeing: float,
     outlier: float,
@@ -44,15 +65,20 @@ def write_constants(
     left: int,
     texture: NDArray[np.float32],
 ) -> None:
-    """Writes texels of cost `agreeing` at masked pixels, and outlier + d / s at distance d > 0 into free space."""
+    """Writes constant costs into the texels of pixels without a usable distance.
+
+    At distance d > 0 from the object, in free space, that is outlier + d / s; else at masked pixels `agreeing`; else at
+    missing returns `agreeing` plus what a missing return costs the sample that meets it, see `depth_cost`.
+    """
     per_metre = np.float32(1 / FREE_SCALE_M)
     for row in range(masked.shape[0]):
         for column in range(masked.shape[1]):
             free = free_m[row, column]
-            if free > 0 or masked[row, column]:
+            if free > 0 or masked[row, column] or missing[row, column]:
                 texel = texture[top + row + 1, left + column + 1]
                 texel[:] = 0
                 texel[6] = np.float32(outlier) + free * per_metre if free > 0 else np.float32(agreeing)
+                texel[7] = np.float32(0) if free > 0 or masked[row, column] else np.float32(1)
 
 
 @kernel
@@ -82,30 +108,44 @@ def normalize(
 def depth_cost(
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
+    missing: NDArray[np.float32],
     texture: NDArray[np.float32],
     inlier: float,
     outlier: float,
     out: NDArray[np.float64],
 ) -> None:
-    """`_cost_of` for every candidate of a population, (population, n)."""
+    """`_cost_of` for every candidate of a population, (population, n).
+
+    Args:
+        pixel, distance: of the samples (population, n), see `Synthesis`.
+        missing: what a missing return costs each sample (population or 1, n).
+        texture: texels (pixels, 8).
+        inlier, outlier: see `Bounds`.
+        out: costs (population,).
+    """
     for k in prange(pixel.shape[0]):
-        out[k] = _cost_of(pixel[k], distance[k], texture, inlier, outlier)
+        out[k] = _cost_of(pixel[k], distance[k], missing[min(k, missing.shape[0] - 1)], texture, inlier, outlier)
 
 
 @kernel
 def _cost_of(
     pixels: NDArray[np.int32],
     distances: NDArray[np.float32],
+    missing: NDArray[np.float32],
     texture: NDArray[np.float32],
     inlier: float,
     outlier: float,
 ) -> float:
-    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured."""
+    """Sum over samples of min(inlier + ½e² + log normaliser, outlier), without that bound where nothing is measured.
+
+    The texel of a missing return has a 1 in place of the normaliser's slope, that of a constant cost a 0.
+    """
     window, ceiling, least = np.float32(WINDOW_M), np.float32(outlier - inlier), np.float32(inlier)
     half, none, unbounded, total = np.float32(0.5), np.float32(0), np.float32(1e30), 0.0
     texels = np.empty((_TILE, 8), np.float32)
     for first in range(0, pixels.size, _TILE):
-        pixel, distance, count = pixels[first:], distances[first:], np.uintp(min(_TILE, pixels.size - first))
+        pixel, distance, lost = pixels[first:], distances[first:], missing[first:]
+        count = np.uintp(min(_TILE, pixels.size - first))
         for v in range(count):
             # All is read before any is written, so that the compiler moves eight numbers at once.
             texel, to = texture[np.uintp(max(pixel[v], 0))], texels[v]
@@ -119,8 +159,9 @@ def _cost_of(
             inside = min(max(t, -window), window)
             inverse = texels[v, 3] + inside * (texels[v, 4] + inside * texels[v, 5])
             e = (t - texels[v, 1] - texels[v, 2] * inside) * inverse
-            cost = half * e * e + texels[v, 6] + texels[v, 7] * inside
-            bounded = min(cost, ceiling if texels[v, 3] > 0 else unbounded) + least
+            measured = texels[v, 3] > 0
+            cost = half * e * e + texels[v, 6] + texels[v, 7] * (inside if measured else lost[v])
+            bounded = min(cost, ceiling if measured else unbounded) + least
             part += bounded if pixel[v] >= 0 else none
         total += part
     return float(total)

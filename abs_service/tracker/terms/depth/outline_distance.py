@@ -18,7 +18,7 @@ def _around(mask: NDArray[np.bool_], reach: int) -> Window:
 def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tuple[Window, NDArray[np.float32]]:
     """Distance of pixels from the object's outline [px], negative outside it; NaN if unknown.
 
-    Occluders and holes are unknown: the object may continue there.
+    Occluders and holes are unknown: the object may continue there. A dropout is beside it if most pixels around it are.
 
     Args:
         distance, seen: an image (height, width) [m], and what it shows.
@@ -27,7 +27,10 @@ def inwards(distance: NDArray[np.float32], seen: Visibility, reach: int) -> tupl
     Returns:
         The part of the image that is not farther outside, and the distances there (rows, columns).
     """
-    beside = (seen.free_m > 0) | (np.isnan(distance) & ~seen.hole)
+    beside = (seen.free_m > 0) | (np.isnan(distance) & ~(seen.hole | seen.dropout))
+    if seen.dropout.any():
+        votes = np.where(seen.dropout, np.int16(0), np.where(beside, np.int16(1), np.int16(-1)))
+        beside |= seen.dropout & (cv2.boxFilter(votes, -1, (3, 3), normalize=False) > 0)
     if not (beside.any() and seen.object.any()):
         return WHOLE, np.full(distance.shape, np.nan, np.float32)
     part = _around(~beside, reach)

@@ -38,7 +38,8 @@ class Visibility:
     Attributes:
         object: shows the object.
         foreground: shows something before the object.
-        hole: no return where the object should be.
+        hole: no return over an area where the object should be.
+        dropout: no return of single pixels, see `dropouts`.
         free_m: distance to the nearest pixel of the object, across the line of sight [m], where the sensor looks past
             the object to a background, measured or without return; 0 elsewhere.
     """
@@ -46,6 +47,7 @@ class Visibility:
     object: NDArray[np.bool_]
     foreground: NDArray[np.bool_]
     hole: NDArray[np.bool_]
+    dropout: NDArray[np.bool_]
     free_m: NDArray[np.float32]
 
 
@@ -54,6 +56,7 @@ def classify(
     predicted: NDArray[np.float32],
     focal: float,
     empty: NDArray[np.bool_] | np.bool_ = np.False_,
+    dropout: NDArray[np.bool_] | np.bool_ = np.False_,
 ) -> Visibility:
     """Classifies the pixels of one depth image by connected surfaces.
 
@@ -64,6 +67,7 @@ def classify(
         predicted: radial distances of the predicted mesh [m], infinite beside it.
         focal: focal length of the camera [px].
         empty: missing returns (height, width) that show the background, see `Background`.
+        dropout: missing returns of single pixels, see `dropouts`.
     """
     distance, predicted = (np.ascontiguousarray(image, np.float32) for image in (distance, predicted))
     labels, count = connected_surfaces(distance, LARGEST_STEP_M)
@@ -71,16 +75,16 @@ def classify(
     _recognize(distance, predicted, labels, is_object)
     nothing = np.zeros(distance.shape, np.bool_)
     if not is_object.any():
-        return Visibility(nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
+        return Visibility(nothing, nothing, nothing, nothing, np.zeros(distance.shape, np.float32))
     near = _extended(predicted)
     shown, before, solid, behind, missing = (np.empty(distance.shape, np.bool_) for _ in range(5))
     _compare(distance, near, labels, is_object, shown, before, solid, behind, missing)
     foreground = before & (cv2.dilate(solid.view(np.uint8), np.ones((3, 3))) > 0)
-    hole, past = nothing, nothing
+    hole, past, single = nothing, nothing, missing & dropout
     if missing.any():
-        hole, past = _holes(missing, np.isfinite(predicted), near / focal, empty)
+        hole, past = _holes(missing & ~single, np.isfinite(predicted), near / focal, empty)
     away = _depth_inside(~shown) * near / np.float32(focal)
-    return Visibility(shown, foreground, hole, np.where(behind | past, away, np.float32(0)))
+    return Visibility(shown, foreground, hole, single, np.where(behind | past, away, np.float32(0)))
 
 
 @kernel
