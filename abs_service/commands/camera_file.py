@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from abs_service.config.camera import PoseTable
 from abs_service.config.problems import Key, from_pydantic
 from calib.camera import Camera
-from calib.lenses import LensName, lens_of
+from calib.lenses.by_name import LensName, lens_of
 
 Size = Annotated[int, Field(ge=1, le=65535)]
 Focal = Annotated[FiniteFloat, Field(gt=0)]

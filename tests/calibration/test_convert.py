@@ -13,7 +13,7 @@ from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 
 TOF = Camera(176, 144, 220.1, 221.7, 87.3, 71.9, Lens(np.array([-0.2, 0.03])))
 NOISE = {"type": "tof_amplitude", "sigma": [0.0015], "sigma_amplitude": 9.0}

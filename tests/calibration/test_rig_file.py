@@ -24,8 +24,8 @@ from abs_service.commands import calibrations
 from abs_service.report.provenance import DataFile, Provenance
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 
 PROVENANCE = Provenance('abs-service calibrate rig "a b"', "2026-11-21T12:00:00Z", "0.1.0", (DataFile("x/", "ab"),))
 TOF = Camera(176, 144, 220.1, 221.7, 87.3, 71.9, Lens(np.array([-0.2, 0.03, 0, 1e-4])))

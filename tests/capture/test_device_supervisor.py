@@ -27,7 +27,7 @@ from abs_service.commands.rig_devices import HeadError, SettingError
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
+from calib.lenses.fisheye import KannalaBrandt
 from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.contract.device import AddressError, DeviceError, DeviceInfo, DeviceState

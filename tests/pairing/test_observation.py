@@ -10,7 +10,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.tracking.observer import Observer
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.measured import Measured

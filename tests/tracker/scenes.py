@@ -12,8 +12,8 @@ from abs_service.tracker.synthesis.base import Synthesis
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.rig import Rig, Sensor
 

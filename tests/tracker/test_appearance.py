@@ -8,7 +8,7 @@ from abs_service.tracker.appearance import with_appearance
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant

@@ -21,7 +21,7 @@ from abs_service.tracker.terms.depth.depth_cost import FREE_SCALE_M, write_const
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.structured_light import StructuredLight

@@ -17,7 +17,7 @@ from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.shadow import Shadow
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from tests.tracker.scenes import CAMERA, as_surface, depth_image, flat, plane_distance, sheet, sparse

@@ -10,8 +10,8 @@ from calib.board.corners.detection import Detection
 from calib.board.corners.errors import BoardError
 from calib.board.corners.to_8bit import grey
 from calib.board.target import Target
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.views import CornerView, PlaneView
 
 #: Tolerance of the predicted board position in a sensor without image, by prior cameras [px].
 _SLACK_PX = 8.0

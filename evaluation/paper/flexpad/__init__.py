@@ -16,7 +16,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracking.plan import OptimizerSettings
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.tof_amplitude import TofAmplitude
 from calib.pose import Pose
 from calib.rig import Rig, Sensor

@@ -10,7 +10,7 @@ from scipy import stats
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate

@@ -11,7 +11,7 @@ from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.models.flexpad import Settings
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 
 CAMERA = Camera(
     320,

@@ -16,7 +16,7 @@ from abs_service.tracker.synthesis.rasterization.zbuffer import Samples, interpo
 from abs_service.tracker.synthesis.sparse import SparseView
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from tests.tracker.scenes import CAMERA, as_surface, sheet
 
 PINHOLE = dataclasses.replace(CAMERA, lens=Lens())

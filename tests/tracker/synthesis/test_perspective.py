@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.synthesis.perspective import SHORT_EDGE_PX, metres_per_pixel, project_with_slopes
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from tests.tracker.scenes import CAMERA, FISHEYE, sheet
 
 RATIONAL = Camera(

@@ -19,7 +19,7 @@ from abs_service.tracker.terms.photometric.illumination import Active, Passive
 from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial

@@ -15,7 +15,7 @@ from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant

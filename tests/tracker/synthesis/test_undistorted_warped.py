@@ -11,7 +11,7 @@ from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.synthesis import undistorted, warped
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Rig, Sensor

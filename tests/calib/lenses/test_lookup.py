@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calib import lookup
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensError
+from calib.lenses import lookup
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensError
 
 LENSES = {
     "pinhole": Lens(),

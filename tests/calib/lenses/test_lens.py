@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calib.lens import Lens, LensError
+from calib.lenses.lens import Lens, LensError
 from tests import reference
 
 #: A webcam, an Azure Kinect's depth camera (rational, wide), and numbers without a fish-eye's extremes.

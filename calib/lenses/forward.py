@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.fisheye import KannalaBrandt
 from calib.jit import composed, kernel
-from calib.lens import LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import LensModel
 
 #: Below this radius, in normalised coordinates, fisheye distortion vanishes in single precision.
 _ON_AXIS = 1e-4

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensError
-from calib.lenses import lens_of
+from calib.lenses.by_name import lens_of
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensError
 from tests import reference
 
 #: An equidistant lens, a wide one, and one whose image folds back before 90°.

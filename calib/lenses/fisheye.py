@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lens import FARTHEST, padded, require_inverse
+from calib.lenses.lens import FARTHEST, padded, require_inverse
 
 COEFFICIENTS = ("k1", "k2", "k3", "k4")
 

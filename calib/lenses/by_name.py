@@ -5,8 +5,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensError, LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensError, LensModel
 
 #: Values of `lens_model`.
 LensName = Literal["brown_conrady", "fisheye"]

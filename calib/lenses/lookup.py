@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.lens import LensError, LensModel
+from calib.lenses.lens import LensError, LensModel
 
 #: Largest error of the inverse at a pixel centre [px].
 ACCURACY_PX = 1e-3
