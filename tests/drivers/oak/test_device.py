@@ -15,14 +15,16 @@ import pytest
 from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Kind
-from drivers.oak import discover, eeprom, library, live, open_device, pipelines, playback
+from drivers.oak import discover, library, open_device
 from drivers.oak.address import parse
+from drivers.oak.cameras import eeprom
 from drivers.oak.controls import make
 from drivers.oak.device import OakDevice
-from drivers.oak.messages import Queue, from_img_frame
-from drivers.oak.picture import Picture
-from drivers.oak.recording import OakRecording
+from drivers.oak.images.messages import Queue, from_img_frame
+from drivers.oak.images.picture import Picture
+from drivers.oak.images.recording import OakRecording
 from drivers.oak.roles import ROLES
+from drivers.oak.source import live, pipelines, playback
 from drivers.simulated.address import parse as parse_simulated
 from tests.drivers.recording_sink import RecordingSink
 from tests.sample import oak

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from drivers.oak.picture import Picture, PictureError, number
+from drivers.oak.images.picture import Picture, PictureError, number
 
 _NS = timedelta(microseconds=1)
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
-from drivers.oak.eeprom import Poses
-from drivers.oak.picture import Picture, camera
+from drivers.oak.cameras.eeprom import Poses
+from drivers.oak.images.picture import Picture, camera
 from drivers.oak.roles import REFERENCES, Role
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 from drivers.contract.clock import Stamp
 from drivers.contract.device import AddressError, DeviceInfo
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.oak import library, recording
+from drivers.oak import library
 from drivers.oak.address import Address
-from drivers.oak.connection import Connection
-from drivers.oak.eeprom import EepromError
-from drivers.oak.messages import OutputQueue
+from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak.images import recording
+from drivers.oak.images.messages import OutputQueue
 from drivers.oak.roles import Role
+from drivers.oak.source.connection import Connection
 
 #: Depth of the image queues; the newest images are kept.
 _QUEUE = 4

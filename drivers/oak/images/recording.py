@@ -21,10 +21,10 @@ from calib import pose
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.oak import eeprom
-from drivers.oak.eeprom import NO_SOCKET, UNITS_M, EepromError, Extrinsics, Poses
-from drivers.oak.heads import cameras
-from drivers.oak.picture import Picture, PictureError, frame, number
+from drivers.oak.cameras import eeprom
+from drivers.oak.cameras.eeprom import NO_SOCKET, UNITS_M, EepromError, Extrinsics, Poses
+from drivers.oak.cameras.heads import cameras
+from drivers.oak.images.picture import Picture, PictureError, frame, number
 from drivers.oak.roles import ROLES, Role
 
 SCHEMA = "dai.proto.img_frame.ImgFrame"
