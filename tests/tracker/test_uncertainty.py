@@ -14,7 +14,7 @@ from abs_service.tracker.posterior.covariance import leverages, propagated, scor
 from abs_service.tracker.posterior.curvature import gauss_newton, posterior_covariance
 from abs_service.tracker.terms.linearization import Linearization, stack
 from abs_service.tracking.observer import Observer
-from abs_service.tracking.vertex_offsets import FixedOffsets, LearntOffsets
+from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, LearntOffsets
 from evaluation.method.posterior import coverage
 from tests.tracker.driving import frame_set, posterior_of
 from tests.tracker.scenes import CAMERA, plane_distance, sheet

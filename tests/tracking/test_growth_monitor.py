@@ -1,7 +1,7 @@
 """When a mesh that began partly covered is made anew."""
 
 from abs_service.tracker.terms.base import RimFit, SensorFit
-from abs_service.tracking.growth_monitor import GrowthMonitor
+from abs_service.tracking.monitors.growth_monitor import GrowthMonitor
 
 SECOND_NS = 10**9
 

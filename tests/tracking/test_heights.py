@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from abs_service.pairing.images import DepthImage
-from abs_service.tracking.heights import HeightSensor
+from abs_service.tracking.offsets.heights import HeightSensor
 from calib import pose
 from calib.noise.constant import Constant
 from tests.tracking.offset_sheet import CAMERA, NOISE, SIGMA, flat_mesh, image

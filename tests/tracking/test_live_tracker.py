@@ -17,7 +17,7 @@ from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.regions import box
 from abs_service.tracker.optimizers import cma
 from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
-from abs_service.tracking.noise_monitor import NoiseMonitor
+from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import TrackingSession, streams
 from drivers.contract.frame import Kind
 from drivers.encoding import codec

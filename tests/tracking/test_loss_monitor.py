@@ -7,7 +7,7 @@ import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.terms.base import RimFit, SensorFit
-from abs_service.tracking.loss_monitor import LossMonitor, Settings
+from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession
 from drivers.contract.frame import Frame, Kind
 from tests.tracker.driving import default_plan, drive, rig_of, simulate

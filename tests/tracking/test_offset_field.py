@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.tracking.offset_field import OffsetField, Prior, change_prior, relief_prior
+from abs_service.tracking.offsets.offset_field import OffsetField, Prior, change_prior, relief_prior
 from tests.tracking.offset_sheet import flat_mesh
 
 MESH = flat_mesh()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracker.detection.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracking.stiffness import (
+from abs_service.tracking.bending_stiffness.stiffness import (
     LEAST_FRAMES,
     InclinationProfile,
     StiffnessError,

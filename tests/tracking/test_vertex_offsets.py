@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.tracking import vertex_offsets
-from abs_service.tracking.heights import HeightSensor
-from abs_service.tracking.offset_field import change_prior, relief_prior
-from abs_service.tracking.vertex_offsets import FixedOffsets, LearntOffsets, Settings, folded
+from abs_service.tracking.offsets import vertex_offsets
+from abs_service.tracking.offsets.heights import HeightSensor
+from abs_service.tracking.offsets.offset_field import change_prior, relief_prior
+from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, LearntOffsets, Settings, folded
 from tests.tracking.offset_sheet import CAMERA, COLUMNS, NOISE, ROWS, SENSOR, SIGMA, Flat, flat_mesh, image, relief_z
 from tests.tracking.test_offset_field import dense
 

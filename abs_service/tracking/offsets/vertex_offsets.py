@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
-from abs_service.tracking.heights import HeightSensor
-from abs_service.tracking.offset_field import OffsetField, change_prior, relief_prior
+from abs_service.tracking.offsets.heights import HeightSensor
+from abs_service.tracking.offsets.offset_field import OffsetField, change_prior, relief_prior
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
 from calib.rig import Sensor

@@ -10,16 +10,16 @@ from abs_service.tracker.detection.elastica import heavy_elastica
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.models.gravity import Gravity
-from abs_service.tracking.observer import Observer
-from abs_service.tracking.plan import Plan
-from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.stiffness import (
+from abs_service.tracking.bending_stiffness.stiffness import (
     InclinationProfile,
     Stiffness,
     StiffnessError,
     inclination_profile,
     predicted_tip,
 )
+from abs_service.tracking.observer import Observer
+from abs_service.tracking.plan import Plan
+from abs_service.tracking.session import TrackingSession
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.replay import Recording
