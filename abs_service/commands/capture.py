@@ -19,7 +19,7 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.capture.device_supervisor import DeviceSupervisor
-from abs_service.commands import rig_devices, rig_process
+from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.config import plugins
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit

@@ -26,7 +26,7 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.supervision import gc_tuning

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from abs_service.commands import import_file
+from abs_service.commands.images import import_file
 from calib.board.target import Target
 from calib.camera import Camera
 from calib.pose import Pose

@@ -8,7 +8,7 @@ import pytest
 
 from abs_service import cli
 from abs_service.calibration.files import target_file
-from abs_service.commands import calibrations
+from abs_service.commands.calibrate import calibrations
 from calib import pose
 from tests.calibration.simulated import Filmed, record, scene
 

@@ -21,9 +21,9 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor, sensor_metadata, stall_detector
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from abs_service.commands import capture as command
-from abs_service.commands import rig_devices
 from abs_service.commands.capture import MetadataPublisher
-from abs_service.commands.rig_devices import HeadError, SettingError
+from abs_service.commands.parts import rig_devices
+from abs_service.commands.parts.rig_devices import HeadError, SettingError
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.camera import Camera

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from abs_service.bus.session import BusError
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from dataclasses import replace
 from queue import Empty, SimpleQueue
 
 from abs_service import config, wiring
-from abs_service.commands import rig_devices
+from abs_service.commands.parts import rig_devices
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.rig import Rig
 from drivers import opening

@@ -37,8 +37,8 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from abs_service.commands import camera_file, import_file
-from abs_service.commands.camera_file import CameraFile
+from abs_service.commands.images import camera_file, import_file
+from abs_service.commands.images.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.frame import Geometry
 from drivers.encoding.foreign_recording import ForeignRecording
