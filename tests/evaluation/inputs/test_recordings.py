@@ -11,17 +11,9 @@ import pytest
 from calib.camera import Camera
 from evaluation.experiment import Context, UnavailableError
 from evaluation.inputs import recordings
-from evaluation.inputs.recordings import (
-    azure,
-    dropouts,
-    kinect_paper,
-    kinect_paper_report,
-    sigma_image,
-    sigma_report,
-    sponge_report,
-    toy,
-)
+from evaluation.inputs.recordings import azure, kinect_paper, kinect_paper_report, sigma_image, sigma_report
 from evaluation.inputs.recordings.agreement import agreement
+from evaluation.inputs.recordings.toy import dropouts, sponge_report, toy
 
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
 
@@ -34,7 +26,7 @@ def folder(shared_data: Path, name: str) -> Path:
 
 def test_the_toy_is_tracked_with_the_example_that_users_are_given():
     example = Path(__file__).parents[3] / "examples" / "image_folder.toml"
-    own = resources.files(recordings).joinpath("toy.toml").read_text(encoding="utf-8")
+    own = resources.files("evaluation.inputs.recordings.toy").joinpath("toy.toml").read_text(encoding="utf-8")
     assert tomllib.loads(own) == tomllib.loads(example.read_text(encoding="utf-8"))
 
 

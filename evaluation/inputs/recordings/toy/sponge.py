@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from evaluation.inputs.recordings import features
 from evaluation.inputs.recordings.binding import bind_rays, normals
-from evaluation.inputs.recordings.toy import CAMERA, ReferenceFrame, TrackedFrame
+from evaluation.inputs.recordings.toy.toy import CAMERA, ReferenceFrame, TrackedFrame
 
 #: Vertices farther than this from what is measured of the object are off it [m].
 OFF_M = 0.02

@@ -12,10 +12,10 @@ from matplotlib.colors import Normalize
 from abs_service.report import plots
 from abs_service.report.content import Cell, Column, Picture, Section, Table, drawing
 from evaluation.experiment import Findings, Goal, at_least, at_most
-from evaluation.inputs.recordings import dropouts
 from evaluation.inputs.recordings.agreement import vertex_errors
-from evaluation.inputs.recordings.dropouts import Pace
-from evaluation.inputs.recordings.toy import CAMERA, RATE_HZ, Toy, TrackedFrame, medians, worst
+from evaluation.inputs.recordings.toy import dropouts
+from evaluation.inputs.recordings.toy.dropouts import Pace
+from evaluation.inputs.recordings.toy.toy import CAMERA, RATE_HZ, Toy, TrackedFrame, medians, worst
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.contract.frame import FrameSet, Kind
-from evaluation.inputs.recordings.toy import RATE_HZ, Change, TrackedFrame
+from evaluation.inputs.recordings.toy.toy import RATE_HZ, Change, TrackedFrame
 
 #: An estimate has recovered when its forward residual is at most this many times that of the undisturbed run.
 RECOVERED = 1.25

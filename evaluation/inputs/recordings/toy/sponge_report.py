@@ -9,9 +9,9 @@ import numpy as np
 
 from abs_service.report.content import Column, Section, Table
 from evaluation.experiment import Findings, Goal, at_most
-from evaluation.inputs.recordings import sponge
-from evaluation.inputs.recordings.sponge import MeshState
-from evaluation.inputs.recordings.toy import Toy, TrackedFrame
+from evaluation.inputs.recordings.toy import sponge
+from evaluation.inputs.recordings.toy.sponge import MeshState
+from evaluation.inputs.recordings.toy.toy import Toy, TrackedFrame
 
 #: What is wanted, written before the first run: residuals of the median frame, folds and edges of the worst, and the
 #: drift in the last, which is frame 120 of the full experiment.
