@@ -11,7 +11,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from drivers.contract.device import Device
-from tests.bus.loopback import LoopbackBus
+from tests.abs_service.bus.loopback import LoopbackBus
 from tests.drivers.conformance import benches
 from tests.drivers.conformance.bench import Bench, Fault, eventually
 from tests.drivers.recording_sink import RecordingSink
