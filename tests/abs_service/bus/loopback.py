@@ -3,7 +3,10 @@
 import fnmatch
 from collections.abc import Callable
 
+from absmsg.v1.health_pb2 import Health as HealthMessage
+
 from abs_service.bus.contract import Publisher, Qos, Sample, Subscription
+from abs_service.bus.health import Health
 
 
 class LoopbackBus:
@@ -55,6 +58,12 @@ class LoopbackBus:
         for pattern, on_sample in list(self._subscribers):
             if _hit(sample.topic, pattern):
                 on_sample(sample)
+
+
+def health_now(health: Health, bus: LoopbackBus) -> HealthMessage:
+    """The health as a subscriber would receive it now."""
+    health.publish()
+    return HealthMessage.FromString([sample for sample in bus.sent if sample.topic.startswith("health/")][-1].payload)
 
 
 class _Publisher:

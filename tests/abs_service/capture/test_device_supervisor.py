@@ -34,7 +34,8 @@ from drivers.contract.device import AddressError, DeviceError, DeviceInfo, Devic
 from drivers.contract.frame import Frame, Kind
 from drivers.encoding.codec import CodecError
 from drivers.encoding.sensor_model import decode_camera
-from tests.abs_service.bus.loopback import LoopbackBus
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.waiting import eventually
 
 CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
 
@@ -110,7 +111,7 @@ def keep(monkeypatch, asked):
         )
         supervisors.append(supervisor)
         supervisor.start()
-        return supervisor, collector, health
+        return supervisor, collector, lambda: health_now(health, bus)
 
     yield keep
     for supervisor in supervisors:
@@ -134,31 +135,23 @@ def working():
     return FakeDevice(start=lambda sink: (sink.on_state(DeviceState.STREAMING, ""), sink.on_frame(frame())))
 
 
-def eventually(condition):
-    for _ in range(500):
-        if condition():
-            return True
-        threading.Event().wait(0.01)
-    return False
-
-
 def test_a_failed_device_is_opened_again_in_a_later_epoch(keep):
     _, collector, health = keep(failing("unplugged"), working)
     first, second = collector.frames.get(timeout=5), collector.frames.get(timeout=5)
     assert (first.sensor, second.sensor) == ("tof", "tof")
     assert second.epoch > first.epoch
-    assert eventually(lambda: health.level == Level.OK)
-    assert health._counters["device.sim.reconnects"] == 1
-    assert eventually(lambda: health._counters["device.sim.frames"] == 2), "both devices count one frame"
-    assert eventually(lambda: health._labels["device.sim"] == "streaming")
+    assert eventually(lambda: health().level == Message.LEVEL_OK)
+    assert health().counters["device.sim.reconnects"] == 1
+    assert eventually(lambda: health().counters["device.sim.frames"] == 2), "both devices count one frame"
+    assert eventually(lambda: health().labels["device.sim"] == "streaming")
 
 
 def test_a_device_error_is_reported_until_the_device_can_be_opened(keep):
     _, collector, health = keep(no_device, working)
-    assert eventually(lambda: health.level == Level.ERROR)
-    assert health._conditions["device sim"][1] == "sim: no such device; plug it in; trying again in 0.2 s"
+    assert eventually(lambda: health().level == Message.LEVEL_ERROR)
+    assert health().message == "sim: no such device; plug it in; trying again in 0.2 s"
     assert collector.frames.get(timeout=5)
-    assert eventually(lambda: health.level == Level.OK)
+    assert eventually(lambda: health().level == Message.LEVEL_OK)
 
 
 def test_an_address_that_no_device_can_have_is_refused(keep):
@@ -184,11 +177,11 @@ def test_a_device_that_falls_silent_is_stalled_and_then_opened_again(keep, monke
     monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
     _, collector, health = keep(working, working)
     first = collector.frames.get(timeout=5)
-    assert eventually(lambda: health._labels["device.sim"] == "stalled")
-    assert health._conditions["device sim"][0] == Level.WARNING
-    assert "head/image delivers nothing for" in health._conditions["device sim"][1]
+    assert eventually(lambda: health().labels["device.sim"] == "stalled")
+    assert health().level == Message.LEVEL_WARNING
+    assert "head/image delivers nothing for" in health().message
     assert collector.frames.get(timeout=5).epoch > first.epoch
-    assert health._counters["device.sim.stalls"] >= 1
+    assert health().counters["device.sim.stalls"] >= 1
 
 
 def test_only_the_same_serial_number_is_accepted_after_a_reconnect(keep, asked):
@@ -197,7 +190,7 @@ def test_only_the_same_serial_number_is_accepted_after_a_reconnect(keep, asked):
 
     _, collector, health = keep(failing("unplugged"), other, working)
     collector.frames.get(timeout=5)
-    assert eventually(lambda: "is device 2 now; 1 is awaited" in health._conditions["device sim"][1])
+    assert eventually(lambda: "is device 2 now; 1 is awaited" in health().message)
     assert collector.frames.get(timeout=5)
     assert asked == ["fake://", "fake://1", "fake://1"], "by its serial number, though the address has none"
 
@@ -213,11 +206,11 @@ def test_warnings_and_gauges_of_a_device_are_in_the_health(keep):
     )
     sinks = []
     _, _, health = keep(lambda: device)
-    assert eventually(lambda: health.level == Level.WARNING)
-    assert health._conditions["device sim usb speed"][1] == "sim: USB 2 only; use a blue port"
-    assert health._gauges["device.sim.temperature_c"] == 41.5
+    assert eventually(lambda: health().level == Message.LEVEL_WARNING)
+    assert health().message == "sim: USB 2 only; use a blue port"
+    assert health().gauges["device.sim.temperature_c"] == 41.5
     sinks[0].on_warning("usb speed", "")
-    assert eventually(lambda: health.level == Level.OK)
+    assert eventually(lambda: health().level == Message.LEVEL_OK)
 
 
 def test_a_control_is_set_at_every_opening_and_a_wrong_one_is_explained():
@@ -251,7 +244,7 @@ def test_frames_of_heads_that_are_not_configured_are_counted_and_dropped(keep):
     device = FakeDevice(start=lambda sink: [sink.on_frame(frame(sensor)) for sensor in ("other", "other", "head")])
     _, collector, health = keep(lambda: device)
     assert collector.frames.get(timeout=5).sensor == "tof"
-    assert eventually(lambda: health._counters["device.sim.unwanted"] == 2)
+    assert eventually(lambda: health().counters["device.sim.unwanted"] == 2)
     assert collector.frames.empty()
 
 
@@ -260,7 +253,7 @@ def test_a_device_at_its_end_is_not_opened_again(keep):
     supervisor, _, health = keep(lambda: device)
     assert eventually(lambda: supervisor.finished)
     assert device.closed.wait(5)
-    assert health.level == Level.OK
+    assert health().level == Message.LEVEL_OK
 
 
 def test_a_device_that_does_not_fit_is_refused_and_closed(keep):
@@ -290,7 +283,7 @@ def test_a_device_that_opens_after_the_end_is_closed_and_not_announced(keep):
     assert device.closed.wait(5)
     assert not announced
     assert supervisor.fatal_error is None
-    assert health.level == Level.OK
+    assert health().level == Message.LEVEL_OK
 
 
 def test_what_fails_after_the_end_is_no_error_of_the_rig(keep):
@@ -384,8 +377,8 @@ def test_a_step_of_the_wall_clock_is_reported_once(metadata):
     for step_ns in (0, 3600 * 10**9, 0):
         now["monotonic"] += 10**9
         now["wall"] += 10**9 + step_ns
-        command._tick(metadata, {}, health, clock)
-        levels.append((health.level, health._counters["clock_steps"]))
+        command.tick(metadata, {}, health, clock)
+        levels.append((health.level, health_now(health, bus).counters["clock_steps"]))
     assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
     said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]
     assert "the wall clock was set by +3600.000 s; stamps follow it" in said

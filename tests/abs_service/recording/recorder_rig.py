@@ -1,7 +1,5 @@
 """A rig on a loopback bus with a recorder, and how to read what it recorded."""
 
-from collections import Counter
-
 import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -14,7 +12,7 @@ from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
-from tests.abs_service.bus.loopback import LoopbackBus
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
 
 DEPTH = keys.image("tof", "depth")
 
@@ -39,7 +37,8 @@ class Rig:
 
     @property
     def said(self):
-        return Counter(self.health._counters), self.health._conditions
+        """The health; asked for after the recorder's end, because a recorder records it, too."""
+        return health_now(self.health, self.bus)
 
 
 def depth(seq, stream="depth"):

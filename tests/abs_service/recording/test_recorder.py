@@ -78,7 +78,7 @@ def test_what_is_no_message_of_ours_is_refused_and_does_not_end_the_recording(tm
     rig.bus.deliver(Sample(DEPTH, codec.IMAGE_SCHEMA, b"", b"\xff\xff"))
     rig.publish_image(depth(2))
     rig.recorder.stop(5)
-    counters, _ = rig.said
+    counters = rig.said.counters
     assert counters["refused"] == 5
     assert counters["recorded"] == 2
     assert not rig.recorder.failed

@@ -4,6 +4,7 @@ import queue
 import threading
 
 from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
+from tests.waiting import eventually
 
 
 class SlowFile:
@@ -40,13 +41,13 @@ def test_a_slow_disk_costs_a_bounded_queue_and_every_drop_is_counted(tmp_path):
     files[0].entered.get(timeout=5)
     for seq in range(1, 101):
         rig.publish_image(depth(seq))
-    rig.recorder.report()
-    counters, conditions = rig.said
-    dropped = counters[f"dropped.{DEPTH}"]
-    assert 80 < dropped < 100
-    assert conditions["queue"][1] == f"the disk is too slow: {dropped} messages dropped"
     files[0].release.set()
     rig.recorder.stop(5)
+    rig.recorder.report()
+    said = rig.said
+    dropped = said.counters[f"dropped.{DEPTH}"]
+    assert 80 < dropped < 100
+    assert said.message == f"the disk is too slow: {dropped} messages dropped"
     (path,) = recordings(tmp_path)
     written = [m for m in read(path)[0] if m.channel.topic == f"/{DEPTH}"]
     assert len(written) + dropped == 101
@@ -58,12 +59,12 @@ def test_it_stops_before_the_disk_is_full_with_a_complete_file(tmp_path):
     rig = Rig(tmp_path, free_bytes=lambda folder: next(free, 999), minimum_free_bytes=1000, flush_s=0.005)
     rig.recorder.start()
     rig.publish_image(depth(1))
-    rig.recorder._thread.join(5)
+    assert eventually(lambda: rig.recorder.failed)
+    rig.recorder.stop(5)
     assert rig.recorder.failed.startswith("only 0 MB free in")
-    assert rig.said[1]["record"][1].startswith("RECORD_FAILED only 0 MB free")
+    assert rig.said.message.startswith("RECORD_FAILED only 0 MB free")
     (path,) = recordings(tmp_path)
     assert metadata(path)["ended"] == "low space"
-    rig.recorder.stop(5)
 
 
 def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered(tmp_path):
@@ -76,20 +77,20 @@ def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered(tmp_path
     rig = Rig(tmp_path, open_file=Full, flush_s=0.005)
     rig.recorder.start()
     seq = 0
-    while rig.recorder._thread.is_alive():
+    while not rig.recorder.failed:
         rig.publish_image(depth(seq := seq + 1))
         threading.Event().wait(0.001)
     assert rig.recorder.failed == "[Errno 28] No space left on device"
-    assert rig.said[1]["record"][1] == "RECORD_FAILED [Errno 28] No space left on device"
-    assert recordings(tmp_path) == []
-    assert len(list(tmp_path.glob("*.mcap.active"))) == 1
     rig.publish_image(depth(0))  # harmless
     rig.recorder.stop(5)
+    assert rig.said.message == "RECORD_FAILED [Errno 28] No space left on device"
+    assert recordings(tmp_path) == []
+    assert len(list(tmp_path.glob("*.mcap.active"))) == 1
 
 
 def test_a_folder_that_is_gone_is_an_error_like_any_other(tmp_path):
     rig = Rig(tmp_path / "nowhere")
     rig.recorder.start()
-    rig.recorder._thread.join(5)
-    assert "No such file or directory" in rig.recorder.failed
+    assert eventually(lambda: rig.recorder.failed)
     rig.recorder.stop(5)
+    assert "No such file or directory" in rig.recorder.failed

@@ -22,12 +22,12 @@ from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.conformance.bench import eventually
 from tests.drivers.kinect1.emulation import usb_descriptors
 from tests.drivers.kinect1.emulation.bit_packing import unpack
 from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect, noise
 from tests.drivers.kinect1.emulation.fake_usb import FakeBackend, FakeDevice, FakeReader
 from tests.drivers.recording_sink import RecordingSink
+from tests.waiting import eventually
 
 SERIAL = "A00363A01234040A"
 BOTH = (Stream.DEPTH, Stream.COLOR)
