@@ -123,7 +123,7 @@ class LearntOffsets:
         self._field = OffsetField(mesh)
         self._first = self._mean = self._offset = np.array(model.offset, np.float64)
         self._precision = 1 / self.variance
-        self._around = _edges_around(mesh)
+        self._around = edges_around(mesh)
         self._prior = relief_prior(self._first, deviation, mesh, len(model.rest))
         self._t_ns: int | None = None
 
@@ -193,7 +193,7 @@ def _mark_folded(
             result[a] = result[b] = result[c] = True
 
 
-def _edges_around(mesh: Mesh) -> NDArray[np.float64]:
+def edges_around(mesh: Mesh) -> NDArray[np.float64]:
     """Mean length (n,) [m] of every vertex's edges."""
     ends = mesh.edges
     length = edge_lengths(mesh.vertices, ends)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numba.core.event import install_recorder
 
 import abs_service as a
 from tests.abs_service.api.scenes import CAMERA, NOISE, Sheet
@@ -187,7 +188,11 @@ def test_a_search_may_be_limited_in_time():
 
 @pytest.mark.slow
 def test_kernels_can_be_compiled_before_the_first_frame():
-    a.Tracker(CAMERA, a.Rigid(), noise=NOISE).warm_up()
+    tracker = a.Tracker(CAMERA, a.Rigid(), noise=NOISE)
+    tracker.warm_up()
+    with install_recorder("numba:compile") as compiled:
+        assert tracker.track(Sheet().depth(), time_s=0).status == a.Status.TRACKING
+    assert compiled.buffer == []
 
 
 def test_what_the_tracker_goes_on_with_cannot_be_written_to():

@@ -11,6 +11,7 @@ from drivers.contract.frame import Frame
 from drivers.opening import available, open_device
 from drivers.simulated.address import Address, parse
 from drivers.simulated.device import SimulatedDevice
+from tests.waiting import eventually
 
 
 @dataclass
@@ -130,8 +131,7 @@ def test_a_sink_may_stop_the_device_itself() -> None:
     device = SimulatedDevice("", parse(f"simulated://sheet?{SMALL}").build(), time.clock, time.wait)
     sink = Impatient(1)
     device.start(sink)
-    device._thread.join(60)
-    assert sink.states[-1] == DeviceState.CLOSED
+    assert eventually(lambda: sink.states[-1] == DeviceState.CLOSED, 60)
     assert len(sink.truths) == 1
 
 
@@ -149,8 +149,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
         "ir/ir",
         "barrier/binary",
     ]
-    assert isinstance(device, SimulatedDevice)
-    frames, _ = device._simulation.expose(0)
+    frames, _ = parse(uri).build().expose(0)
     for stream, frame in zip(device.capabilities.streams, frames, strict=True):
         camera = device.cameras[stream.sensor]
         assert (frame.kind, frame.encoding, frame.calib_id) == (stream.kind, stream.encoding, camera.calib_id)

@@ -173,13 +173,13 @@ def test_what_lies_behind_the_mesh_itself_is_no_sample():
 
 def test_interpolation_is_the_weighted_sum_of_the_corners():
     generator = np.random.default_rng(3)
-    surface = moved([0.2, -0.3, 0.1, 0.01, 0, 0.02], [0.1, 0.2, 0, 0, 0, 0.1])
-    dense = view(CAMERA)
-    samples, _ = dense._render(surface)
+    face = generator.integers(0, len(MESH.faces), (2, 50)).astype(np.int32)
+    weights = generator.dirichlet(np.ones(3), (2, 50)).astype(np.float32)
+    samples = Samples(np.ones_like(face), np.ones((2, 50), np.float32), face, weights, np.array([50, 50]))
     values = generator.normal(size=(2, len(MESH.vertices), 3)).astype(np.float32)
     corners = MESH.faces[samples.face]
     expected = np.stack([np.einsum("mi,mic->mc", samples.weights[k], values[k][corners[k]]) for k in range(2)])
-    np.testing.assert_allclose(interpolate(values, dense._faces, samples), expected, atol=1e-5)
+    np.testing.assert_allclose(interpolate(values, MESH.faces, samples), expected, atol=1e-5)
 
 
 def test_both_syntheses_see_the_same_surface():

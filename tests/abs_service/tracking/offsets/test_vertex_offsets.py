@@ -48,7 +48,7 @@ def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
     offset = np.linalg.solve(matrix, precision * mean)
     if random_walk:
         change = offsets.variance + random_walk**2 * 2.5
-        prior = change_prior(offset, change, 0.2 * np.median(vertex_offsets._edges_around(model.mesh)))
+        prior = change_prior(offset, change, 0.2 * np.median(vertex_offsets.edges_around(model.mesh)))
     for k in range(1, 6):
         np.testing.assert_allclose(model.offset, offset, atol=3e-6)
         picture = image(relief_z(relief) + SIGMA * generator.standard_normal(SHAPE))
@@ -114,7 +114,7 @@ def test_no_offset_moves_farther_than_half_an_edge():
     offsets = learnt(model, 1.0)  # a metre in a second: everything is believed
     for k in range(1, 100):
         offsets.update(image(1 - 2e-3 * k), model.surface, k * FRAME_NS)
-    most = 0.5 * vertex_offsets._edges_around(model.mesh)
+    most = 0.5 * vertex_offsets.edges_around(model.mesh)
     assert (np.abs(model.offset) <= 1.000001 * most).all()
     assert np.abs(model.offset).max() > 0.9 * most.min()
 
