@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState
+from drivers.contract.device import AddressError, ControlError, DeviceError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Geometry, Kind
 from drivers.kinect1 import udev
@@ -102,23 +102,6 @@ def test_controls_reach_the_camera(fake: FakeDevice) -> None:
     device.close()
     with pytest.raises(DeviceError, match="closed"):
         device.controls.get("infrared_gain")
-
-
-def test_an_unplugged_device_fails_and_can_be_reopened(fake: FakeDevice) -> None:
-    device, sink = opened(fake), RecordingSink()
-    device.start(sink)
-    sink.wait(lambda: len(sink.frames) > 0)
-    fake.plugged = False
-    assert "unplugged" in sink.wait_for(DeviceState.FAILED)
-    device.close()
-    with pytest.raises(DeviceError, match="no kinect1 device is attached"):
-        opened(fake)
-    fake.plugged = True
-    device, sink = opened(fake), RecordingSink()
-    device.start(sink)
-    sink.wait(lambda: len(sink.frames) > 0)
-    device.close()
-    assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
 
 
 def test_closing_in_the_sink_releases_the_camera(fake: FakeDevice) -> None:

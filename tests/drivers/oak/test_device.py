@@ -90,23 +90,6 @@ def has_frames(receiver: RecordingSink, epoch: int, number: int) -> bool:
     return sum(frame.epoch == epoch for frame in receiver.frames) >= number
 
 
-def test_a_lost_device_fails_and_releases_its_resources() -> None:
-    threads = len(os.listdir("/proc/self/task"))
-    receiver = RecordingSink()
-    connection = live_connection()
-    device = OakDevice(connection, time.monotonic_ns)
-    device.start(receiver)
-    receiver.wait(lambda: len(receiver.frames) > 5)
-    connection.close()
-    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.FAILED)
-    assert "the device is gone" in receiver.states[-1][1]
-    device.close()
-    deadline = time.monotonic() + 10
-    while len(os.listdir("/proc/self/task")) > threads and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert len(os.listdir("/proc/self/task")) <= threads
-
-
 def live_connection() -> Any:
     """A playback whose end is reported as the loss of a device."""
     return replace(playback.connect(parse(URI), SAMPLE), ended="")

@@ -1,8 +1,6 @@
 """The RealSense driver on librealsense itself: its software device, and its recorder and player."""
 
 import contextlib
-import os
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -111,40 +109,6 @@ def test_host_times_follow_the_exposures_and_a_restart_is_a_new_epoch(
     device.close()
     with pytest.raises(DeviceError, match="closed"):
         device.start(receiver)
-
-
-def test_the_sink_may_stop_the_device(camera: SoftwareCamera, device: RealsenseDevice) -> None:
-    class Stopper(RecordingSink):
-        def on_frame(self, frame: Any) -> None:
-            super().on_frame(frame)
-            device.stop()
-
-    receiver = Stopper()
-    camera.run()
-    device.start(receiver)
-    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.CLOSED)
-    assert receiver.settle() == 1
-
-
-def test_resources_are_released(camera: SoftwareCamera) -> None:
-    camera.run()
-    resources = []
-    for _ in range(6):
-        device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
-        receiver = RecordingSink()
-        device.start(receiver)
-        receiver.wait(lambda receiver=receiver: len(receiver.frames) > 0)
-        device.close()
-        resources.append(threading.active_count() + len(os.listdir("/proc/self/fd")))
-    assert resources[-1] <= resources[1]
-
-
-def test_a_lost_camera_fails(camera: SoftwareCamera, device: RealsenseDevice) -> None:
-    device._camera = SimpleNamespace(is_connected=lambda: False)
-    receiver = RecordingSink()
-    device.start(receiver)
-    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.FAILED)
-    assert receiver.states[-1] == (DeviceState.FAILED, "the camera is gone")
 
 
 def test_recordings_of_librealsense_are_played(tmp_path: Path, camera: SoftwareCamera) -> None:
