@@ -34,12 +34,6 @@ LARGE = (slice(50, 90), slice(20, 70), 0.06)
 SMALL = (slice(60, 85), slice(100, 130), 0.05)
 
 
-def box_of(selected: np.ndarray) -> tuple[int, int, int, int]:
-    """First and last row, first and last column."""
-    rows, columns = np.nonzero(selected)
-    return int(rows.min()), int(rows.max()), int(columns.min()), int(columns.max())
-
-
 def assert_is(selected: np.ndarray, thing: tuple[slice, slice, float]) -> None:
     """Only pixels of the thing, and all but its rim."""
     inside = np.zeros(selected.shape, bool)
