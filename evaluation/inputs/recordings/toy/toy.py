@@ -7,7 +7,6 @@ only.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 
 import cv2
@@ -27,6 +26,8 @@ from evaluation.inputs.recordings.agreement import Agreement, agreement
 #: From the data's own description: 320 × 240, focal length 275 px, centre (160, 120); depth is z in millimetres.
 CAMERA = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
 RATE_HZ = 30.0
+#: The configuration that users are given for such images.
+EXAMPLE = Path(__file__).parents[4] / "examples" / "image_folder.toml"
 FOLDER, TRACKER = "sl_rgbd_deform_petit", "toy"
 
 #: What the tracker is given in place of a frame set; None if it is to see nothing of that reference.
@@ -85,8 +86,8 @@ class Toy:
         names = ("depth_mm", "color", mask)
         depth, color, masks = (by_number(folder, f"{name}_*.png", RATE_HZ)[:frames] for name in names)
         images = ImageFolder({"depth": DepthImages(depth, CAMERA, 0.001), "color": ColorImages(color, CAMERA)})
-        text = resources.files(__name__.rpartition(".")[0]).joinpath("toy.toml").read_text(encoding="utf-8")
-        self._settings = config.loads(text.replace("mask.png", masks[0].path.resolve().as_posix()), "toy.toml", folder)
+        text = EXAMPLE.read_text(encoding="utf-8").replace("mask.png", masks[0].path.resolve().as_posix())
+        self._settings = config.loads(text, EXAMPLE.name, folder)
         self._rig = wiring.rig(self._settings, TRACKER, images.cameras)
         synchroniser = wiring.synchroniser(self._settings, TRACKER, self._rig.sensors.values())
         sets = list(synchroniser.group(images.frames()))
