@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections import Counter
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ from rich.console import Console
 from abs_service import cli
 from abs_service.calibration.files import target_file
 from abs_service.calibration.shots.collection import Collector
-from abs_service.calibration.shots.corner_extraction import BoardObservations, see_all
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.guide import LineGuide, coverage_map, draw
 from abs_service.calibration.shots.shot_sources import RecordingShots
 from abs_service.supervision.exit_codes import Exit
@@ -52,9 +53,11 @@ def test_a_capture_that_ends_early_says_what_is_missing_and_can_be_read_again(
     assert said["shots"] >= 1
     assert {missing["sensor"] for missing in said["missing"]} == {"depth_camera", "color"}
     recording = Recording(tmp_path / "board.mcap")
-    seen = see_all(TARGETS["chessboard"], RecordingShots(recording, every_s=0.5), recording.cameras)
-    assert {name: sum(v.sensor == name for v in seen.corners) for name in said["views"]} == said["views"]
-    assert {plane.sensor for plane in seen.planes} == {"depth_camera"}
+    shots = RecordingShots(recording, every_s=0.5)
+    seen = [see(TARGETS["chessboard"], shot, recording.cameras) for shot in shots]
+    corners = Counter(view.sensor for one in seen for view in one.corners)
+    assert {name: corners[name] for name in said["views"]} == said["views"]
+    assert {plane.sensor for one in seen for plane in one.planes} == {"depth_camera"}
     for name, size in (("depth_camera", (144, 176)), ("color", (480, 640))):
         picture = cv2.imread(str(tmp_path / f"board-{name}.png"))
         assert picture is not None

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.calibration.shots.corner_extraction import BoardObservations, see_all
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.live_shots import LiveShots, NamedDevice
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import SensorShot, Shot, ShotsError
@@ -38,7 +38,8 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 @pytest.fixture(scope="module")
 def seen(recording: Recording) -> BoardObservations:
-    return see_all(CHESSBOARD.target, RecordingShots(recording, every_s=0.1), recording.cameras)
+    shots = RecordingShots(recording, every_s=0.1)
+    return sum((see(CHESSBOARD.target, shot, recording.cameras) for shot in shots), BoardObservations())
 
 
 @pytest.mark.slow
@@ -91,7 +92,7 @@ def test_images_in_folders_are_paired_by_the_last_number_in_their_names(tmp_path
         (3, ["right"]),
         (10, ["left"]),
     ]
-    seen = see_all(CHESSBOARD.target, shots, {})
+    seen = sum((see(CHESSBOARD.target, shot, {}) for shot in shots), BoardObservations())
     assert [(view.shot, view.sensor) for view in seen.corners] == [
         (2, "left"),
         (2, "right"),
@@ -138,5 +139,5 @@ def test_a_saturated_amplitude_is_refused_although_its_corners_are_found() -> No
     image = photograph(CHESSBOARD.target, VGA, T_sb, black=0.2, white=1.3, noise=0.01)
     amplitude = np.clip(4095 * image, 0, 4095).astype(np.uint16)
     shot = Shot(0, {"tof": SensorShot(0, amplitude, amplitude, own_light=True)})
-    (why,) = see_all(CHESSBOARD.target, [shot], {}).rejected.values()
+    (why,) = see(CHESSBOARD.target, shot, {}).rejected.values()
     assert isinstance(why, errors.SaturatedError)

@@ -14,12 +14,11 @@ from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan, make_posterior
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.truth import Errors
-from calib.noise.color import GaussianColor
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
-from evaluation.sequences import TruthEvaluator, with_noise
+from evaluation.sequences import TruthEvaluator
 
 CONFIG = config.load_default()
 TRACKER = next(iter(CONFIG.trackers))
@@ -33,11 +32,6 @@ def default_plan(**changes: object) -> Plan:
 def rig_of(simulation: Simulation) -> Rig:
     """The default rig around a simulation's cameras."""
     return wiring.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
-
-
-def with_color_deviation(rig: Rig, sigma: float) -> Rig:
-    """A rig with a colour camera, whose colours deviate by `sigma` [levels of 256]."""
-    return with_noise(rig, "color", GaussianColor(sigma))
 
 
 def simulate(uri: str) -> Simulation:
