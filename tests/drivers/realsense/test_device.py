@@ -66,11 +66,9 @@ def test_every_stream_arrives_in_si_units_on_the_cameras_clock(camera: SoftwareC
     assert device.counters["frames"] == 20
 
 
-def test_the_extrinsics_of_the_colour_camera(device: RealsenseDevice) -> None:
+def test_the_extrinsics_of_the_colour_camera(camera: SoftwareCamera, device: RealsenseDevice) -> None:
     point = [0.1, -0.05, 0.8]
-    depth, color = (
-        stream.profile for used in device._used for stream in used.streams if stream.role.stream in {"depth", "color"}
-    )
+    depth, color = camera.profiles["depth"], camera.profiles["color"]
     moved = rs.rs2_transform_point_to_point(depth.get_extrinsics_to(color), point)
     expected = rs.rs2_project_point_to_pixel(color.get_intrinsics(), moved)
     np.testing.assert_allclose(device.cameras["color"].project(np.array(point)), expected, atol=1e-3)
@@ -80,7 +78,7 @@ def test_the_extrinsics_of_the_colour_camera(device: RealsenseDevice) -> None:
 def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> None:
     camera = SoftwareCamera(model=model)
     device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
-    intrinsics = device._used[0].streams[0].profile.get_intrinsics()
+    intrinsics = camera.profiles["depth"].get_intrinsics()
     for point in ([0.1, -0.05, 0.8], [-0.3, 0.2, 0.8]):
         expected = rs.rs2_project_point_to_pixel(intrinsics, point)
         np.testing.assert_allclose(device.cameras["depth"].project(np.array(point)), expected, atol=0.01)
