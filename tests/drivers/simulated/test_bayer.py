@@ -81,4 +81,4 @@ def test_the_colour_head_takes_two_rays_per_pixel_and_axis_of_a_fine_print() -> 
     simulation = build("texture=fine&sensors=color&noise=0")
     (frame,) = simulation.frames(0)
     levels = Picture(simulation.heads["color"].camera, simulation.scene, samples=2).take(simulation.scene.at(0.0))
-    assert np.abs(frame.data - levels).max() <= 0.501
+    assert np.abs(frame.data.astype(np.float32) - levels).max() <= 0.501
