@@ -68,10 +68,8 @@ def test_the_ten_lines_of_the_page_run(tmp_path):
     ("example", "folder", "limit_mm"),
     [("toy_folder.py", "sl_rgbd_deform_petit", 1.5), ("kinect_paper.py", "sl_kinect_paper", 2.0)],
 )
-def test_an_example_tracks_its_folder(example, folder, limit_mm, shared_data):
-    if not (shared_data / folder).is_dir():
-        pytest.skip(f"no {folder} in {shared_data}")
-    command = [sys.executable, ROOT / "examples" / example, shared_data / folder]
+def test_an_example_tracks_its_folder(example, folder, limit_mm, data_set):
+    command = [sys.executable, ROOT / "examples" / example, data_set(folder)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         lines = [line.split() for line, _ in zip(process.stdout, range(30))]

@@ -1,6 +1,7 @@
 """`abs-service calibrate convert`: published calibrations of others, and what it says about what it cannot do."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -111,8 +112,8 @@ def test_what_cannot_be_done_is_said(convert, lab: Path, monkeypatch, arguments:
     assert said in err
 
 
-def test_published_calibrations_are_read(convert, shared_data: Path, tmp_path: Path) -> None:
-    registration = shared_data / "calib_azure_charuco" / "example_files" / "registration"
+def test_published_calibrations_are_read(convert, data_set: Callable[[str], Path], tmp_path: Path) -> None:
+    registration = data_set("calib_azure_charuco") / "example_files" / "registration"
     names = ("--rename", "calib_color=color", "--rename", "calib_ir=ir")
     pair = registration / "calib_color.yml", registration / "calib_ir.yml"
     assert convert(*pair, tmp_path / "k4a.toml", *names)[0] == Exit.OK
@@ -120,7 +121,7 @@ def test_published_calibrations_are_read(convert, shared_data: Path, tmp_path: P
     assert (k4a["color"].camera.width, k4a["ir"].camera.width) == (4096, 1024)
     assert k4a["color"].camera.fx == pytest.approx(1960.8795300703463, rel=1e-14)
     assert np.all(k4a["ir"].camera.lens.coefficients != 0)
-    stereo = shared_data / "calib_opencv_stereo"
+    stereo = data_set("calib_opencv_stereo")
     code, _, err = convert(
         stereo / "intrinsics.yml", stereo / "left_intrinsics.yml", tmp_path / "s.toml", "--size", "640x480"
     )

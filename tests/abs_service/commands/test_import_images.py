@@ -1,6 +1,7 @@
 """`abs-service import` makes a recording that can be replayed, or says with exit code 2 what is wrong."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -178,7 +179,7 @@ def test_a_rate_is_a_number(folder: Path, capsys: pytest.CaptureFixture[str], ra
     assert f"'{rate}' must be a number from 0.001 to 10000" in capsys.readouterr().err
 
 
-def test_a_real_sequence_of_a_squeezed_toy(shared_data: Path, tmp_path: Path) -> None:
+def test_a_real_sequence_of_a_squeezed_toy(data_set: Callable[[str], Path], tmp_path: Path) -> None:
     """PrimeSense-like camera, 320 × 240, a soft toy on a table about 0.6 to 1.5 m away."""
     (tmp_path / "camera.toml").write_text(
         "".join(
@@ -186,7 +187,7 @@ def test_a_real_sequence_of_a_squeezed_toy(shared_data: Path, tmp_path: Path) ->
             for sensor in ("depth", "color")
         )
     )
-    folder, out = shared_data / "sl_rgbd_deform_petit", tmp_path / "toy.mcap"
+    folder, out = data_set("sl_rgbd_deform_petit"), tmp_path / "toy.mcap"
     options = ["--camera", str(tmp_path / "camera.toml"), "--depth", "depth_mm_*.png", "--mask", "seg_*.png"]
     assert cli.main(["import", str(folder), "--layout", "pairs", "--out", str(out), *options]) == Exit.OK
     recording = Recording(out)

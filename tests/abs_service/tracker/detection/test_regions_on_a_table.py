@@ -1,5 +1,6 @@
 """The regions seed, above_plane and distance, and the limit `within`: objects that lie on a table."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -207,11 +208,9 @@ def test_only_measured_pixels_within_the_limit_are_selected(
 
 
 @pytest.fixture(scope="module")
-def toy(shared_data: Path) -> tuple[DepthView, Path]:
+def toy(data_set: Callable[[str], Path]) -> tuple[DepthView, Path]:
     """First frame of a real recording, a sponge under a hand and a toy on a white table, and the sponge's mask."""
-    folder = shared_data / "sl_rgbd_deform_petit"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
+    folder = data_set("sl_rgbd_deform_petit")
     camera = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
     z_mm = np.asarray(cv2.imread(str(folder / "depth_mm_000200.png"), cv2.IMREAD_UNCHANGED))
     lengths = np.where(z_mm > 0, z_mm * 1e-3 * camera.lookup.ray_length, np.nan).astype(np.float32)
