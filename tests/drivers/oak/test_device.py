@@ -327,8 +327,10 @@ def test_attached_devices_have_availability_and_remedy(
     assert bool(found.remedy) == (availability != Availability.READY)
 
 
-def test_a_rejected_sync_role_in_the_address_raises() -> None:
+def test_a_rejected_sync_role_in_the_address_raises_and_the_device_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     device = mock_device("RVC2", tof=True)
     device.setExternalFrameSyncRole.return_value = (False, "no M8 connector")
+    monkeypatch.setattr(dai, "Device", lambda info: device)
     with pytest.raises(DeviceError, match="sync = master: no M8 connector"):
-        live._run(dai, device, parse("oak://?sync=master"))
+        live.connect(parse("oak://18443010E1A2B3C4?sync=master"))
+    device.close.assert_called_once_with()
