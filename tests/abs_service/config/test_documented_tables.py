@@ -1,4 +1,4 @@
-"""The TOML tables in the docs load, and name every key of every region, model and optimizer with its default."""
+"""The TOML tables in the docs load, and name every key of every template, model and optimizer with its default."""
 
 import re
 import tomllib
@@ -13,7 +13,7 @@ from abs_service.tracker.optimizers.base import Stop
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = {
-    "region": "abs_service.tracker.detection.regions",
+    "template": "abs_service.tracker.detection.templates",
     "model": "abs_service.tracker.models",
     "optimizer": "abs_service.tracker.optimizers",
 }
@@ -40,22 +40,18 @@ def test_a_table_names_all_keys_with_their_defaults(part, name):
     made, table = plugins.load(PACKAGES[part], TABLES[part, name], ROOT), TABLES[part, name]
     assert table.keys() == {"type", *(field.name for field in fields(made))}
     for field in fields(made):
-        if field.default not in (MISSING, None):
+        if field.default is not MISSING:
             assert getattr(made, field.name) == field.default, field.name
 
 
-def test_every_region_has_a_row_and_is_in_the_readme():
+def test_every_template_is_in_the_readme():
     readme = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
-    row = next(line for line in readme if "docs/regions.md" in line)
-    for name in documented("region"):
-        assert f"| `{name}` | " in PAGES["region"]
-        assert f"`{name}`" in row
+    row = next(line for line in readme if "docs/templates.md" in line)
+    assert all(f"`{name}`" in row for name in documented("template"))
 
 
-@pytest.mark.parametrize("name", documented("region"))
-def test_paths_start_from_the_folder_of_the_rig_file(name):
-    made = plugins.load(PACKAGES["region"], TABLES["region", name], ROOT)
-    assert made.file == ROOT / "mask.png" if name == "mask" else made.within == ROOT / "mask.png"
+def test_the_path_of_a_template_starts_from_the_folder_of_the_rig_file():
+    assert plugins.load(PACKAGES["template"], TABLES["template", "mesh"], ROOT).path == ROOT / "toy.obj"
 
 
 def test_every_optimizer_has_a_row():

@@ -1,5 +1,6 @@
 """The region seed: by pixel, by colour and by motion; where depth cannot separate an object, its colours can."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -204,10 +205,8 @@ def test_motion_is_compared_anew_after_a_break():
 
 
 @pytest.mark.parametrize("number", [200, 229, 258, 287, 316])
-def test_a_real_sponge_on_a_table_is_separated_by_its_colours(shared_data: Path, number):
-    folder = shared_data / "sl_rgbd_deform_petit"
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
+def test_a_real_sponge_on_a_table_is_separated_by_its_colours(data_set: Callable[[str], Path], number):
+    folder = data_set("sl_rgbd_deform_petit")
     camera = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
     z_mm = np.asarray(cv2.imread(str(folder / f"depth_mm_{number:06d}.png"), cv2.IMREAD_UNCHANGED))
     lengths = np.where(z_mm > 0, z_mm * 1e-3 * camera.lookup.ray_length, np.nan).astype(np.float32)
