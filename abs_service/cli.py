@@ -35,8 +35,8 @@ COMMANDS = {
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
-#: Modules whose name cannot be that of the command.
-MODULES = {"import": "import_images"}
+#: Modules that are not called as their command is.
+MODULES = {"import": "images.import_images"}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import lookup, pose
-from calib.lens import Lens, LensModel
+from calib import pose
+from calib.lenses import lookup
+from calib.lenses.lens import Lens, LensModel
 from calib.pose import Pose
 
 

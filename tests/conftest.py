@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import hypothesis
@@ -52,13 +53,17 @@ def device_uri(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
-    """The folder of recorded data sets: too large for the repository, so a test that needs one skips without it."""
+def data_set() -> Callable[[str], Path]:
+    """A recorded data set by its name: too large for the repository, so a test that needs one skips without it."""
     beside = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("ABS_SHARED_DATA", beside))
-    if not folder.is_dir():
-        pytest.skip(f"no data sets in {folder}; name their folder with ABS_SHARED_DATA")
-    return folder
+
+    def data_set(name: str) -> Path:
+        if not (folder / name).exists():
+            pytest.skip(f"no {name} in {folder}; name the folder of the data sets with ABS_SHARED_DATA")
+        return folder / name
+
+    return data_set
 
 
 @pytest.fixture

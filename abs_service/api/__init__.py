@@ -10,8 +10,8 @@ from abs_service.api.tracker import Tracker
 from abs_service.config import ConfigError
 from abs_service.tracker.estimate import Status
 from calib.camera import Camera, CameraError
-from calib.fisheye import KannalaBrandt as Fisheye
-from calib.lens import Lens, LensError
+from calib.lenses.fisheye import KannalaBrandt as Fisheye
+from calib.lenses.lens import Lens, LensError
 from drivers.replay import RecordingError
 
 __all__ = [

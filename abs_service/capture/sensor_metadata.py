@@ -15,8 +15,8 @@ from abs_service.bus import keys
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from drivers.contract.host_clock import host_clock
 from drivers.encoding.mcap_file import file_descriptor_set
 

@@ -1,1 +1,1 @@
-"""The commands of `abs-service`, one module each; see `abs_service.cli` for what such a module has."""
+"""The commands of `abs-service`, one module each, and what they share; see `abs_service.cli` for what a command has."""

@@ -19,7 +19,7 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.capture.device_supervisor import DeviceSupervisor
-from abs_service.commands import rig_devices, rig_process
+from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.config import plugins
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         supervisors = [_supervisor(name, rig, source, metadata, publishers[name], health) for name in rig.devices]
         for supervisor in supervisors:
             supervisor.start()
-        _watch(stop, supervisors, lambda: _tick(metadata, publishers, health, clock))
+        _watch(stop, supervisors, lambda: tick(metadata, publishers, health, clock))
         for supervisor in supervisors:
             supervisor.close(CLOSE_S)
         for publisher in publishers.values():
@@ -100,9 +100,10 @@ def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], tick: Cal
             return
 
 
-def _tick(
+def tick(
     metadata: "MetadataPublisher", publishers: Mapping[str, FramePublisher], health: Health, clock: WallClock
 ) -> None:
+    """Once a second: follows the wall clock, publishes new metadata and the health."""
     if not health.due():
         return
     steps = clock.steps

@@ -21,9 +21,9 @@ from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.commands import harmless_devices, preview_option, rig_process
-from abs_service.commands.harmless_devices import HARMLESS, HarmlessError
-from abs_service.commands.preview_option import PictureOptionError
+from abs_service.commands.parts import harmless_devices, preview_option, rig_process
+from abs_service.commands.parts.harmless_devices import HARMLESS, HarmlessError
+from abs_service.commands.parts.preview_option import PictureOptionError
 from abs_service.config import plugins
 from abs_service.config.problems import allowed_instead
 from abs_service.supervision.exit_codes import Exit, is_for_user

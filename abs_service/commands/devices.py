@@ -21,7 +21,7 @@ from typing import Any
 
 from rich.console import Console
 
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.display import devices as display
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening

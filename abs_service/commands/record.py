@@ -17,7 +17,7 @@ import threading
 from abs_service import config
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
 from abs_service.supervision import gc_tuning

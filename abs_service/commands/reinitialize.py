@@ -15,7 +15,7 @@ from abs_service import wiring
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Bus, Sample
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.supervision.exit_codes import Exit
 
 #: Timeout of the detection [s].

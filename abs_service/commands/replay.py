@@ -25,8 +25,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import preview_option
 from abs_service.commands import run as run_command
+from abs_service.commands.parts import preview_option
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay

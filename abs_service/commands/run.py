@@ -26,7 +26,7 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.supervision import gc_tuning
@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         _display(as_json=arguments.json) as display,
         _logging_to(display),
     ):
-        spawn = partial(_spawn, display, path, config.to_toml(rig))
-        supervisor = Supervisor(children(rig, path), spawn, time.monotonic_ns, limits(rig))
+        starts = partial(spawn, display, path, config.to_toml(rig))
+        supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
         try:
@@ -139,7 +139,8 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
-def _spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:
+def spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:
+    """Starts a child process; first writes its configuration again if the file at `path` is gone."""
     # A child may start again after weeks, and many systems clear old files out of their temporary folder.
     with suppress(FileExistsError), path.open("x", encoding="utf-8") as stream:
         stream.write(toml)

@@ -17,8 +17,8 @@ from abs_service.commands import replay
 from abs_service.display.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.models import gravity
-from abs_service.tracking.hanging_strip import HangingStrip, track_strip
-from abs_service.tracking.stiffness import Stiffness, estimate_stiffness
+from abs_service.tracking.bending_stiffness.hanging_strip import HangingStrip, track_strip
+from abs_service.tracking.bending_stiffness.stiffness import Stiffness, estimate_stiffness
 from drivers.replay import Recording
 
 #: Standard gravity [m/s²].

@@ -19,11 +19,11 @@ from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import rig_process
+from abs_service.commands.parts import rig_process
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
-from abs_service.tracking.noise_monitor import NoiseMonitor
+from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup import warm_up

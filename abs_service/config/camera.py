@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
-from calib.lenses import LensName, lens_of
+from calib.lenses.by_name import LensName, lens_of
+from calib.lenses.lens import Lens
 from calib.pose import Pose
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]

@@ -93,7 +93,7 @@ class TrackerTable(Table):
         model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
         template: likewise of `abs_service.tracker.detection.templates`.
         mesh: the triangle mesh.
-        priors, vertex_offsets: `Settings` of `tracker.posterior.priors` and `tracking.vertex_offsets`.
+        priors, vertex_offsets: `Settings` of `tracker.posterior.priors` and `tracking.offsets.vertex_offsets`.
         status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
         budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
@@ -108,9 +108,9 @@ class TrackerTable(Table):
     synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
     priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors")] = Field(default={})
-    vertex_offsets: Annotated[Any, SettingsOf("abs_service.tracking.vertex_offsets")] = Field(default={})
+    vertex_offsets: Annotated[Any, SettingsOf("abs_service.tracking.offsets.vertex_offsets")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
-    reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.loss_monitor")] = Field(default={})
+    reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.monitors.loss_monitor")] = Field(default={})
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
     budget_ms: Positive = 24.0
     budget_evaluations: Annotated[int, Field(ge=1)] = 100_000

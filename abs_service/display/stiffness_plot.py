@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from abs_service.report import plots
-from abs_service.tracking.hanging_strip import Profiles
+from abs_service.tracking.bending_stiffness.hanging_strip import Profiles
 
 
 def draw(profiles: Profiles, title: str, path: Path) -> None:

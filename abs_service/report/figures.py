@@ -43,19 +43,6 @@ def coverage_map(
     return figure
 
 
-def covered_share(
-    views: Sequence[NDArray[np.floating]], width: int, height: int, cells: tuple[int, int] = (8, 6)
-) -> float:
-    """Share of the parts of the image, 0…1, in which at least one corner was seen; arguments as of `coverage_map`."""
-    seen = np.zeros(cells, bool)
-    for pixels in views:
-        column = np.floor((pixels[:, 0] + 0.5) / width * cells[0]).astype(int)
-        row = np.floor((pixels[:, 1] + 0.5) / height * cells[1]).astype(int)
-        inside = (column >= 0) & (column < cells[0]) & (row >= 0) & (row < cells[1])
-        seen[column[inside], row[inside]] = True
-    return float(seen.mean())
-
-
 def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating], width: int, height: int) -> "Figure":
     """Residuals as enlarged arrows at their place in the image, and all of them from one origin.
 

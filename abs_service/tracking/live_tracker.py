@@ -12,7 +12,7 @@ from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
-from abs_service.tracking.noise_monitor import NoiseMonitor
+from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity

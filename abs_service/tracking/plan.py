@@ -23,8 +23,8 @@ from abs_service.tracker.posterior.priors import ShapePrior
 from abs_service.tracker.posterior.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
-from abs_service.tracking import loss_monitor
-from abs_service.tracking.vertex_offsets import Settings as VertexOffsetSettings
+from abs_service.tracking.monitors import loss_monitor
+from abs_service.tracking.offsets.vertex_offsets import Settings as VertexOffsetSettings
 from calib.rig import Rig
 
 

@@ -17,11 +17,11 @@ from abs_service.tracker.models.base import DeformationModel, ModelError
 from abs_service.tracker.optimizers.base import Stop
 from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.tracker import Tracker
-from abs_service.tracking import loss_monitor
-from abs_service.tracking.growth_monitor import LEAST_GROWTH, GrowthMonitor
+from abs_service.tracking.monitors import loss_monitor
+from abs_service.tracking.monitors.growth_monitor import LEAST_GROWTH, GrowthMonitor
 from abs_service.tracking.observer import Observer
+from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, VertexOffsets
 from abs_service.tracking.plan import Plan, make_tracker
-from abs_service.tracking.vertex_offsets import FixedOffsets, VertexOffsets
 from calib.noise.base import ImageNoise
 from calib.rig import Rig, Sensor
 from drivers.contract.frame import FrameSet

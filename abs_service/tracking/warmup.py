@@ -10,8 +10,8 @@ from abs_service.tracker.detection.templates import first_image
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from calib.noise.base import DepthNoise
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.rig import Noise, Rig, Sensor

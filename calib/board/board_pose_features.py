@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from calib import pose
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 #: Two poses differ if they are this far apart in position (of half the image), size (a factor), or an angle [rad].
 _PLACE, _SIZE, _ANGLE = 0.2, 1.2, np.deg2rad(8)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.board import mirrored
 from calib.board.board_pose_features import BoardPose, board_pose_features, differs, extent
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 #: Minimum number of views of a sensor, and number for a reliable calibration.
 MIN_VIEWS, SUFFICIENT_VIEWS = 4, 12

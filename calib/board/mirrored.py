@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 
 from calib.board.board_pose_features import board_pose_features, extent
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 #: Minimum number of common shots.
 MIN_SHARED = 5

@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 
 from calib import pose
 from calib.board.target import Target
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.lens import LensError
+from calib.lenses.lens import LensError
 from calib.pose import Pose
-from calib.views import CornerView, PlaneView
 
 #: Erosion of regions [px], because distances at edges of squares and boards are mixed.
 _RIM_PX = 2

@@ -1,4 +1,4 @@
-"""Kinds of boards, in the frame of `calib.views`: origin in the first corner, x along the first row."""
+"""Kinds of boards, in the frame of `calib.board.views`: origin in the first corner, x along the first row."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.views import CornerView, PlaneView
 from calib.solve.bundle.layout import POSE
 from calib.solve.bundle.state import SensorState
 from calib.solve.start.board_poses import pose_candidates
-from calib.views import CornerView, PlaneView
 
 
 class CalibrationCheckError(ValueError):

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensError, LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensError, LensModel
 from calib.pose import Pose
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
 from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, fisheye, relative, rigid
-from calib.lens import LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import LensModel
 from calib.pose import Pose
 
 #: Metres per numbered length unit: metre, centimetre (the default), millimetre, inch, foot.

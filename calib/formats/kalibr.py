@@ -11,7 +11,6 @@ import yaml
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
 from calib.formats.content import (
     Content,
     FormatError,
@@ -24,7 +23,8 @@ from calib.formats.content import (
     relative,
     rigid,
 )
-from calib.lens import Lens, LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensModel
 
 _KNOWN = (
     "camera_model", "intrinsics", "distortion_model", "distortion_coeffs", "resolution", "T_cn_cnm1", "rostopic",

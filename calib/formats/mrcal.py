@@ -9,7 +9,7 @@ import numpy as np
 from calib import pose
 from calib.camera import Camera
 from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, extra, only
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 
 #: Coefficients after fx, fy, cx, cy, by lens model.
 COEFFICIENTS = {

@@ -12,9 +12,9 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
 from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, fisheye, rigid
-from calib.lens import LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import LensModel
 
 _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "K", "M1", "M2")
 _DISTORTIONS = (

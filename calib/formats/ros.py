@@ -7,7 +7,6 @@ import numpy as np
 import yaml
 
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
 from calib.formats.content import (
     Content,
     FormatError,
@@ -20,7 +19,8 @@ from calib.formats.content import (
     only,
     placed,
 )
-from calib.lens import LensModel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import LensModel
 
 _KNOWN = (
     "image_width", "image_height", "camera_name", "camera_matrix", "distortion_model", "distortion_coefficients",

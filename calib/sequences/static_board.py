@@ -8,12 +8,12 @@ from scipy.optimize import least_squares
 
 from calib import pose
 from calib.board.plane import region
+from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.noise.base import NoiseError
 from calib.pose import Pose
 from calib.sequences import plane
 from calib.solve.start.board_poses import pose_candidates
-from calib.views import CornerView
 
 #: Increments for finite differences with respect to a pose [rad, m].
 _STEP = 1e-5

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 
 def shared(views: Sequence[CornerView]) -> list[CornerView]:

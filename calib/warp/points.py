@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.forward import projector
 from calib.jit import kernel
+from calib.lenses.forward import projector
 
 #: Minimum z of a visible point [m].
 _NEAREST_M = 1e-3

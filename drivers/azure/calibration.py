@@ -13,7 +13,7 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 
 
 class CalibrationError(ValueError):

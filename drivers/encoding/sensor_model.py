@@ -4,8 +4,8 @@ import numpy as np
 from absmsg.v1.sensor_model_pb2 import SensorModel
 
 from calib.camera import Camera
-from calib.lens import Lens
-from calib.lenses import lens_of
+from calib.lenses.by_name import lens_of
+from calib.lenses.lens import Lens
 from drivers.encoding.codec import CodecError
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from calib.camera import Camera, CameraError
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensError
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensError
 from drivers.o3r.chunks import ChunkError
 
 #: Version, metres and amplitude per digit, normalisation of three amplitudes, pose of the optics in the user's

@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from drivers.contract.device import Device
 from drivers.contract.discovery import Found
-from drivers.oak import live, playback
 from drivers.oak.address import parse
 from drivers.oak.device import OakDevice
-from drivers.oak.recording import OakRecording
+from drivers.oak.images.recording import OakRecording
+from drivers.oak.source import live, playback
 
 __all__ = ["discover", "open_device", "open_recording"]
 

@@ -6,7 +6,7 @@ from typing import Any
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
 from drivers.contract.device import DeviceError
 from drivers.oak.address import Address
-from drivers.oak.pipelines import Outputs
+from drivers.oak.source.pipelines import Outputs
 
 #: Limits of manual exposure supported by every camera of the family: time [s], and ISO speed over 100.
 _EXPOSURE_S = (20e-6, 33e-3)

@@ -8,12 +8,12 @@ from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.device import DeviceError, DeviceState, Sink
 from drivers.contract.frame_gate import FrameGate
-from drivers.oak.connection import CLOCK, Connection, HostTimes
-from drivers.oak.eeprom import EepromError
-from drivers.oak.heads import cameras
-from drivers.oak.messages import QueueClosed
-from drivers.oak.picture import Picture, PictureError, frame, pixels
+from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak.cameras.heads import cameras
+from drivers.oak.images.messages import QueueClosed
+from drivers.oak.images.picture import Picture, PictureError, frame, pixels
 from drivers.oak.roles import Role
+from drivers.oak.source.connection import CLOCK, Connection, HostTimes
 
 #: Timeout for the first image of a stream, exposure settling included [s].
 FIRST_S = 10.0

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.pose import Pose
 from drivers.contract.frame import Geometry, Kind
 

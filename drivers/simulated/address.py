@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from calib.lens import COEFFICIENTS, LensError, LensModel
-from calib.lenses import lens_of
+from calib.lenses.by_name import lens_of
+from calib.lenses.lens import COEFFICIENTS, LensError, LensModel
 from drivers.contract.device import AddressError
 from drivers.simulated import faults, values
 from drivers.simulated.faults import FaultSchedule

@@ -38,8 +38,8 @@ from calib.noise.bayer import GaussianBayer
 from calib.noise.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
-from tests.tracker.driving import frame_set, rig_of, simulate
-from tests.tracker.scenes import flat, sheet
+from tests.abs_service.tracker.scenes import flat, sheet
+from tests.abs_service.tracking.driving import frame_set, rig_of, simulate
 
 POPULATION, VERTICES = 32, 1024
 NOISES = {

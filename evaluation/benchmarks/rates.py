@@ -26,7 +26,7 @@ from abs_service.tracker.optimizers.base import Budget, Optimizer, Problem, Sear
 from abs_service.tracker.posterior.curvature import Quadratic
 from abs_service.tracking.plan import ModelSettings, OptimizerSettings
 from abs_service.tracking.session import TrackingSession
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+from tests.abs_service.tracking.driving import default_plan, frame_set, rig_of, simulate
 
 Answer = TypeVar("Answer")
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.tracker.driving import simulate
+from tests.abs_service.tracking.driving import simulate
 
 #: Exposure at which everything is in view.
 SHOWN = 135

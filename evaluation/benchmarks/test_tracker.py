@@ -17,10 +17,10 @@ from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from evaluation.benchmarks import rates
+from tests.abs_service.tracker.differences import central_differences
+from tests.abs_service.tracker.scenes import sheet
+from tests.abs_service.tracking.driving import default_plan, frame_set, rig_of, simulate
 from tests.calib.noise.texels import render_texture
-from tests.tracker.differences import central_differences
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
-from tests.tracker.scenes import sheet
 
 POPULATION, VERTICES = 32, 1024
 SIMULATION = simulate("simulated://sheet?seed=1")

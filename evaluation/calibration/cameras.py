@@ -16,14 +16,14 @@ from scipy import stats
 
 from abs_service.report.content import Cell, Column, Section, Table
 from calib import pose
+from calib.board.views import CornerView
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL, LensKind
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation.verdict import assess
-from calib.views import CornerView
 from evaluation.calibration import published_boards, simulated_rig
 from evaluation.experiment import Context, Findings, Goal, at_least, at_most
 

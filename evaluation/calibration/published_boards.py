@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from calib.board.corners.detection import detect
 from calib.board.corners.errors import BoardError
 from calib.board.target import Charuco, Chessboard, Circles, Target
+from calib.board.views import CornerView
 from calib.solve.weights import shared
-from calib.views import CornerView
 
 CIRCLES = Circles(10, 10, 0.0254, 0.0127)
 CHESSBOARD = Chessboard(9, 6, 0.025)

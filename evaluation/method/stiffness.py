@@ -18,7 +18,7 @@ import numpy as np
 from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.report.plots import figure
 from abs_service.tracker.models import gravity
-from abs_service.tracking.stiffness import Stiffness, estimate_stiffness, inclination_profile
+from abs_service.tracking.bending_stiffness.stiffness import Stiffness, estimate_stiffness, inclination_profile
 from evaluation.experiment import Context, Findings, at_least, at_most
 from evaluation.sequences import demo_plan, demo_rig, expose, simulate, track
 

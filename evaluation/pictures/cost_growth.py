@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from evaluation.benchmarks.kernels import POPULATION, VERTICES, Case, nurbs_of, seconds, whole
-from tests.tracker.scenes import flat, sheet
+from tests.abs_service.tracker.scenes import flat, sheet
 
 ROUNDS = 150
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from calib import pose
 from calib.camera import Camera, CameraError
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from tests import reference
 
 LENS = Lens(np.array([-0.2, 0.05, 1e-3, -2e-3, 0.01]))

@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
 from calib.formats import depthai, kalibr, mrcal, opencv, ros, tf, urdf
 from calib.formats.content import FormatError, Hints, rigid
 from calib.formats.resizing import resized
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 
 HINTS = Hints("tof")
 ORIGIN = (np.zeros(3), np.zeros(3))

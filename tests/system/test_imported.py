@@ -1,6 +1,7 @@
 """Recordings of other programs are imported with their own calibration, and tracked."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -71,12 +72,15 @@ def test_a_recording_of_depthai_shows_what_the_simulator_did(tmp_path: Path) -> 
     ],
 )
 def test_real_recordings_are_tracked(
-    shared_data: Path, tmp_path: Path, layout: str, file: str, exposures: int, distances: tuple[float, float]
+    data_set: Callable[[str], Path],
+    tmp_path: Path,
+    layout: str,
+    file: str,
+    exposures: int,
+    distances: tuple[float, float],
 ) -> None:
-    if not (shared_data / file).is_file():
-        pytest.skip(f"no file {shared_data / file}")
     pytest.importorskip({"azure": "av", "realsense": "rosbags"}.get(layout, "numpy"), reason="make all")
-    estimates = tracked(tmp_path, shared_data / file, layout)
+    estimates = tracked(tmp_path, data_set(file), layout)
     assert len(estimates) == exposures
     for theta in estimates:
         near, far = distances

@@ -12,7 +12,7 @@ import pytest
 from abs_service import config
 from drivers.replay import Recording
 from drivers.simulated.address import parse
-from tests.commands.simulated_recording import write_take
+from tests.abs_service.commands.simulated_recording import write_take
 from tests.system.running import START_S, abs_service, wait_until
 
 pytestmark = pytest.mark.slow

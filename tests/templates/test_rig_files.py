@@ -6,7 +6,7 @@ from abs_service import cli, config
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.detection.templates import sheet
 from abs_service.tracking.preview import preview
-from tests.tracker.driving import default_plan, frame_set, rig_of, simulate
+from tests.abs_service.tracking.driving import default_plan, frame_set, rig_of, simulate
 
 
 def rig_file(folder, template, model='{ type = "rigid" }', more=""):

@@ -10,6 +10,7 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
+from calib.board.views import PlaneView
 from calib.calibration_check.changes import PairChange, pair_changes
 from calib.calibration_check.hypotheses import (
     CornerFit,
@@ -22,7 +23,6 @@ from calib.calibration_check.hypotheses import (
 )
 from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.state import SensorState
-from calib.views import PlaneView
 
 #: Maximum number of shots.
 MOST_SHOTS = 40

@@ -18,8 +18,6 @@ from abs_service.report.provenance import Provenance
 from calib import pose
 from calib.camera import Camera
 
-SUFFIX = ".calibration.toml"
-
 
 class RigFileError(Exception):
     """Calibration file that cannot be written, or an invalid side file."""

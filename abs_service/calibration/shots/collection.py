@@ -7,7 +7,7 @@ from calib.board import coverage
 from calib.board.corners.errors import MovedError
 from calib.board.coverage import MissingView
 from calib.board.mirrored import MirroredSensorError
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 
 class Collector:

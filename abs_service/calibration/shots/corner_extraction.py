@@ -1,6 +1,6 @@
 """Corner and plane extraction from shots, with reasons for rejected images."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from abs_service.calibration.shots.shots import SensorShot, Shot
@@ -10,8 +10,8 @@ from calib.board.corners.detection import Detection
 from calib.board.corners.errors import BoardError
 from calib.board.corners.to_8bit import grey
 from calib.board.target import Target
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.views import CornerView, PlaneView
 
 #: Tolerance of the predicted board position in a sensor without image, by prior cameras [px].
 _SLACK_PX = 8.0
@@ -40,14 +40,6 @@ class BoardObservations:
             {**self.rejected, **other.rejected},
             {**self.sizes, **other.sizes},
         )
-
-
-def see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> BoardObservations:
-    """Observations of a board in all shots; see `see`."""
-    seen = BoardObservations()
-    for shot in shots:
-        seen += see(target, shot, cameras)
-    return seen
 
 
 def see(target: Target, shot: Shot, cameras: Mapping[str, Camera]) -> BoardObservations:

@@ -15,7 +15,7 @@ from rich.text import Text
 from abs_service.calibration.shots.collection import Collector
 from calib.board import coverage
 from calib.board.corners.to_8bit import Image, grey
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 #: Cells of the map in the terminal, and symbols for no points, some, many.
 _COLUMNS, _ROWS = 12, 7

@@ -33,7 +33,7 @@ from abs_service.calibration.shots.guide import Guide, LineGuide, LiveGuide, cov
 from abs_service.calibration.shots.live_shots import LiveShots, NamedDevice
 from abs_service.calibration.shots.shot_recording import ShotFileError, ShotRecording
 from abs_service.calibration.shots.shots import SOUGHT, Shot
-from abs_service.commands import rig_devices, rig_process
+from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.report.content import Level
 from calib.board.target import Target
 from calib.camera import Camera

@@ -18,8 +18,7 @@ from abs_service.calibration.shots import corner_extraction
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands import calibrations
-from abs_service.commands.calibrate import live
+from abs_service.commands.calibrate import calibrations, live
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.supervision.exit_codes import Exit

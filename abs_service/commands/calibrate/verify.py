@@ -24,8 +24,8 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands import calibrations, rig_process
-from abs_service.commands.calibrate import live
+from abs_service.commands.calibrate import calibrations, live
+from abs_service.commands.parts import rig_process
 from abs_service.report import page, provenance
 from abs_service.report.content import Report, to_json
 from calib.board.target import Target

@@ -9,7 +9,7 @@ noise that each residual loses to the fit (HC2 of MacKinnon and White, J. Econom
 are exact, r² / (1 − h) is 1 on average and the sandwich equals Σ.
 
 **Vertices.** The noise of the first frame displaces every vertex by σε along its normal n, with ε standard normal; the
-vertex keeps what of this offset is not learnt over the frames (`tracking.vertex_offsets`). The sensors measure the
+vertex keeps what of this offset is not learnt over the frames (`tracking.offsets`). The sensors measure the
 surface, not the vertex. The search therefore corrects the part of the offsets that Θ can represent, and only the rest
 remains. With the derivatives D of the vertices, the offsets E = σn, and the derivatives JE of the residuals with
 respect to ε, the response of Θ is −Σ JᵀJE ε, and the error of a vertex is (E − D Σ JᵀJE) ε besides D times the error of

@@ -11,7 +11,7 @@ from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
 from abs_service.tracker.synthesis.projection import optics
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
+from calib.lenses.fisheye import KannalaBrandt
 from calib.noise.base import ImageNoise
 from calib.rig import Rig
 

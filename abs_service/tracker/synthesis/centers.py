@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.forward import brown_conrady_coefficients as coefficients
-from calib.forward import distort, distort_fisheye, fisheye_coefficients
 from calib.jit import composed, kernel, prange
+from calib.lenses.forward import brown_conrady_coefficients as coefficients
+from calib.lenses.forward import distort, distort_fisheye, fisheye_coefficients
 
 
 @kernel

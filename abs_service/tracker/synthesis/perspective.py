@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.jit import kernel
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 
 #: Edges shorter than this in the image [px], of a surface seen at grazing incidence, are down-weighted.
 SHORT_EDGE_PX = 0.5

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.forward import brown_conrady_coefficients as coefficients
-from calib.forward import distort, distort_fisheye, fisheye_coefficients
 from calib.jit import composed, kernel
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.forward import brown_conrady_coefficients as coefficients
+from calib.lenses.forward import distort, distort_fisheye, fisheye_coefficients
 
 
 def optics(camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:

@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.fisheye import KannalaBrandt
-from calib.forward import brown_conrady_coefficients as coefficients
-from calib.forward import (
+from calib.jit import composed, kernel, prange
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.forward import brown_conrady_coefficients as coefficients
+from calib.lenses.forward import (
     distort,
     distort_fisheye,
     fisheye_coefficients,
@@ -15,8 +16,7 @@ from calib.forward import (
     undistort_step_fisheye,
     without_distortion,
 )
-from calib.jit import composed, kernel, prange
-from calib.lens import LensModel
+from calib.lenses.lens import LensModel
 
 #: Smallest cosine of incidence at which the distance is extrapolated along the tangent plane to the pixel's centre.
 LEAST_COSINE = 0.2

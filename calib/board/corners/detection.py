@@ -10,7 +10,7 @@ from calib.board.corners.order import canonical_order
 from calib.board.corners.search import find, is_cut_off
 from calib.board.corners.to_8bit import Grey, Image, grey
 from calib.board.target import AsymmetricCircles, Charuco, Circles, Target
-from calib.views import CornerView
+from calib.board.views import CornerView
 
 #: Minimum number of points in a view.
 MIN_POINTS = 6

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from calib.camera import CameraError
-from calib.lens import LensError
+from calib.lenses.lens import LensError
 from calib.solve.bundle import motion, rotations
 from calib.solve.bundle.blocks import Corners, JacobianBlocks, Planes
 from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Layout

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.views import CornerView, PlaneView
 from calib.solve.bundle import motion
 from calib.solve.bundle.adjustment import rescale
 from calib.solve.bundle.blocks import Corners, Planes
@@ -13,7 +14,6 @@ from calib.solve.bundle.equations import Equations, Group
 from calib.solve.bundle.layout import Layout
 from calib.solve.bundle.state import State
 from calib.solve.bundle.tasks import Task
-from calib.views import CornerView, PlaneView
 
 
 @dataclass(frozen=True)

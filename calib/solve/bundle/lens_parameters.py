@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calib import fisheye, lens
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens, LensModel
+from calib.lenses import fisheye, lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens, LensModel
 
 #: Parameters of the camera matrix; lens coefficients follow.
 MATRIX = ("fx", "fy", "cx", "cy")

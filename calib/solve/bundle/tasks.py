@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
 from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters
 from calib.solve.bundle.lens_parameters import BROWN_CONRADY, MATRIX, LensKind
-from calib.views import CornerView, PlaneView
 
 
 class TaskError(ValueError):

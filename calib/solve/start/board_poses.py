@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
+from calib.board.views import CornerView
 from calib.camera import Camera
-from calib.lens import LensError
+from calib.lenses.lens import LensError
 from calib.pose import Pose
 from calib.solve.bundle.lens_parameters import LensKind
-from calib.views import CornerView
 
 #: Candidate focal lengths, relative to the image's width: from a wide fisheye to a telephoto lens.
 FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.views import PlaneView
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.start.extrinsics_graph import NotConnectedError
-from calib.views import PlaneView
 
 #: Normals span the space if their smallest singular value, relative to the largest, is above this.
 SPANNING = 0.03

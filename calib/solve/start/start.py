@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib import pose
+from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, search
@@ -14,7 +15,6 @@ from calib.solve.bundle.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, registration
 from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates
-from calib.views import CornerView
 
 #: Reprojection errors are clipped here [px] when board poses are compared.
 FAR_PX = 20.0

@@ -7,6 +7,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.solve.bundle.layout import DEPTH_TERMS
 from calib.solve.bundle.state import State
@@ -15,7 +16,6 @@ from calib.solve.solution import Parameter
 from calib.solve.start.board_poses import pose_candidates
 from calib.solve.start.registration import fit_plane
 from calib.solve.start.start import fit_camera
-from calib.views import CornerView
 
 #: Minimum number of views of a sensor with free intrinsics.
 MIN_VIEWS = 6

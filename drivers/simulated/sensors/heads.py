@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from calib.camera import Camera
-from calib.lens import Lens, LensModel
+from calib.lenses.lens import Lens, LensModel
 from drivers.simulated.scene.scene import Scene
 from drivers.simulated.sensors import infrared
 from drivers.simulated.sensors.barrier import Barrier, BarrierNoise

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import LensModel
+from calib.lenses.lens import LensModel
 
 
 @dataclass(frozen=True)

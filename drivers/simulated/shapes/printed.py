@@ -38,7 +38,7 @@ def paper_size(target: Target) -> tuple[float, float]:
 
 
 def board_pose(surface: Surface, target: Target, t: float) -> Pose:
-    """Ground-truth pose `T_rb` of a board at time `t` [s]: its frame b is that of `calib.views`, r is the rig.
+    """Ground-truth pose `T_rb` of a board at time `t` [s]: its frame b is that of `calib.board.views`, r is the rig.
 
     Args:
         surface: of the scene `target`: `parse(uri).build().scene.surfaces[0]`.

@@ -22,15 +22,8 @@ from abs_service.report.content import Section
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.image_folder.listing import ImageFolderError
 from evaluation.experiment import Context, Findings, UnavailableError
-from evaluation.inputs.recordings import (
-    azure,
-    kinect_paper,
-    kinect_paper_report,
-    sigma_report,
-    sponge_report,
-    toy,
-    toy_report,
-)
+from evaluation.inputs.recordings import azure, kinect_paper, kinect_paper_report, sigma_report
+from evaluation.inputs.recordings.toy import sponge_report, toy, toy_report
 
 __all__ = ["QUICK", "TITLE", "Settings", "run"]
 

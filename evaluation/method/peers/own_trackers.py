@@ -21,7 +21,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior import priors
 from abs_service.tracker.synthesis import sparse
-from abs_service.tracking import loss_monitor
+from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.plan import OptimizerSettings, Plan
 from abs_service.tracking.session import TrackingSession
 from calib import pose

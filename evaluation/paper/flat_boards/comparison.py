@@ -17,7 +17,7 @@ from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.models.parts.bends import FULL
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracking.plan import ModelSettings, OptimizerSettings
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.tof_amplitude import TofAmplitude
 from calib.rig import Rig, Sensor
 from drivers.simulated.scene.motion import Motion

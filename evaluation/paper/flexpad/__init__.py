@@ -24,7 +24,7 @@ from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracking.plan import OptimizerSettings
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.noise.tof_amplitude import TofAmplitude
 from calib.pose import Pose
 from calib.rig import Rig, Sensor
@@ -153,7 +153,7 @@ class Bent:
         for number, estimate in enumerate(followed.estimates):
             placement = self.moves.at(estimate.t_host_ns * 1e-9)
             true[number, first : first + 2] = -2 * MODEL.least_radius_m * placement.curvature
-            poses.append(_pose_error(_unbent(followed.models[number], estimate.theta), placement.T_rp))
+            poses.append(pose_error(_unbent(followed.models[number], estimate.theta), placement.T_rp))
         rotation, translation = np.mean(poses, axis=0)
         return Errors(bends, true, followed.thetas[:, flexpad.HEIGHT], float(rotation), float(translation))
 
@@ -219,7 +219,7 @@ def _unbent(model: DeformationModel, theta: NDArray[np.float64]) -> NDArray[np.f
     return model.deform(flat[None]).vertices[0].T.astype(np.float64)
 
 
-def _pose_error(flat: NDArray[np.float64], T_rp: Pose) -> tuple[float, float]:
+def pose_error(flat: NDArray[np.float64], T_rp: Pose) -> tuple[float, float]:
     """Angle [mrad] and distance [mm] between the pose of a flat mesh (n, 3), a regular grid, and the true one."""
     center = flat.mean(axis=0)
     axes = np.linalg.svd(flat - center, full_matrices=False)[2]  # along the long side, the short side, the normal

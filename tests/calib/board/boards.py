@@ -10,8 +10,6 @@ from calib.board.target import Target
 from calib.camera import Camera
 from calib.pose import Pose
 
-CHESSBOARD_POSE = ((0.2, -0.3, 0.1), (-0.1, -0.07, 0.6))
-
 VGA = Camera(640, 480, 550, 550, 319.5, 239.5)
 TOF = Camera(176, 144, 220, 220, 87.5, 71.5)
 

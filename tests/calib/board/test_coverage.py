@@ -10,7 +10,7 @@ from calib.board import coverage
 from calib.board.board_pose_features import board_pose_features
 from calib.board.mirrored import MirroredSensorError
 from calib.board.target import Chessboard
-from calib.views import CornerView
+from calib.board.views import CornerView
 from drivers.simulated.address import parse
 from drivers.simulated.shapes.printed import TARGETS, board_pose
 from tests.calib.board.boards import VGA, centered

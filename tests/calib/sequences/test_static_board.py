@@ -5,10 +5,10 @@ import pytest
 
 from calib import pose
 from calib.board.target import Chessboard
+from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.noise.base import NoiseError
 from calib.sequences.static_board import locate
-from calib.views import CornerView
 
 TOF = Camera(176, 144, 200.0, 200.0, 87.5, 71.5)
 COLOR = Camera(640, 480, 600.0, 600.0, 320.0, 240.0, T_rs=pose.from_rotation_vector((0, 0, 0), (0.06, 0, 0)))

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib import pose
+from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.pose import Pose
-from calib.views import CornerView, PlaneView
 
 COLUMNS, ROWS, SQUARE = 9, 7, 0.04
 

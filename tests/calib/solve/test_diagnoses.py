@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calib.board.views import CornerView, PlaneView
 from calib.solve.bundle.observability import UndeterminedError, require_determined
 from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
 from calib.solve.start import extrinsics_graph
 from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
 from calib.solve.validation.diagnoses import MixedUpError, SquareSizeError, ViewsError
-from calib.views import CornerView, PlaneView
 from tests.calib.solve import board_views
 from tests.calib.solve.board_views import Head
 

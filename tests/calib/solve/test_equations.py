@@ -7,8 +7,8 @@ import pytest
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from calib.solve.bundle import rotations
 from calib.solve.bundle.equations import Equations
 from calib.solve.bundle.formulation import formulate, groups_of

@@ -4,8 +4,8 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.fisheye import KannalaBrandt
-from calib.lens import Lens
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from evaluation.scenes.solids import Ball, Plane, cast, image, seen_by
 
 __all__ = ["BOARD", "SOURCE", "VIEWS", "WALL", "Ball", "Plane", "cast", "image", "seen_by"]

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -165,11 +166,9 @@ def test_arbitrary_bytes_are_an_image_or_rejected(content: bytes, encoding: str,
             assert read(jpeg[:300] + content if begins else content).shape[:2] == (6, 8)
 
 
-def test_depth_and_colour_of_a_real_recording_are_registered(shared_data: Path) -> None:
+def test_depth_and_colour_of_a_real_recording_are_registered(data_set: Callable[[str], Path]) -> None:
     pytest.importorskip("av", reason="needs PyAV: make all")
-    path = shared_data / "tof_azure_kinect_pyk4a" / "recording.mkv"
-    if not path.is_file():
-        pytest.skip(f"no file {path}")
+    path = data_set("tof_azure_kinect_pyk4a/recording.mkv")
     read = AzureRecording(path)
     frames = {frame.kind: frame for frame in read.frames()}
     depth = frames[Kind.DEPTH].si()

@@ -18,14 +18,12 @@ On real hardware the tests without faults run with
 """
 
 import threading
-import time
 from collections import Counter
 from enum import StrEnum
 from pathlib import Path
 from typing import Protocol
 
 from drivers.contract.device import Device
-from tests.drivers.recording_sink import TIMEOUT_S
 
 #: Frames of each stream that a fake delivers before its fault.
 BEFORE = 3
@@ -61,16 +59,6 @@ class Bench(Protocol):
     def open_second(self) -> Device:
         """Opens another device of the same kind without faults; both may be open at a time."""
         ...
-
-
-def eventually(condition) -> bool:
-    """True if a condition becomes true in time."""
-    end = time.monotonic() + TIMEOUT_S
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return False
 
 
 def dropped(device: Device) -> int:

@@ -16,8 +16,9 @@ from drivers.contract.device import ControlError, Device, DeviceError, DeviceSta
 from drivers.contract.frame import Kind
 from drivers.opening import open_device
 from tests.drivers.conformance import benches
-from tests.drivers.conformance.bench import Bench, Fault, dropped, eventually, resources
+from tests.drivers.conformance.bench import Bench, Fault, dropped, resources
 from tests.drivers.recording_sink import RecordingSink
+from tests.waiting import eventually
 
 NAMES = sorted(module.name for module in pkgutil.iter_modules(benches.__path__))
 STARTS = 50

@@ -11,10 +11,11 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import device_supervisor
 from abs_service.capture.device_supervisor import DeviceSupervisor
 from drivers.contract.device import Device
-from tests.bus.loopback import LoopbackBus
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.drivers.conformance import benches
-from tests.drivers.conformance.bench import Bench, Fault, eventually
+from tests.drivers.conformance.bench import Bench, Fault
 from tests.drivers.recording_sink import RecordingSink
+from tests.waiting import eventually
 
 
 @pytest.fixture(params=sorted(module.name for module in pkgutil.iter_modules(benches.__path__)))
@@ -37,7 +38,8 @@ def test_an_unplugged_device_is_reopened_in_a_later_epoch(bench: Bench, monkeypa
 
     heads: dict[str, str] = {}
     sink, clock = RecordingSink(), WallClock()
-    health = Health(LoopbackBus(), "capture", HeaderFactory("demo", clock))
+    bus = LoopbackBus()
+    health = Health(bus, "capture", HeaderFactory("demo", clock))
     supervisor = DeviceSupervisor(
         "cam", "any://", open_device, lambda device: None, sink, heads, health, clock.monotonic
     )
@@ -49,7 +51,8 @@ def test_an_unplugged_device_is_reopened_in_a_later_epoch(bench: Bench, monkeypa
         supervisor.close(10)
     epochs = [frame.epoch for frame in sink.frames]
     assert epochs == sorted(epochs)
-    assert health._counters["device.cam.reconnects"] == 1
+    counters = health_now(health, bus).counters
+    assert counters["device.cam.reconnects"] == 1
     assert opened[0][0] == "any://"
     assert opened[1][0] == opened[0][1], "by the address of this very device, whatever the first one left open"
-    assert health._counters["device.cam.frames"] >= len(sink.frames)
+    assert counters["device.cam.frames"] >= len(sink.frames)

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState
+from drivers.contract.device import AddressError, ControlError, DeviceError
 from drivers.contract.discovery import Availability
 from drivers.contract.frame import Geometry, Kind
 from drivers.kinect1 import udev
@@ -22,12 +22,12 @@ from drivers.kinect1.camera import Stream
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
-from tests.drivers.conformance.bench import eventually
 from tests.drivers.kinect1.emulation import usb_descriptors
 from tests.drivers.kinect1.emulation.bit_packing import unpack
 from tests.drivers.kinect1.emulation.emulated_camera import EmulatedKinect, noise
 from tests.drivers.kinect1.emulation.fake_usb import FakeBackend, FakeDevice, FakeReader
 from tests.drivers.recording_sink import RecordingSink
+from tests.waiting import eventually
 
 SERIAL = "A00363A01234040A"
 BOTH = (Stream.DEPTH, Stream.COLOR)
@@ -102,23 +102,6 @@ def test_controls_reach_the_camera(fake: FakeDevice) -> None:
     device.close()
     with pytest.raises(DeviceError, match="closed"):
         device.controls.get("infrared_gain")
-
-
-def test_an_unplugged_device_fails_and_can_be_reopened(fake: FakeDevice) -> None:
-    device, sink = opened(fake), RecordingSink()
-    device.start(sink)
-    sink.wait(lambda: len(sink.frames) > 0)
-    fake.plugged = False
-    assert "unplugged" in sink.wait_for(DeviceState.FAILED)
-    device.close()
-    with pytest.raises(DeviceError, match="no kinect1 device is attached"):
-        opened(fake)
-    fake.plugged = True
-    device, sink = opened(fake), RecordingSink()
-    device.start(sink)
-    sink.wait(lambda: len(sink.frames) > 0)
-    device.close()
-    assert (fake.opened, fake.claims, fake.readers) == (0, 0, 0)
 
 
 def test_closing_in_the_sink_releases_the_camera(fake: FakeDevice) -> None:

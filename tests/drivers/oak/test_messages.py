@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
-from drivers.oak import eeprom
-from drivers.oak.eeprom import EepromError, Extrinsics, Poses
-from drivers.oak.heads import cameras
-from drivers.oak.picture import Picture, PictureError, camera, frame, pixels
-from drivers.oak.recording import OakRecording
+from drivers.oak.cameras import eeprom
+from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses
+from drivers.oak.cameras.heads import cameras
+from drivers.oak.images.picture import Picture, PictureError, camera, frame, pixels
+from drivers.oak.images.recording import OakRecording
 from drivers.oak.roles import ROLES
 from drivers.simulated.address import parse
 from tests.sample.sample import DEVICE, EXPOSURES

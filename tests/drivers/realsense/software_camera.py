@@ -23,6 +23,7 @@ class SoftwareCamera:
 
     Attributes:
         device: `rs.software_device`.
+        profiles: of its streams, by their kind.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class SoftwareCamera:
             (sensor, kind, bpp, sensor.add_video_stream(self._stream(kind, encoding, bpp, number, model)))
             for sensor, kind, encoding, bpp, number in kinds
         ]
+        self.profiles = {kind: profile.as_video_stream_profile() for _, kind, _, profile in self._streams}
         extrinsics = rs.extrinsics()
         extrinsics.rotation = [0, 1, 0, -1, 0, 0, 0, 0, 1]  # column by column
         extrinsics.translation = [-0.05, 0.01, 0.02]
@@ -60,7 +62,7 @@ class SoftwareCamera:
         fault = self.fault if number >= self._after else Fault.NONE
         if fault in {Fault.STALL, Fault.UNPLUG}:
             return
-        for sensor, kind, bpp, profile in self._streams:
+        for sensor, kind, bpp, _ in self._streams:
             depth = np.full((height, width), 1000 + number, np.uint16)
             depth[0 if fault != Fault.NAN else slice(None)] = 0
             images = {"depth": depth, "color": np.full((height, width, 3), number % 256, np.uint8)}
@@ -71,7 +73,7 @@ class SoftwareCamera:
                 frame.stride = width * bpp // 2  # rows with half of their pixels
             frame.timestamp, frame.domain = time_ms, rs.timestamp_domain.hardware_clock
             frame.frame_number = number
-            frame.profile = profile.as_video_stream_profile()
+            frame.profile = self.profiles[kind]
             if kind == "depth":
                 frame.depth_units = 0.0005
             sensor.on_video_frame(frame)

@@ -1,6 +1,7 @@
 """Bags of librealsense: synthetic files, written after the format description, are read back in SI units."""
 
 import contextlib
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -182,12 +183,10 @@ def test_arbitrary_image_messages_are_an_image_or_rejected(
         assert image.shape[:2] == (height, width)
 
 
-def test_depth_and_colour_of_a_real_bag_are_registered(shared_data: Path) -> None:
+def test_depth_and_colour_of_a_real_bag_are_registered(data_set: Callable[[str], Path]) -> None:
     """The room's corner, 1.9 m away, is at column 326 of the depth image and at column 330 of the colours."""
     pytest.importorskip("rosbags", reason="needs rosbags: make all")
-    path = shared_data / "realsense_bag" / "single_depth_color_640x480.bag"
-    if not path.is_file():
-        pytest.skip(f"no file {path}")
+    path = data_set("realsense_bag/single_depth_color_640x480.bag")
     read = RealsenseBag(path)
     frames = [frame for frame in read.frames() if frame.kind == Kind.DEPTH]
     assert [frame.seq for frame in frames] == [169, 170]

@@ -1,8 +1,6 @@
 """The RealSense driver on librealsense itself: its software device, and its recorder and player."""
 
 import contextlib
-import os
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -68,11 +66,9 @@ def test_every_stream_arrives_in_si_units_on_the_cameras_clock(camera: SoftwareC
     assert device.counters["frames"] == 20
 
 
-def test_the_extrinsics_of_the_colour_camera(device: RealsenseDevice) -> None:
+def test_the_extrinsics_of_the_colour_camera(camera: SoftwareCamera, device: RealsenseDevice) -> None:
     point = [0.1, -0.05, 0.8]
-    depth, color = (
-        stream.profile for used in device._used for stream in used.streams if stream.role.stream in {"depth", "color"}
-    )
+    depth, color = camera.profiles["depth"], camera.profiles["color"]
     moved = rs.rs2_transform_point_to_point(depth.get_extrinsics_to(color), point)
     expected = rs.rs2_project_point_to_pixel(color.get_intrinsics(), moved)
     np.testing.assert_allclose(device.cameras["color"].project(np.array(point)), expected, atol=1e-3)
@@ -82,7 +78,7 @@ def test_the_extrinsics_of_the_colour_camera(device: RealsenseDevice) -> None:
 def test_other_brown_conrady_models_are_near_enough_to_opencvs(model: str) -> None:
     camera = SoftwareCamera(model=model)
     device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
-    intrinsics = device._used[0].streams[0].profile.get_intrinsics()
+    intrinsics = camera.profiles["depth"].get_intrinsics()
     for point in ([0.1, -0.05, 0.8], [-0.3, 0.2, 0.8]):
         expected = rs.rs2_project_point_to_pixel(intrinsics, point)
         np.testing.assert_allclose(device.cameras["depth"].project(np.array(point)), expected, atol=0.01)
@@ -111,40 +107,6 @@ def test_host_times_follow_the_exposures_and_a_restart_is_a_new_epoch(
     device.close()
     with pytest.raises(DeviceError, match="closed"):
         device.start(receiver)
-
-
-def test_the_sink_may_stop_the_device(camera: SoftwareCamera, device: RealsenseDevice) -> None:
-    class Stopper(RecordingSink):
-        def on_frame(self, frame: Any) -> None:
-            super().on_frame(frame)
-            device.stop()
-
-    receiver = Stopper()
-    camera.run()
-    device.start(receiver)
-    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.CLOSED)
-    assert receiver.settle() == 1
-
-
-def test_resources_are_released(camera: SoftwareCamera) -> None:
-    camera.run()
-    resources = []
-    for _ in range(6):
-        device = of_device(rs, camera.device, device_info(rs, camera.device), time.monotonic_ns)
-        receiver = RecordingSink()
-        device.start(receiver)
-        receiver.wait(lambda receiver=receiver: len(receiver.frames) > 0)
-        device.close()
-        resources.append(threading.active_count() + len(os.listdir("/proc/self/fd")))
-    assert resources[-1] <= resources[1]
-
-
-def test_a_lost_camera_fails(camera: SoftwareCamera, device: RealsenseDevice) -> None:
-    device._camera = SimpleNamespace(is_connected=lambda: False)
-    receiver = RecordingSink()
-    device.start(receiver)
-    receiver.wait(lambda: receiver.states[-1][0] == DeviceState.FAILED)
-    assert receiver.states[-1] == (DeviceState.FAILED, "the camera is gone")
 
 
 def test_recordings_of_librealsense_are_played(tmp_path: Path, camera: SoftwareCamera) -> None:

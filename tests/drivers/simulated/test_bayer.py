@@ -8,8 +8,9 @@ from scipy.ndimage import gaussian_filter
 
 from calib.camera import Camera
 from drivers.simulated.address import parse
-from drivers.simulated.sensors.bayer import ORDERS, Mosaic
-from drivers.simulated.sensors.color import Picture
+from drivers.simulated.sensors.bayer import ORDERS, Bayer, Mosaic
+from drivers.simulated.sensors.color import Color, Picture
+from drivers.simulated.sensors.exposure import Exposure
 from drivers.simulated.simulation import Simulation
 
 
@@ -19,12 +20,13 @@ def build(query: str) -> Simulation:
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_the_mosaic_is_one_channel_per_pixel_of_the_colour_image(order: str) -> None:
-    simulation = build(f"sensors=color,bayer&noise=0&order={order}")
-    color, bayer = simulation.heads["color"], simulation.heads["bayer"]
-    bayer._picture = color._picture  # pyright: ignore[reportAttributeAccessIssue]  # two sensors behind one lens
-    frames, _ = simulation.expose(100)
-    rgb, mosaic = (frame.data for frame in frames)
-    assert frames[1].encoding == f"bayer_{order}8"
+    simulation = build("sensors=color")
+    picture = Picture(simulation.heads["color"].camera, simulation.scene)  # two sensors behind one lens
+    heads = Color("color", picture, 30, sigma=0), Bayer("bayer", picture, 30, sigma=0, mosaic=Mosaic(order))
+    exposure = Exposure(100, simulation.scene.at(3.3), np.random.default_rng(0), 0)
+    (color,), (bayer,) = (head.expose(exposure) for head in heads)
+    rgb, mosaic = color.data, bayer.data
+    assert bayer.encoding == f"bayer_{order}8"
     for row in range(2):
         for column in range(2):
             channel = {"r": 0, "g": 1, "b": 2}[order[2 * row + column]]
@@ -73,5 +75,10 @@ def test_a_pixel_of_a_fine_print_is_the_mean_over_its_area() -> None:
     dense = Picture(camera, simulation.scene, samples=12).take(moment)
     errors = [np.abs(Picture(camera, simulation.scene, n).take(moment) - dense).mean() for n in (1, 2, 4)]
     assert errors[0] > 2 * errors[1] > 4 * errors[2]
-    head = simulation.heads["color"]
-    assert head._picture._samples == 2  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def test_the_colour_head_takes_two_rays_per_pixel_and_axis_of_a_fine_print() -> None:
+    simulation = build("texture=fine&sensors=color&noise=0")
+    (frame,) = simulation.frames(0)
+    levels = Picture(simulation.heads["color"].camera, simulation.scene, samples=2).take(simulation.scene.at(0.0))
+    assert np.abs(frame.data.astype(np.float32) - levels).max() <= 0.501

@@ -2,7 +2,6 @@
 
 import threading
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import pytest
 
@@ -102,39 +101,6 @@ def test_a_temporary_fault_loses_the_declared_frames() -> None:
     assert device.counters["lost"] >= 3 * 2
 
 
-def test_nothing_arrives_after_stop_and_a_new_start_is_a_new_epoch() -> None:
-    time = Time()
-    device, sink = run(SMALL, time, 3)
-    count = len(sink.frames)
-    assert sink.states == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
-    again = Recorder(3)
-    device.start(again)
-    device.start(again)  # already running: nothing happens
-    assert again.full.wait(60)
-    device.close()
-    device.close()
-    assert len(sink.frames) == count
-    assert {frame.epoch for frame in sink.frames} == {0}
-    assert {frame.epoch for frame in again.frames} == {1}
-    sequence = [truth.seq for truth in again.truths]
-    assert all(later == earlier + 1 for earlier, later in pairwise(sequence))
-
-
-def test_a_sink_may_stop_the_device_itself() -> None:
-    class Impatient(Recorder):
-        def on_frame(self, frame: Frame) -> None:
-            super().on_frame(frame)
-            device.stop()
-
-    time = Time()
-    device = SimulatedDevice("", parse(f"simulated://sheet?{SMALL}").build(), time.clock, time.wait)
-    sink = Impatient(1)
-    device.start(sink)
-    device._thread.join(60)
-    assert sink.states[-1] == DeviceState.CLOSED
-    assert len(sink.truths) == 1
-
-
 def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
     heads = "tof,structured_light,color,bayer,ir,barrier"
     uri = f"simulated://board?seed=2&sensors={heads}&rate=15&color=64x48&tof=32x24"
@@ -149,8 +115,7 @@ def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
         "ir/ir",
         "barrier/binary",
     ]
-    assert isinstance(device, SimulatedDevice)
-    frames, _ = device._simulation.expose(0)
+    frames, _ = parse(uri).build().expose(0)
     for stream, frame in zip(device.capabilities.streams, frames, strict=True):
         camera = device.cameras[stream.sensor]
         assert (frame.kind, frame.encoding, frame.calib_id) == (stream.kind, stream.encoding, camera.calib_id)

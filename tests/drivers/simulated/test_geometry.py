@@ -8,7 +8,7 @@ from scipy.optimize import root_scalar
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from drivers.simulated.scene import scenes
 from drivers.simulated.scene.motion import Placement
 from drivers.simulated.scene.scene import REST_Z, WALL_Z, Moment, Scene

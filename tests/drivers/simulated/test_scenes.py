@@ -8,6 +8,7 @@ from drivers.contract.frame import Frame
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 from drivers.simulated.simulation import Simulation
+from tests.waiting import eventually
 
 
 def build(scene: str, query: str) -> Simulation:
@@ -77,7 +78,7 @@ def test_the_device_delivers_the_truth_of_both() -> None:
     waits = iter([False, True])
     device = SimulatedDevice("", simulation, lambda: 0, lambda stop, seconds: next(waits))
     device.start(log)
-    device._thread.join(60)
+    assert eventually(lambda: len(log.truths) == 2, 60)
     assert [(truth.seq, truth.surface) for truth in log.truths] == [(0, 0), (0, 1)]
 
 

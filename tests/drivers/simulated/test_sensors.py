@@ -8,6 +8,7 @@ from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.simulated.address import parse
 from drivers.simulated.sensors.time_of_flight import SIGMA_POLYNOMIAL, TimeOfFlight, TimeOfFlightNoise
+from drivers.simulated.sensors.view import View
 from drivers.simulated.simulation import Simulation
 
 
@@ -102,7 +103,7 @@ def test_sigma_and_offset_of_time_of_flight_follow_the_declared_model() -> None:
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
     depths = np.array([expose(simulation, k)[0]["tof/depth"].si() for k in range(30)])  # the first second is at rest
-    distance, amplitude = head.ideal(head._view.look(simulation.scene.at(0.0)))
+    distance, amplitude = head.ideal(View(simulation.scene, head.camera).look(simulation.scene.at(0.0)))
     bright = amplitude > 1000
     normalized = ((depths - distance - head.noise.mu(distance, amplitude)) / head.noise.sigma(distance, amplitude))[
         :, bright
@@ -138,7 +139,7 @@ def test_flying_pixels_are_between_sheet_and_wall() -> None:
     simulation = build("sensors=tof&noise=0")
     head = simulation.heads["tof"]
     assert isinstance(head, TimeOfFlight)
-    (sight,) = head._view.look(simulation.scene.at(4.0))
+    (sight,) = View(simulation.scene, head.camera).look(simulation.scene.at(4.0))
     depth = expose(simulation, 120)[0]["tof/depth"].si()[sight.region]
     rim = (sight.share > 0.2) & (sight.share < 0.8) & np.isfinite(depth)
     assert rim.sum() > 50

@@ -9,7 +9,7 @@ from scipy.spatial import KDTree
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from drivers.simulated.address import parse
 from drivers.simulated.shapes.elastica import solve_elastica
 from drivers.simulated.shapes.strip import GRAVITY, PlacedStrip, Strip

@@ -1,5 +1,6 @@
 """Acceptance on published sets of boards, and the rate at which the truth of a simulated rig lies where it should."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from scipy import stats
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
@@ -21,15 +22,9 @@ from evaluation.calibration import published_boards, simulated_rig
 from evaluation.calibration.published_boards import Published
 
 
-def folder(shared_data: Path, name: str) -> Path:
-    if not (shared_data / name).is_dir():
-        pytest.skip(f"{shared_data / name} is not there")
-    return shared_data / name
-
-
 @pytest.mark.slow
-def test_circles_give_the_published_intrinsics(shared_data: Path) -> None:
-    views, published = published_boards.circles(folder(shared_data, "calib_rct_circles"))
+def test_circles_give_the_published_intrinsics(data_set: Callable[[str], Path]) -> None:
+    views, published = published_boards.circles(data_set("calib_rct_circles"))
     solution = calibrate(Task({"camera": SensorTask(640, 480, BROWN_CONRADY)}, views, (), "camera"))
     found = np.array([parameter.value for parameter in solution.parameters[:4]])
     assert np.abs(found[:2] / published.matrix[:2] - 1).max() < 0.002
@@ -37,8 +32,8 @@ def test_circles_give_the_published_intrinsics(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_stereo_pair_stands_where_opencv_says(shared_data: Path) -> None:
-    views = published_boards.stereo(folder(shared_data, "calib_opencv_stereo"))
+def test_a_stereo_pair_stands_where_opencv_says(data_set: Callable[[str], Path]) -> None:
+    views = published_boards.stereo(data_set("calib_opencv_stereo"))
     solution = calibrate(Task({"left": SensorTask(640, 480), "right": SensorTask(640, 480)}, views, (), "left"))
     T_lr = solution.cameras["right"].T_rs
     expected = _opencv_stereo(views)
@@ -47,8 +42,8 @@ def test_a_stereo_pair_stands_where_opencv_says(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_an_azure_kinect_is_as_published_and_as_well_as_its_halves_agree(shared_data: Path) -> None:
-    views, published = published_boards.azure(folder(shared_data, "calib_azure_charuco"))
+def test_an_azure_kinect_is_as_published_and_as_well_as_its_halves_agree(data_set: Callable[[str], Path]) -> None:
+    views, published = published_boards.azure(data_set("calib_azure_charuco"))
     infrared = SensorTask(1024, 1024, RATIONAL, (_camera(published["infrared"], 1024, 1024),), fixed_intrinsics=True)
     color = SensorTask(4096, 3072, RATIONAL)
     pair = calibrate(Task({"color": color, "infrared": infrared}, views, (), "color", min_views_fixed=1))

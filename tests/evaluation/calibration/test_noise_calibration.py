@@ -1,5 +1,6 @@
 """Noise on real data: static parts of a sequence in which hands move, and a frame with the sensor's own deviations."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,8 @@ AT_REST = ((450, 550), (550, 650), (1000, 1300), (1300, 1700), (2200, 2800), (28
 
 
 @pytest.mark.slow
-def test_static_parts_of_a_real_sequence_have_the_published_noise(shared_data: Path) -> None:
-    if not (shared_data / "sl_rgbd_deform_petit").is_dir():
-        pytest.skip("the sequence is not there")
-    static, one = noise_calibration.petit(shared_data)
+def test_static_parts_of_a_real_sequence_have_the_published_noise(data_set: Callable[[str], Path]) -> None:
+    static, one = noise_calibration.petit(data_set("sl_rgbd_deform_petit").parent)
     assert static.steps.growth == pytest.approx(2.85e-3, rel=0.1)
     rows = zip(noise_calibration.BINS, noise_calibration.WITH_MOTION, noise_calibration.by_distance(static, one))
     for place, published, (still, everything, _, pixels) in rows:
@@ -27,10 +26,8 @@ def test_static_parts_of_a_real_sequence_have_the_published_noise(shared_data: P
     assert 0.1 < static.moving < 0.5
 
 
-def test_the_o3r_claims_less_than_neighbouring_pixels_differ_by(shared_data: Path) -> None:
-    if not (shared_data / "tof_ifm_o3r").is_dir():
-        pytest.skip("the frame is not there")
-    everything, near, *_ = noise_calibration.o3r(shared_data)
+def test_the_o3r_claims_less_than_neighbouring_pixels_differ_by(data_set: Callable[[str], Path]) -> None:
+    everything, near, *_ = noise_calibration.o3r(data_set("tof_ifm_o3r").parent)
     assert everything.pixels > 4000
     assert everything.within_95 == pytest.approx(0.354, abs=0.03)
     assert near.ratio == pytest.approx(1.69, rel=0.1)

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from abs_service import Status
-from evaluation.inputs.recordings import features, sponge
+from evaluation.inputs.recordings import features
 from evaluation.inputs.recordings.binding import bind, bind_rays
 from evaluation.inputs.recordings.kinect_paper import MaterialErrors, share_inside
+from evaluation.inputs.recordings.toy import sponge
 
 SIDE = 0.01
 

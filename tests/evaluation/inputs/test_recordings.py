@@ -1,8 +1,7 @@
 """Real recordings: a toy, a sponge, a sheet, an O3R's own σ, an Azure Kinect; and what the figures are made of."""
 
 import time
-import tomllib
-from importlib import resources
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,31 +10,11 @@ import pytest
 from calib.camera import Camera
 from evaluation.experiment import Context, UnavailableError
 from evaluation.inputs import recordings
-from evaluation.inputs.recordings import (
-    azure,
-    dropouts,
-    kinect_paper,
-    kinect_paper_report,
-    sigma_image,
-    sigma_report,
-    sponge_report,
-    toy,
-)
+from evaluation.inputs.recordings import azure, kinect_paper, kinect_paper_report, sigma_image, sigma_report
 from evaluation.inputs.recordings.agreement import agreement
+from evaluation.inputs.recordings.toy import dropouts, sponge_report, toy
 
 CAMERA = Camera(40, 30, 40.0, 40.0, 19.5, 14.5)
-
-
-def folder(shared_data: Path, name: str) -> Path:
-    if not (shared_data / name).is_dir():
-        pytest.skip(f"{shared_data / name} is not there")
-    return shared_data / name
-
-
-def test_the_toy_is_tracked_with_the_example_that_users_are_given():
-    example = Path(__file__).parents[3] / "examples" / "image_folder.toml"
-    own = resources.files(recordings).joinpath("toy.toml").read_text(encoding="utf-8")
-    assert tomllib.loads(own) == tomllib.loads(example.read_text(encoding="utf-8"))
 
 
 def test_a_mesh_that_is_half_the_object_and_too_near_agrees_by_as_much():
@@ -66,8 +45,8 @@ def test_a_search_within_the_rate_misses_nothing_and_one_that_is_not_misses_what
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_a_real_toy_is_tracked_within_the_goals(shared_data: Path) -> None:
-    sequence = toy.Toy(folder(shared_data, toy.FOLDER), 30)
+def test_a_real_toy_is_tracked_within_the_goals(data_set: Callable[[str], Path]) -> None:
+    sequence = toy.Toy(data_set(toy.FOLDER), 30)
     frames = list(sequence.follow(time.process_time_ns, lambda k, frames: None if k in (12, 20, 21) else frames))
     usual, least = toy.medians(frames), toy.worst(frames)
     assert [frame.index for frame in frames] == [k for k in range(30) if k not in (12, 20, 21)]
@@ -79,8 +58,8 @@ def test_a_real_toy_is_tracked_within_the_goals(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_real_sponge_keeps_its_mesh(shared_data: Path) -> None:
-    found = sponge_report.findings(folder(shared_data, toy.FOLDER), 6, lambda text: None).values["sponge"]
+def test_a_real_sponge_keeps_its_mesh(data_set: Callable[[str], Path]) -> None:
+    found = sponge_report.findings(data_set(toy.FOLDER), 6, lambda text: None).values["sponge"]
     assert max(*found["forward_mm"], *found["backward_mm"]) < 1
     assert max(found["off"]) == 0
     assert found["drift_px"][0] == pytest.approx(0, abs=1e-3)  # corners are bound where they are seen
@@ -89,8 +68,8 @@ def test_a_real_sponge_keeps_its_mesh(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_real_paper_is_where_it_was_measured(shared_data: Path) -> None:
-    found = kinect_paper_report.findings(folder(shared_data, kinect_paper.FOLDER), 3, 1, lambda text: None)
+def test_real_paper_is_where_it_was_measured(data_set: Callable[[str], Path]) -> None:
+    found = kinect_paper_report.findings(data_set(kinect_paper.FOLDER), 3, 1, lambda text: None)
     run = found.values["kinect_paper"][kinect_paper.CELLS[0].name]
     assert run["number"] == [16, 24]
     assert run["status"] == ["TRACKING", "TRACKING"]
@@ -98,8 +77,8 @@ def test_real_paper_is_where_it_was_measured(shared_data: Path) -> None:
 
 
 @pytest.mark.slow
-def test_factor_and_floor_make_likely_what_the_sensor_s_own_deviations_do_not(shared_data: Path) -> None:
-    found = sigma_report.findings(folder(shared_data, sigma_report.FOLDER), 0, rounds=1)
+def test_factor_and_floor_make_likely_what_the_sensor_s_own_deviations_do_not(data_set: Callable[[str], Path]) -> None:
+    found = sigma_report.findings(data_set(sigma_report.FOLDER), 0, rounds=1)
     rows = found.values["o3r"]
     fitted, reported_sigma = rows[sigma_image.FITTED], rows[sigma_image.CLAIMED]
     assert fitted["log_likelihood"] > reported_sigma["log_likelihood"] + 1
@@ -108,9 +87,9 @@ def test_factor_and_floor_make_likely_what_the_sensor_s_own_deviations_do_not(sh
 
 
 @pytest.mark.slow
-def test_a_real_frame_s_colours_fit_its_amplitudes(shared_data: Path) -> None:
+def test_a_real_frame_s_colours_fit_its_amplitudes(data_set: Callable[[str], Path]) -> None:
     pytest.importorskip("av", reason="PyAV reads the recording")
-    found = azure.findings(folder(shared_data, azure.FOLDER)).values["azure"]
+    found = azure.findings(data_set(azure.FOLDER)).values["azure"]
     assert found["edges"] > 1.3
     assert found["forward_mm"] < 2
 

@@ -9,7 +9,7 @@ from evaluation.experiment import Context
 from evaluation.method import ablations
 from evaluation.method.ablations import plain_cma
 from evaluation.method.ablations.cold_start import Cold, Forgetful
-from tests.tracker.problems import linear, minimize
+from tests.abs_service.tracker.optimizers.problems import linear, minimize
 
 TARGET = np.array([1.0, -2.0])
 

@@ -16,7 +16,7 @@ def test_the_pose_error_of_a_flat_grid_is_how_far_it_was_turned_and_moved():
     moved[:3, :3] = turned[:3, :3] @ T_rp[:3, :3]
     moved[:3, 3] += [0.0, 0.003, -0.004]
     flat = Sheet(moved, 0.3, 0.2).mesh(300).vertices
-    rotation_mrad, translation_mm = flexpad._pose_error(flat, T_rp)
+    rotation_mrad, translation_mm = flexpad.pose_error(flat, T_rp)
     assert rotation_mrad == pytest.approx(30.0, rel=0.01)
     assert translation_mm == pytest.approx(5.0, rel=0.01)
 

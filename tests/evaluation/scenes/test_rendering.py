@@ -5,7 +5,7 @@ import pytest
 
 from calib import pose
 from calib.camera import Camera
-from calib.lens import Lens
+from calib.lenses.lens import Lens
 from evaluation.scenes.rendering import Renderer
 from evaluation.scenes.surfaces import NO_WALL, Sheet, SplineSurface, Wall, knots
 

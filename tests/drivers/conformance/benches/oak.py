@@ -13,12 +13,13 @@ import pytest
 
 from drivers.contract.device import Device
 from drivers.contract.errors import SdkMissingError
-from drivers.oak import library, playback
+from drivers.oak import library
 from drivers.oak.address import parse
-from drivers.oak.connection import Connection
 from drivers.oak.device import OakDevice
-from drivers.oak.messages import Queue
-from drivers.oak.picture import Picture
+from drivers.oak.images.messages import Queue
+from drivers.oak.images.picture import Picture
+from drivers.oak.source import playback
+from drivers.oak.source.connection import Connection
 from tests.drivers.conformance.bench import BEFORE, Fault
 
 SAMPLE = Path(__file__).parents[4] / "recordings" / "sample_oak"

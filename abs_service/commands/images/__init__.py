@@ -1,0 +1,1 @@
+"""The import of images and of other programs' recordings."""

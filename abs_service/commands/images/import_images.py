@@ -1,0 +1,172 @@
+"""Turns images or a recording of another program into a recording that `abs-service replay` tracks.
+
+  abs-service import data/cloth --layout pairs --camera cloth.toml --out cloth.mcap
+  abs-service import data/cloth --layout pairs --camera cloth.toml --depth 'd*.png' --color 'c*.jpg' --out cloth.mcap
+  abs-service import rgbd_dataset_freiburg1_xyz --layout tum --out xyz.mcap
+  abs-service import kinect.mkv --layout azure --out kinect.mcap
+
+Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
+process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 bag). See docs/devices.md.
+
+Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
+the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
+and their times.
+
+Depth images have one channel of 16 bits, in millimetres (`pairs`) or 1/5000 m (`tum`), colour images have 8 bits. The
+camera file says what took them; without a table `color` in it there are no colour images:
+
+  [depth]
+  width = 320
+  height = 240
+  fx = 275.0
+  fy = 275.0
+  cx = 160.0
+  cy = 120.0
+  depth_scale = 0.001     # metres per unit; optional, as are the following
+  geometry = "z"          # or "radial": from the camera centre
+  invalid = 0             # means "no return"
+  lens = []               # k1 k2 p1 p2 k3 k4 k5 k6, in OpenCV's order; k1 k2 k3 k4 if lens_model = "fisheye"
+  T_rs = { rotation_vector = [0.0, 0.0, 0.0], translation = [0.0, 0.0, 0.0] }   # sensor to rig
+
+  [color]                 # the same keys but depth_scale, geometry and invalid
+"""
+
+import argparse
+import math
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from abs_service.commands.images import camera_file, import_file
+from abs_service.commands.images.camera_file import CameraFile
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.frame import Geometry
+from drivers.encoding.foreign_recording import ForeignRecording
+from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
+from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
+from drivers.opening import open_recording
+
+#: Metres per unit of depth images whose camera file does not tell.
+DEPTH_SCALES = {"pairs": 0.001, "tum": 1 / 5000}
+#: Layouts that are one file and know their cameras.
+RECORDINGS = ("azure", "o3r", "oak", "realsense")
+
+
+class ImportOptionError(Exception):
+    """Options that do not go together, or a file that they name and that cannot be used."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service import`."""
+    parser.add_argument("path", type=Path, metavar="PATH", help="folder with the images, or file")
+    parser.add_argument("--layout", choices=sorted([*DEPTH_SCALES, *RECORDINGS]), required=True, help="what it is")
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="FILE.mcap", help="recording to write; must not exist"
+    )
+    parser.add_argument("--camera", type=Path, metavar="FILE", help="camera file, TOML or JSON (pairs; tum: optional)")
+    parser.add_argument("--depth", default="depth_*.png", metavar="GLOB", help="depth images (pairs; %(default)s)")
+    parser.add_argument("--color", default="color_*.png", metavar="GLOB", help="colour images (pairs; %(default)s)")
+    parser.add_argument("--mask", metavar="GLOB", help="images, black or transparent where depth is left out (pairs)")
+    parser.add_argument(
+        "--rate", type=_rate, default=30.0, metavar="HZ", help="exposures per second (pairs; %(default)g)"
+    )
+    parser.add_argument("--rig", type=Path, metavar="FILE", help="configuration to attach, for a replay without one")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Imports; what is wrong with the images or options is raised as an error of this package or of `drivers`."""
+    rig_toml = _rig(arguments.rig)
+    foreign_recording = _foreign_recording(arguments)
+    if arguments.out.exists():
+        raise ImportOptionError(f"{arguments.out}: exists already; remove it or choose another name")
+    partial = arguments.out.with_name(f"{arguments.out.name}.partial")
+    try:
+        counts = import_file.write(partial, arguments.path.resolve().stem, foreign_recording, rig_toml)
+        partial.rename(arguments.out)
+    except OSError as error:
+        raise ImportOptionError(f"{arguments.out}: cannot be written: {error.strerror}") from error
+    finally:
+        partial.unlink(missing_ok=True)
+    names = (
+        (stream if sensor == stream else f"{sensor}/{stream}", number) for (sensor, stream), number in counts.items()
+    )
+    print(f"{arguments.out}: {', '.join(f'{number} {name}' for name, number in names)} images")
+    return Exit.OK
+
+
+def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
+    if arguments.layout not in RECORDINGS:
+        return ImageFolder(_streams(arguments, _cameras(arguments)))
+    for option in ("camera", "mask"):
+        if getattr(arguments, option) is not None:
+            raise ImportOptionError(f"--{option}: a recording with layout {arguments.layout} needs none")
+    return open_recording(arguments.layout, arguments.path)
+
+
+def _cameras(arguments: argparse.Namespace) -> CameraFile:
+    if arguments.camera is not None:
+        return camera_file.load(arguments.camera)
+    if arguments.layout == "tum":
+        return camera_file.TUM
+    raise ImportOptionError("--camera: layout pairs needs a camera file; `abs-service import --help` shows one")
+
+
+def _rig(path: Path | None) -> bytes:
+    """The text of the configuration to attach, empty if there is none."""
+    if path is None:
+        return b""
+    try:
+        text = path.read_bytes()
+        tomllib.loads(text.decode())
+    except OSError as error:
+        raise ImportOptionError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
+        raise ImportOptionError(f"{path}: not TOML: {error}") from error
+    return text
+
+
+def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str, Images]:
+    """The images to import, by sensor name."""
+    numbered = arguments.layout == "pairs"
+    if arguments.mask is not None and not numbered:
+        raise ImportOptionError("--mask: only layout pairs has masks")
+    folder, rate = arguments.path, arguments.rate
+    if not folder.is_dir():
+        raise ImageFolderError(f"{folder}: no such folder")
+    depth = cameras.depth
+    files = by_number(folder, arguments.depth, rate) if numbered else by_list(folder, "depth.txt")
+    streams: dict[str, Images] = {
+        "depth": DepthImages(
+            files=files,
+            camera=depth.camera(),
+            scale=depth.depth_scale or DEPTH_SCALES[arguments.layout],
+            geometry=Geometry(depth.geometry),
+            invalid=depth.invalid,
+            masks=_masks(files, folder, arguments.mask, rate),
+        )
+    }
+    if cameras.color is not None:
+        files = by_number(folder, arguments.color, rate) if numbered else by_list(folder, "rgb.txt")
+        streams["color"] = ColorImages(files, cameras.color.camera())
+    return streams
+
+
+def _masks(depth: Sequence[ImageFile], folder: Path, pattern: str | None, rate_hz: float) -> Mapping[int, Path]:
+    """The mask of every depth image by sequence number; none at all without a pattern."""
+    if pattern is None:
+        return {}
+    masks = {mask.seq: mask.path for mask in by_number(folder, pattern, rate_hz)}
+    for file in depth:
+        if file.seq not in masks:
+            raise ImageFolderError(f"{file.path}: no mask that matches {pattern!r} has the number {file.seq}")
+    return masks
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 0.001 <= rate <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0.001 to 10000")
+    return rate

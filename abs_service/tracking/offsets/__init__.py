@@ -1,0 +1,1 @@
+"""Offsets of the vertices from the model's surface, learnt over frames."""

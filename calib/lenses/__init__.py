@@ -1,0 +1,1 @@
+"""Lens models, their inverses, and the ideal viewing directions of a camera's pixels."""

@@ -1,0 +1,1 @@
+"""Cameras of an OAK: intrinsics and extrinsics from its factory calibration."""

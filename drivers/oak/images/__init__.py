@@ -1,0 +1,1 @@
+"""Images of an OAK, from depthai's queues and from its recordings."""

@@ -1,0 +1,86 @@
+"""The names that are promised, what they cost to import, and the examples that use them."""
+
+import inspect
+import re
+import subprocess
+import sys
+from enum import StrEnum
+from pathlib import Path
+
+import pytest
+
+import abs_service as a
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+HEAVY = {"numpy", "numba", "cv2", "scipy", "pydantic", "mcap", "zenoh"}
+CALLS = [getattr(a, name) for name in a.__all__ if name != "noise"] + [
+    getattr(a.noise, name) for name in a.noise.__all__
+]
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    code = f"import sys, abs_service; print(sorted({HEAVY} & set(sys.modules)))"
+    found = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"
+
+
+def test_promised_names_are_listed_and_others_refused():
+    assert set(a.__all__) <= set(dir(a))
+    assert a.__all__ == sorted(a.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'Trakcer'"):
+        getattr(a, "Trakcer")  # noqa: B009  a type checker knows already
+
+
+@pytest.mark.parametrize("call", CALLS, ids=lambda call: call.__name__)
+def test_everything_promised_is_documented_and_typed(call):
+    assert inspect.getdoc(call)
+    if inspect.isclass(call) and issubclass(call, (Exception, StrEnum)):
+        return
+    methods = [one for name, one in vars(call).items() if inspect.isfunction(one) and not name.startswith("_")]
+    for member in (call, *methods):
+        assert inspect.getdoc(member)
+        parameters = inspect.signature(member).parameters
+        assert [name for name, one in parameters.items() if name != "self" and one.annotation is one.empty] == []
+
+
+def test_the_page_describes_every_name_and_argument():
+    for name in [*a.__all__, *a.noise.__all__]:
+        assert f"`{name}" in PAGE or f".{name}" in PAGE or f"{name}(" in PAGE, name
+    for call in (a.Tracker, a.Tracker.track, a.Rig.tracker):
+        for name in inspect.signature(call).parameters.keys() - {"self"}:
+            assert f"`{name}`" in PAGE, name
+    for field in (*a.Estimate.__dataclass_fields__, *a.Image.__dataclass_fields__):
+        assert f"`{field}`" in PAGE, field
+
+
+def test_the_ten_lines_of_the_page_run(tmp_path):
+    """With frames rendered in place of the reader's."""
+    code = re.findall(r"```python\n(.*?)```", PAGE, re.S)[0]
+    frames = "import numpy as np\ndepth = np.full((480, 640), np.nan)\ndepth[150:330, 200:440] = 0.8\n"
+    program = frames + "frames = [(0.0, depth, None)]\n" + code
+    found = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert found.stdout.startswith("TRACKING")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("example", "folder", "limit_mm"),
+    [("toy_folder.py", "sl_rgbd_deform_petit", 1.5), ("kinect_paper.py", "sl_kinect_paper", 2.0)],
+)
+def test_an_example_tracks_its_folder(example, folder, limit_mm, data_set):
+    command = [sys.executable, ROOT / "examples" / example, data_set(folder)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        lines = [line.split() for line, _ in zip(process.stdout, range(30))]
+        process.kill()
+    assert len(lines) == 30
+    assert [status for _, status, *_ in lines].count("TRACKING") >= 28
+    assert max(float(residual) for _, _, residual, _ in lines) < limit_mm
+
+
+@pytest.mark.parametrize("name", ["toy_folder.py", "kinect_paper.py"])
+def test_an_example_needs_only_the_public_face(name):
+    text = (ROOT / "examples" / name).read_text(encoding="utf-8")
+    assert re.findall(r"^(?:import|from) abs_service.*", text, re.M) == ["import abs_service as a"]
+    assert len(text.splitlines()) <= 35

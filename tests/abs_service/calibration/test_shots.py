@@ -1,0 +1,143 @@
+"""Shots from recordings, folders and devices, and what they show of a board, against the simulator's truth."""
+
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from abs_service.calibration.shots.corner_extraction import BoardObservations, see
+from abs_service.calibration.shots.live_shots import LiveShots, NamedDevice
+from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
+from abs_service.calibration.shots.shots import SensorShot, Shot, ShotsError
+from calib import pose
+from calib.board.corners import errors
+from calib.camera import Camera
+from calib.pose import Pose
+from drivers.opening import open_device
+from drivers.replay.recording import Recording
+from tests.abs_service.calibration.simulated import Filmed, record, scene
+from tests.calib.board.boards import VGA, as_bytes, centered, photograph
+
+CHESSBOARD = scene("chessboard", "sensors=tof,structured_light,color", "rate=6", "seed=2", "color=640x480", "hold=1")
+
+
+def plane_error(pixels, distances, camera: Camera, T_rb: Pose) -> np.ndarray:
+    """Measured distances less those of a plane [m]."""
+    T_sb = camera.T_sr @ T_rb
+    normal = T_sb[:3, 2]
+    return distances - (normal @ T_sb[:3, 3]) / (camera.directions(pixels) @ normal)
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    path = tmp_path_factory.mktemp("shots") / "board.mcap"
+    return Recording(record(Filmed(CHESSBOARD.simulation, 26), path))
+
+
+@pytest.fixture(scope="module")
+def seen(recording: Recording) -> BoardObservations:
+    shots = RecordingShots(recording, every_s=0.1)
+    return sum((see(CHESSBOARD.target, shot, recording.cameras) for shot in shots), BoardObservations())
+
+
+@pytest.mark.slow
+def test_a_recording_shows_corners_and_planes_where_they_truly_are(
+    recording: Recording, seen: BoardObservations
+) -> None:
+    simulation = CHESSBOARD.simulation
+    assert {view.sensor for view in seen.corners} == {"tof", "color"}
+    assert {view.sensor for view in seen.planes} == {"tof", "structured_light"}
+    assert seen.sizes == {"tof": (176, 144), "color": (640, 480), "structured_light": (320, 240)}
+    for view in seen.corners:
+        T_rb = CHESSBOARD.true_pose(simulation, view.t_s)
+        true = recording.cameras[view.sensor].project(pose.transform(T_rb, view.points_b))
+        assert np.sqrt(np.mean((view.pixels - true) ** 2)) < 0.15
+    for view in seen.planes:
+        error = plane_error(
+            view.pixels, view.distances, recording.cameras[view.sensor], CHESSBOARD.true_pose(simulation, view.t_s)
+        )
+        assert abs(error.mean()) < 0.003
+        assert 0.6 < np.sqrt(np.mean(np.square(error / view.sigmas))) < 1.6
+
+
+@pytest.mark.slow
+def test_a_board_that_moves_is_refused_and_one_that_is_held_is_not(seen: BoardObservations) -> None:
+    rejected = {shot for (shot, sensor), why in seen.rejected.items() if isinstance(why, errors.MovedError)}
+    held = {view.shot for view in seen.corners if view.sensor == "color"}
+    # Of every twelve exposures, the first six are still; shot n is exposure n + 1 and is compared with exposure n.
+    assert held >= {0, 1, 2, 3, 4, 12, 13, 14, 15, 16, 24}
+    assert rejected >= {7, 8, 9}
+    assert not held & {7, 8, 9, 19, 20, 21}
+
+
+def test_a_recording_without_images_is_refused(tmp_path: Path) -> None:
+    path = record(Filmed(scene("circles", "sensors=barrier").simulation, 2), tmp_path / "beam.mcap")
+    with pytest.raises(ShotsError, match=r"beam\.mcap: no image in it shows a board: barrier/binary"):
+        list(RecordingShots(Recording(path)))
+
+
+def write(folder: Path, name: str, distance: float) -> None:
+    T_sb = centered(CHESSBOARD.target, (0.2, 0.1, 0), distance)
+    cv2.imwrite(str(folder / name), as_bytes(photograph(CHESSBOARD.target, VGA, T_sb)))
+
+
+def test_images_in_folders_are_paired_by_the_last_number_in_their_names(tmp_path: Path) -> None:
+    for name, distance in (("left02.png", 0.7), ("left10.png", 0.8), ("r_2.png", 0.9), ("r_3.png", 0.75)):
+        write(tmp_path, name, distance)
+    shots = list(FolderShots({"left": f"{tmp_path}/left*.png", "right": f"{tmp_path}/r_*.png"}))
+    assert [(shot.number, sorted(shot.sensor_shots)) for shot in shots] == [
+        (2, ["left", "right"]),
+        (3, ["right"]),
+        (10, ["left"]),
+    ]
+    seen = sum((see(CHESSBOARD.target, shot, {}) for shot in shots), BoardObservations())
+    assert [(view.shot, view.sensor) for view in seen.corners] == [
+        (2, "left"),
+        (2, "right"),
+        (3, "right"),
+        (10, "left"),
+    ]
+
+
+def test_what_is_no_image_is_named(tmp_path: Path) -> None:
+    (tmp_path / "left01.png").write_bytes(b"nothing")
+    with pytest.raises(ShotsError, match=r"left01\.png: this is no image"):
+        list(FolderShots({"left": f"{tmp_path}/left*.png"}))
+    with pytest.raises(ShotsError, match=r"images of right: .*no file matches 'right\*\.png'"):
+        list(FolderShots({"right": f"{tmp_path}/right*.png"}))
+
+
+def test_devices_deliver_the_newest_shot() -> None:
+    device = open_device("simulated://target?speed=0&sensors=tof,color&rate=20", time.monotonic_ns)
+    wired = {"sim": NamedDevice(device, {"tof": "depth_camera", "color": "color"})}
+    with LiveShots(wired, device.cameras, 12_000_000, time.monotonic_ns) as shots:
+        first, second = (shot for shot, _ in zip(shots, range(2)))
+    assert set(first.sensor_shots) == {"depth_camera", "color"}
+    assert first.sensor_shots["depth_camera"].distance.shape == (144, 176)
+    assert second.t_ns > first.t_ns
+    assert second.number == 1
+
+
+def test_a_device_that_fails_ends_the_shots_with_its_reason() -> None:
+    device = open_device("simulated://target?fault=unplug@3&sensors=tof&rate=50", time.monotonic_ns)
+    with (
+        LiveShots({"sim": NamedDevice(device, {"tof": "tof"})}, device.cameras, 12_000_000, time.monotonic_ns) as shots,
+        pytest.raises(ShotsError, match="device sim failed"),
+    ):
+        list(shots)
+
+
+def test_z_distances_without_a_camera_are_refused(recording: Recording) -> None:
+    with pytest.raises(ShotsError, match="structured_light/depth: distances along z need the camera model"):
+        list(RecordingShots(recording, cameras={"tof": recording.cameras["tof"]}))
+
+
+def test_a_saturated_amplitude_is_refused_although_its_corners_are_found() -> None:
+    T_sb = centered(CHESSBOARD.target, (0.3, 0.2, 0), 0.7)
+    image = photograph(CHESSBOARD.target, VGA, T_sb, black=0.2, white=1.3, noise=0.01)
+    amplitude = np.clip(4095 * image, 0, 4095).astype(np.uint16)
+    shot = Shot(0, {"tof": SensorShot(0, amplitude, amplitude, own_light=True)})
+    (why,) = see(CHESSBOARD.target, shot, {}).rejected.values()
+    assert isinstance(why, errors.SaturatedError)

@@ -1,0 +1,198 @@
+"""`abs-service import` makes a recording that can be replayed, or says with exit code 2 what is wrong."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from abs_service import cli
+from abs_service.supervision.exit_codes import Exit
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.replay import Recording
+from tests.drivers.o3r import pcic_messages
+
+CAMERA = """\
+[depth]
+width = 4
+height = 3
+fx = 4.0
+fy = 4.0
+cx = 1.5
+cy = 1.0
+"""
+COLOR = CAMERA.replace("depth", "color") + "T_rs = { translation = [0.05, 0.0, 0.0] }\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Three exposures, one of them without colour, and a camera file."""
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"depth_{k:03}.png"), np.full((3, 4), 1000 + k, np.uint16))
+        cv2.imwrite(str(tmp_path / f"mask_{k:03}.png"), np.eye(3, 4, dtype=np.uint8))
+        if k != 1:
+            cv2.imwrite(str(tmp_path / f"color_{k:03}.png"), np.full((3, 4, 3), 40 * k, np.uint8))
+    (tmp_path / "camera.toml").write_text(CAMERA + COLOR)
+    return tmp_path
+
+
+def run(folder: Path, *options: str) -> int:
+    return cli.main(["import", str(folder), "--layout", "pairs", "--out", str(folder / "out.mcap"), *options])
+
+
+def frames_of(path: Path) -> list[Frame]:
+    return [item for item in Recording(path).frames() if isinstance(item, Frame)]
+
+
+def test_pairs_become_a_recording(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = folder / "rig.toml"
+    rig.write_text('version = 1\nname = "cloth"\n')
+    camera = str(folder / "camera.toml")
+    assert run(folder, "--camera", camera, "--rate", "10", "--rig", str(rig), "--mask", "mask_*.png") == Exit.OK
+    assert "3 depth, 2 color images" in capsys.readouterr().out
+    recording = Recording(folder / "out.mcap")
+    assert recording.config == rig.read_text()
+    assert recording.counts == {("depth", "depth"): 3, ("color", "color"): 2}
+    assert recording.cameras["color"].center.tolist() == [0.05, 0, 0]
+    frames = frames_of(folder / "out.mcap")
+    assert [(frame.sensor, frame.seq, frame.t_host_ns) for frame in frames] == [
+        ("depth", 0, 0),
+        ("color", 0, 0),
+        ("depth", 1, 100_000_000),
+        ("depth", 2, 200_000_000),
+        ("color", 2, 200_000_000),
+    ]
+    assert (frames[2].scale, frames[2].geometry) == (0.001, Geometry.Z)
+    np.testing.assert_array_equal(np.isfinite(frames[2].si()), np.eye(3, 4, dtype=bool))
+
+
+def test_the_same_images_give_the_same_bytes(folder: Path) -> None:
+    run(folder, "--camera", str(folder / "camera.toml"))
+    first = (folder / "out.mcap").read_bytes()
+    (folder / "out.mcap").unlink()
+    run(folder, "--camera", str(folder / "camera.toml"))
+    assert (folder / "out.mcap").read_bytes() == first
+
+
+def test_a_camera_file_may_be_json_and_say_more_about_depth(folder: Path) -> None:
+    depth = {"width": 4, "height": 3, "fx": 4, "fy": 4, "cx": 1.5, "cy": 1, "lens": [-0.1, 0.01]}
+    depth |= {"depth_scale": 0.0001, "geometry": "radial", "invalid": 1001}
+    (folder / "camera.json").write_text(json.dumps({"depth": depth}))
+    assert run(folder, "--camera", str(folder / "camera.json")) == Exit.OK
+    frames = frames_of(folder / "out.mcap")
+    assert {frame.sensor for frame in frames} == {"depth"}
+    assert (frames[0].scale, frames[0].geometry, frames[0].invalid) == (0.0001, Geometry.RADIAL, 1001)
+    assert not np.any(np.isfinite(frames[1].si()))
+    assert Recording(folder / "out.mcap").cameras["depth"].lens.coefficients[:2].tolist() == [-0.1, 0.01]
+
+
+def test_a_camera_file_may_describe_a_fisheye(folder: Path) -> None:
+    depth = {"width": 4, "height": 3, "fx": 4, "fy": 4, "cx": 1.5, "cy": 1, "lens": [-0.1], "lens_model": "fisheye"}
+    (folder / "camera.json").write_text(json.dumps({"depth": depth}))
+    assert run(folder, "--camera", str(folder / "camera.json")) == Exit.OK
+    lens = Recording(folder / "out.mcap").cameras["depth"].lens
+    assert (lens.name, lens.coefficients.tolist()) == ("fisheye", [-0.1, 0, 0, 0])
+
+
+def test_a_benchmark_sequence_needs_no_camera_file(tmp_path: Path) -> None:
+    for name, image in (("depth", np.full((480, 640), 5000, np.uint16)), ("rgb", np.zeros((480, 640, 3), np.uint8))):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+        (tmp_path / f"{name}.txt").write_text(f"1305031102.5 {name}.png\n")
+    assert cli.main(["import", str(tmp_path), "--layout", "tum", "--out", str(tmp_path / "out.mcap")]) == Exit.OK
+    depth, _ = frames_of(tmp_path / "out.mcap")
+    assert depth.si()[0, 0] == 1.0
+    assert depth.t_host_ns == 1_305_031_102_500_000_000
+    assert Recording(tmp_path / "out.mcap").cameras["depth"].fx == 525
+
+
+def test_a_recording_of_another_program_brings_its_calibration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "o3r.data").write_bytes(pcic_messages.exposure(3) + pcic_messages.exposure(4))
+    arguments = ["import", str(tmp_path / "o3r.data"), "--layout", "o3r", "--out", str(tmp_path / "out.mcap")]
+    assert cli.main([*arguments, "--camera", "camera.toml"]) == Exit.USER
+    assert "--camera: a recording with layout o3r needs none" in capsys.readouterr().err
+    assert cli.main(arguments) == Exit.OK
+    assert "2 depth, 2 depth/deviation, 2 depth/amplitude, 2 depth/confidence images" in capsys.readouterr().out
+    recording = Recording(tmp_path / "out.mcap")
+    assert recording.cameras["depth"].fx == pcic_messages.LENS[0]
+    deviations = [frame for frame in frames_of(tmp_path / "out.mcap") if frame.kind == Kind.DEVIATION]
+    assert [frame.unit for frame in deviations] == ["m", "m"]
+
+
+@pytest.mark.parametrize(
+    ("camera", "options", "complaint"),
+    [
+        (CAMERA, ["--depth", "*.tiff"], "no file matches '*.tiff'"),
+        (CAMERA, ["--mask", "m_*.png"], "no file matches 'm_*.png'"),
+        (CAMERA, ["--mask", "mask_*[01].png"], "depth_002.png: no mask that matches 'mask_*[01].png' has the number 2"),
+        (
+            CAMERA,
+            ["--depth", "color_*.png"],
+            "color_000.png: depth must have one channel of 16 bits, this is 3 × 8 bit",
+        ),
+        (CAMERA.replace("width = 4", "width = 5"), [], "depth_000.png: the image has 4 × 3 pixels, its camera 5 × 3"),
+        (CAMERA.replace("fx = 4.0\n", ""), [], "depth.fx: missing, but needed"),
+        (CAMERA.replace("fx", "focal"), [], "depth.focal: unknown key"),
+        (CAMERA.replace("fx = 4.0", "fx = -4.0"), [], "depth.fx = -4.0: must be greater than 0"),
+        (CAMERA + "geometry = 'x'", [], "depth.geometry = \"x\": must be 'z' or 'radial'"),
+        (CAMERA + "T_rs = { turn = 1 }", [], "depth.T_rs.turn: unknown key"),
+        (COLOR, [], "depth: missing, but needed"),
+        (CAMERA + "?", [], "camera.toml: cannot be understood"),
+        (None, ["--camera", "nowhere.toml"], "nowhere.toml: cannot be read: No such file"),
+        (None, [], "--camera: layout pairs needs a camera file"),
+        (CAMERA, ["--rig", "nowhere.toml"], "nowhere.toml: cannot be read"),
+        (CAMERA, ["--layout", "tum"], "depth.txt: cannot be read"),
+        (CAMERA, ["--layout", "tum", "--mask", "m*"], "--mask: only layout pairs has masks"),
+        (CAMERA, ["--out", "/nowhere/at/all.mcap"], "/nowhere/at/all.mcap: cannot be written: No such file"),
+    ],
+)
+def test_a_user_error_is_reported_with_exit_code_2(
+    folder: Path, capsys: pytest.CaptureFixture[str], camera: str | None, options: list[str], complaint: str
+) -> None:
+    if camera is not None:
+        (folder / "camera.toml").write_text(camera)
+        options = ["--camera", str(folder / "camera.toml"), *options]
+    before = sorted(folder.iterdir())
+    assert run(folder, *options) == Exit.USER
+    assert complaint in capsys.readouterr().err
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_missing_folder_and_an_existing_recording_are_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    camera = ["--camera", str(folder / "camera.toml")]
+    assert cli.main(["import", str(folder / "no"), "--layout", "pairs", "--out", "x.mcap", *camera]) == Exit.USER
+    assert "no: no such folder" in capsys.readouterr().err
+    (folder / "out.mcap").write_bytes(b"precious")
+    assert run(folder, *camera) == Exit.USER
+    assert "out.mcap: exists already" in capsys.readouterr().err
+    assert (folder / "out.mcap").read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("rate", ["0", "fast", "nan"])
+def test_a_rate_is_a_number(folder: Path, capsys: pytest.CaptureFixture[str], rate: str) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        run(folder, "--rate", rate)
+    assert exit_info.value.code == Exit.USER
+    assert f"'{rate}' must be a number from 0.001 to 10000" in capsys.readouterr().err
+
+
+def test_a_real_sequence_of_a_squeezed_toy(data_set: Callable[[str], Path], tmp_path: Path) -> None:
+    """PrimeSense-like camera, 320 × 240, a soft toy on a table about 0.6 to 1.5 m away."""
+    (tmp_path / "camera.toml").write_text(
+        "".join(
+            f"[{sensor}]\nwidth = 320\nheight = 240\nfx = 275\nfy = 275\ncx = 160\ncy = 120\n"
+            for sensor in ("depth", "color")
+        )
+    )
+    folder, out = data_set("sl_rgbd_deform_petit"), tmp_path / "toy.mcap"
+    options = ["--camera", str(tmp_path / "camera.toml"), "--depth", "depth_mm_*.png", "--mask", "seg_*.png"]
+    assert cli.main(["import", str(folder), "--layout", "pairs", "--out", str(out), *options]) == Exit.OK
+    recording = Recording(out)
+    assert recording.counts == {("depth", "depth"): 120, ("color", "color"): 120}
+    depth = next(frame for frame in recording.frames() if isinstance(frame, Frame) and frame.sensor == "depth")
+    assert depth.seq == 200
+    assert 0.01 < np.isfinite(depth.si()).mean() < 0.5
+    assert 0.3 < np.nanmedian(depth.si()) < 1.5

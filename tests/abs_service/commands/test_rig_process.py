@@ -1,0 +1,57 @@
+"""Endpoint and signals of a rig's processes."""
+
+import argparse
+import os
+import signal
+
+import pytest
+
+from abs_service.bus.session import BusError
+from abs_service.commands.parts import rig_process
+
+
+@pytest.fixture
+def handlers():
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_the_first_signal_asks_and_the_second_forces(handlers, monkeypatch, number):
+    forced = []
+    monkeypatch.setattr(os, "_exit", forced.append)
+    stop = rig_process.stop_on_signals()
+    assert not stop.is_set()
+    signal.raise_signal(number)
+    assert stop.is_set()
+    assert forced == []
+    signal.raise_signal(number)
+    assert forced == [128 + number]
+
+
+def parse(*arguments):
+    parser = argparse.ArgumentParser()
+    rig_process.add_arguments(parser)
+    return parser.parse_args(arguments)
+
+
+def test_one_process_may_listen_and_others_connect_to_a_given_endpoint(endpoint):
+    rig = rig_process.load_config(parse())
+    with (
+        rig_process.open_bus(rig, parse("--listen", endpoint)),
+        rig_process.open_bus(rig, parse("--connect", endpoint)) as bus,
+    ):
+        assert bus.query("**", 0.1) == []
+
+
+def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file():
+    with pytest.raises(BusError, match='"nowhere": not an endpoint'):
+        rig_process.open_bus(rig_process.load_config(parse()), parse("--connect", "nowhere"))
+
+
+def test_a_process_cannot_both_listen_and_connect(endpoint, capsys):
+    with pytest.raises(SystemExit):
+        parse("--listen", endpoint, "--connect", endpoint)
+    assert "not allowed with" in capsys.readouterr().err

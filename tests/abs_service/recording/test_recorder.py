@@ -1,0 +1,114 @@
+"""The recorder writes all messages, unchanged, in a standard format."""
+
+import json
+import threading
+
+import pytest
+from absmsg.v1 import frame_info_pb2
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Sample
+from abs_service.capture import sensor_metadata
+from abs_service.wire import message_header
+from calib.camera import Camera
+from drivers.encoding import codec
+from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
+
+
+def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    published = [rig.publish_image(depth(10**9 + seq)) for seq in range(5)]
+    rig.health.publish()
+    rig.recorder.stop(5)
+    (path,) = recordings(tmp_path)
+    messages, attachments, _ = read(path)
+    assert attachments == {"rig.toml": b"version = 1\n"}
+    images = [m for m in messages if m.channel.topic == "/tof/depth/image"]
+    infos = [m for m in messages if m.channel.topic == "/tof/depth/info"]
+    assert [(image.message.data, info.message.data) for image, info in zip(images, infos)] == published
+    for image, info in zip(images, infos):
+        stamp_ns = frame_info_pb2.FrameInfo.FromString(info.message.data).header.stamp.ToNanoseconds()
+        assert image.message.log_time == image.message.publish_time == info.message.log_time == stamp_ns
+        assert image.message.sequence == info.message.sequence
+    assert [m.message.sequence for m in images] == [(10**9 + seq) & 0xFFFFFFFF for seq in range(5)]
+    schemas = {m.schema and m.schema.name for m in messages}
+    assert schemas == {"foxglove.RawImage", "absmsg.v1.FrameInfo", "absmsg.v1.Health"}
+    assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
+
+
+def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_every_file(tmp_path):
+    rig = Rig(tmp_path, rotate_bytes=1, flush_s=0.001)
+    camera = Camera(176, 144, 220.0, 220.0, 87.5, 71.5)
+    header = rig.headers.now(0)
+    for topic, message in {
+        keys.CONFIG: sensor_metadata.config(header, "version = 1"),
+        keys.calibration("tof"): sensor_metadata.calibration("tof", camera, 1),
+        keys.model("tof"): sensor_metadata.sensor_model(
+            header, "tof", camera, {"type": "x", "sigma": [[1, 2], [3, 4]]}
+        ),
+        keys.TRANSFORMS: sensor_metadata.transforms({"tof": camera}, 1),
+    }.items():
+        rig.bus.latched_publisher(topic, message.DESCRIPTOR.full_name).put(message.SerializeToString())
+    rig.bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
+    rig.recorder.start()
+    seq = 0
+    while len(recordings(tmp_path)) < 2:
+        seq += 1
+        rig.publish_image(depth(seq))
+        threading.Event().wait(0.005)
+    rig.recorder.stop(5)
+    for path in recordings(tmp_path):
+        messages, attachments, _ = read(path)
+        assert {"/config", "/tof/calibration", "/tof/model", "/tf"} <= {m.channel.topic for m in messages}
+        assert json.loads(attachments["calibration/tof.json"])["calib_id"] == camera.calib_id
+    assert metadata(recordings(tmp_path)[0])["ended"] == "rotated"
+    frames = [m.message.sequence for p in recordings(tmp_path) for m in read(p)[0] if m.channel.topic == f"/{DEPTH}"]
+    assert sorted(frames) == list(range(1, seq + 1)), "rotation lost or doubled a frame"
+
+
+def test_what_is_no_message_of_ours_is_refused_and_does_not_end_the_recording(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    rig.publish_image(depth(1))
+    rig.bus.deliver(Sample("x/y", "", b"1"))
+    rig.bus.deliver(Sample("x/y", "their.Message", b"1"))
+    rig.bus.deliver(Sample("health/x", "absmsg.v1.Health", b"\xff\xff\xff"))
+    rig.bus.deliver(Sample(DEPTH, "absmsg.v1.Health", b""))
+    rig.bus.deliver(Sample(DEPTH, codec.IMAGE_SCHEMA, b"", b"\xff\xff"))
+    rig.publish_image(depth(2))
+    rig.recorder.stop(5)
+    counters = rig.said.counters
+    assert counters["refused"] == 5
+    assert counters["recorded"] == 2
+    assert not rig.recorder.failed
+    assert [m.message.sequence for m in read(recordings(tmp_path)[0])[0] if m.channel.topic == f"/{DEPTH}"] == [1, 2]
+
+
+@pytest.mark.parametrize("seconds", [-1, 0, 253402300799, 1 << 62])
+def test_absurd_stamps_are_replaced_by_the_present(tmp_path, seconds):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    before = rig.clock.wall(rig.clock.monotonic())
+    info = frame_info_pb2.FrameInfo(seq=1)
+    info.header.stamp.seconds = seconds
+    rig.bus.deliver(Sample(DEPTH, codec.IMAGE_SCHEMA, b"", info.SerializeToString()))
+    rig.recorder.stop(5)
+    image, _ = read(recordings(tmp_path)[0])[0]
+    assert before <= image.message.log_time <= before + 10**10 or image.message.log_time == seconds * 10**9
+
+
+def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    for seq in (1, 2, 5, 6, 0, 1, 3):
+        rig.publish_image(depth(seq))
+    rig.recorder.stop(5)
+    assert metadata(recordings(tmp_path)[0])[f"missing.{DEPTH}"] == "3"
+
+
+def test_messages_of_every_type_have_an_envelope():
+    for message in message_header.MESSAGES - {message_header.INFO}:
+        message_header.parse(Sample("x", message, b"", b""))
+    with pytest.raises(message_header.MessageHeaderError, match="is none of"):
+        message_header.parse(Sample("x", "google.protobuf.Timestamp", b""))

@@ -1,0 +1,206 @@
+import argparse
+import io
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import MeshTopology
+from absmsg.v1.health_pb2 import Health
+
+from abs_service import config
+from abs_service.bus import keys
+from abs_service.bus.contract import EVENTS
+from abs_service.bus.keys import KeyNameError
+from abs_service.bus.stamps import WallClock
+from abs_service.commands import run
+from abs_service.display.lines import PlainDisplay
+from abs_service.supervision.exit_codes import Exit
+from abs_service.supervision.run_session import RunSession
+from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.wire import estimate_messages
+from tests.abs_service.bus.loopback import LoopbackBus
+from tests.abs_service.supervision.idle_process import Idle
+
+RIG = """
+version = 1
+name = "bench"
+bus.endpoint = "{endpoint}"
+record = {{ directory = "takes", minimum_free_bytes = 0 }}
+[devices.sim]
+uri = "simulated://sheet?seed=1&tof=32x24&sensors=tof"
+[sensors.tof]
+device = "sim"
+"""
+
+
+@pytest.fixture
+def rig_file(tmp_path, endpoint):
+    """A small rig that only records, on an address of its own."""
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG.format(endpoint=endpoint))
+    return path
+
+
+def arguments(*given):
+    parser = argparse.ArgumentParser()
+    run.add_arguments(parser)
+    return parser.parse_args(given)
+
+
+class TestWhatTheCommandLineChanges:
+    def changed(self, rig_file, *given):
+        return run.effective(config.load(rig_file), arguments(*given))
+
+    def test_nothing_by_default(self, rig_file):
+        assert self.changed(rig_file) == config.load(rig_file)
+
+    def test_name_seed_folder_and_recording(self, rig_file, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        rig = self.changed(rig_file, "--rig", "other", "--seed", "9", "--out", "here", "--no-record")
+        assert (rig.name, rig.record.directory, rig.record.enabled) == ("other", tmp_path / "here", False)
+        assert rig.devices["sim"].uri == "simulated://sheet?seed=9&tof=32x24&sensors=tof"
+
+    def test_a_name_that_cannot_be_a_key_is_refused(self, rig_file):
+        with pytest.raises(KeyNameError):
+            self.changed(rig_file, "--rig", "a/b")
+
+    @pytest.mark.parametrize(
+        ("uri", "seeded"),
+        [
+            ("simulated://sheet", "simulated://sheet?seed=5"),
+            ("simulated://board?sensors=tof,color&seed=1", "simulated://board?sensors=tof,color&seed=5"),
+            ("replay://a.mcap?loop=1", "replay://a.mcap?loop=1"),
+        ],
+    )
+    def test_the_seed_reaches_simulated_devices_only(self, uri, seeded):
+        assert run.with_seed(uri, 5) == seeded
+
+
+def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path):
+    rig = config.load_default()
+    children = run.children(rig, tmp_path / "x.toml")
+    assert [child.component for child in sorted(children, key=lambda child: child.stage)] == [
+        "capture",
+        "track/sheet",
+        "record",
+    ]
+    off = rig.model_copy(update={"record": rig.record.model_copy(update={"enabled": False})})
+    assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
+
+
+class TestTheFileOfTheChildren:
+    def test_it_says_the_same_and_is_gone_at_the_end(self, rig_file):
+        rig = config.load(rig_file)
+        with run.file(rig) as path:
+            assert config.load(path) == rig
+        assert not path.exists()
+
+    def test_its_removal_by_others_does_no_harm(self, rig_file, monkeypatch):
+        rig = config.load(rig_file)
+        monkeypatch.setattr(run, "ChildProcess", lambda component, arguments, on_line: Idle(component))
+        with run.file(rig) as path:
+            path.unlink()
+            run.spawn(PlainDisplay(io.StringIO(), io.StringIO()), path, config.to_toml(rig), "capture", ())
+            assert config.load(path) == rig
+            path.unlink()
+
+
+class Bench:
+    """A session around processes that do nothing, one of which may end."""
+
+    def __init__(self, display, trackers=()):
+        self.bus = LoopbackBus()
+        self.killed = []
+        limits = Limits(startup_ns=10**12, stall_ns=0, restarts=0)
+        children = [Child("capture", (), 0), Child("record", (), 1)]
+        self.supervisor = Supervisor(
+            children, lambda component, _: Idle(component, self.killed), time.monotonic_ns, limits
+        )
+        self.session = RunSession(
+            self.bus, "bench", "tcp/127.0.0.1:1", Path(), trackers, self.supervisor, display, WallClock()
+        )
+
+
+class Gone(io.StringIO):
+    """Somebody who stopped reading."""
+
+    def write(self, text):
+        raise BrokenPipeError
+
+
+def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
+    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()))
+    bench.supervisor.poll()
+    bench.bus.publisher(keys.health("capture"), Health.DESCRIPTOR.full_name, EVENTS).put(
+        Health(component="capture").SerializeToString()
+    )
+    bench.session.run_until(lambda: False)  # ends because capture, once heard, is silent and has no restart left
+    assert bench.supervisor.children["capture"].state == "failed"
+    told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
+    assert told[-1].level == Health.LEVEL_ERROR
+    assert "capture failed: needed more than 0 restarts" in told[-1].message
+
+
+def test_a_topology_that_the_network_lost_is_queried():
+    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
+    asked = []
+
+    def topology():
+        asked.append(bench.session.elapsed_s)
+        return MeshTopology(mesh_version=3).SerializeToString()
+
+    bench.bus.answer_queries(keys.topology("sheet"), estimate_messages.TOPOLOGY, topology)
+    state = DeformationState(tracker="sheet", mesh_version=3).SerializeToString()
+    bench.bus.publisher(keys.state("sheet"), estimate_messages.STATE, EVENTS).put(state)
+    bench.session.run_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
+    assert len(asked) == 1
+    assert bench.session.view().live.missing_topologies() == []
+
+
+def test_the_processes_are_stopped_also_when_the_output_is_closed():
+    bench = Bench(PlainDisplay(Gone(), io.StringIO()))
+    with pytest.raises(BrokenPipeError):
+        bench.session.run_until(lambda: False)
+    bench.session.stop()
+    assert bench.killed == ["capture", "record"]
+
+
+def lines_until(stream, word):
+    """Reads lines until one holds the word, and keeps reading the rest so that nobody waits for a full pipe."""
+    for line in stream:
+        if word in line:
+            threading.Thread(target=stream.read, daemon=True).start()
+            return line
+    raise AssertionError(f"{word!r} was never written")
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_a_running_rig_in_order_and_in_time(rig_file, tmp_path, launch):
+    process = launch("run", rig_file, stdout=-1)
+    lines_until(process.stdout, ".mcap 1")  # recording: its size begins with a 1
+    begin = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    assert process.wait(10) == Exit.OK
+    assert time.monotonic() - begin < 5.0
+    assert [path.suffix for path in (tmp_path / "takes").iterdir()] == [".mcap"]
+
+
+@pytest.mark.slow
+def test_what_a_child_refuses_ends_the_run_with_its_message(rig_file, launch):
+    rig_file.write_text(rig_file.read_text().replace('device = "sim"', 'device = "sim"\nhead = "tov"'))
+    process = launch("run", rig_file, stdout=-1)
+    _, message = process.communicate(timeout=30)
+    assert process.returncode == Exit.USER
+    assert message.count("abs-service: error: ") == 1
+    assert 'sensors.tof: device "sim" has no head "tov"; it has: tof' in message
+
+
+def test_a_configuration_that_cannot_be_used_is_refused_before_anything_starts(rig_file, launch):
+    rig_file.write_text(rig_file.read_text() + "colour = 1\n")
+    process = launch("run", rig_file, stdout=-1)
+    out, message = process.communicate(timeout=30)
+    assert (process.returncode, out) == (Exit.USER, "")
+    assert "sensors.tof.colour: unknown key" in message

@@ -1,0 +1,141 @@
+"""The initial mesh covers the object in the reference sensor, and nothing else."""
+
+import numpy as np
+import pytest
+
+from abs_service.pairing.images import ColorImage
+from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.regions import nearest
+from abs_service.tracker.detection.segmentation import detect_object
+from calib import pose
+from calib.camera import Camera
+from calib.noise.color import GaussianColor
+from calib.noise.structured_light import StructuredLight
+from calib.rig import Rig, Sensor
+from tests.abs_service.tracker.scenes import depth_image, observation
+
+TOF = Camera(176, 144, 220.0, 220.0, 87.5, 71.5, T_rs=pose.from_rotation_vector([0.1, -0.2, 0.05], [0.1, 0.2, -0.3]))
+COLOR = Camera(320, 240, 275.0, 275.0, 159.5, 119.5, T_rs=TOF.T_rs @ pose.from_rotation_vector([0, 0, 0], [0.05, 0, 0]))
+RIG = Rig("r", {"tof": Sensor("tof", TOF, StructuredLight()), "color": Sensor("color", COLOR, GaussianColor())})
+WIDTH, HEIGHT = 0.30, 0.20
+
+
+def rectangle(T_ro: np.ndarray, background: float = np.nan) -> np.ndarray:
+    """Distances of a rectangle of 0.30 × 0.20 m in the x-y plane of o, in front of an equidistant background."""
+    T_os = pose.inverse(T_ro) @ TOF.T_rs
+    rays = TOF.rays() @ T_os[:3, :3].T
+    distance = -T_os[2, 3] / rays[..., 2]
+    x, y = (T_os[i, 3] + distance * rays[..., i] for i in range(2))
+    inside = (np.abs(x) < WIDTH / 2) & (np.abs(y) < HEIGHT / 2) & (distance > 0)
+    return np.where(inside, distance, background).astype(np.float32)
+
+
+def placed(turn: float = 0.0, tilt: float = 0.0, z: float = 1.0) -> np.ndarray:
+    """Pose in the rig of a rectangle in front of the camera, rotated about its normal and tilted [rad]."""
+    T_so = pose.from_rotation_vector([0, 0, 0], [0.01, -0.02, z]) @ pose.from_rotation_vector(
+        [tilt, tilt / 2, 0], [0] * 3
+    )
+    return TOF.T_rs @ T_so @ pose.from_rotation_vector([0, 0, turn], [0, 0, 0])
+
+
+def area(mesh) -> float:
+    a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+TURNS = np.deg2rad([0, 20, 45, 70, 90, 135])
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("tilt", [0.0, 0.4])
+def test_the_mesh_is_the_rectangle(turn, tilt):
+    T_ro = placed(turn, tilt)
+    mesh = grid_mesh(InitialDetection(rectangle(T_ro), TOF, 300))
+    points = pose.transform(pose.inverse(T_ro), mesh.vertices)
+    np.testing.assert_allclose(points[:, 2], 0, atol=5e-4)  # in the plane
+    assert np.abs(points[:, 0]).max() < WIDTH / 2 + 0.006  # a pixel is 4.5 mm wide
+    assert np.abs(points[:, 1]).max() < HEIGHT / 2 + 0.006
+    # No vertex lies closer to the rim than its neighbourhood reaches.
+    assert 0.72 * WIDTH * HEIGHT < area(mesh) < 1.02 * WIDTH * HEIGHT
+    assert 0.75 * 300 < len(mesh.vertices) < 1.15 * 300
+
+
+@pytest.mark.parametrize("vertices", [60, 150, 300, 1000])
+def test_there_are_about_as_many_vertices_as_wanted(vertices):
+    mesh = grid_mesh(InitialDetection(rectangle(placed()), TOF, vertices))
+    assert len(mesh.vertices) == pytest.approx(vertices, rel=0.2)
+    assert len(np.unique(mesh.faces)) == len(mesh.vertices)  # no unused vertices
+
+
+@pytest.mark.parametrize("turn", TURNS)
+def test_faces_are_seen_from_the_camera_and_the_chart_follows_the_long_side(turn):
+    T_ro = placed(turn, 0.2)
+    mesh = grid_mesh(InitialDetection(rectangle(T_ro), TOF, 200))
+    corners = mesh.vertices[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.all(np.einsum("ni,ni->n", normals, corners[:, 0] - TOF.center) < 0)
+    chart = mesh.chart[mesh.faces]
+    sides = np.concatenate([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]])
+    assert np.abs(sides).max() == 1  # neighbours on the grid
+    assert np.linalg.det(np.stack([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]], axis=1)).max() < 0
+    along = pose.transform(pose.inverse(T_ro), mesh.vertices)[:, 0]
+    assert abs(np.corrcoef(along, mesh.chart[:, 0])[0, 1]) > 0.9
+
+
+def test_noise_is_averaged():
+    distance = rectangle(placed())
+    noisy = distance + np.random.default_rng(1).normal(0, 5e-3, distance.shape).astype(np.float32)
+    points = pose.transform(pose.inverse(placed()), grid_mesh(InitialDetection(noisy, TOF, 300)).vertices)
+    assert points[:, 2].std() < 3e-3
+
+
+def test_no_face_spans_a_jump_in_distance():
+    """A step of 20 cm between the halves: no gap in the image, but two surfaces."""
+    near, far = rectangle(placed()), rectangle(placed(z=1.2))
+    distance = near.copy()
+    distance[:, 90:] = far[:, 90:]
+    mesh = grid_mesh(InitialDetection(distance, TOF, 200))
+    z = pose.transform(TOF.T_sr, mesh.vertices)[:, 2]
+    assert np.ptp(z[mesh.faces], axis=1).max() < 0.02
+    assert z.min() < 1.02
+    assert z.max() > 1.18
+
+
+def test_a_hole_in_the_object_is_a_hole_in_the_mesh():
+    distance = rectangle(placed())
+    distance[60:85, 75:100] = np.nan
+    mesh = grid_mesh(InitialDetection(distance, TOF, 400))
+    centers = TOF.project(mesh.vertices[mesh.faces].mean(axis=1))
+    assert not np.any(np.all((centers > (78, 63)) & (centers < (96, 81)), axis=1))
+
+
+def test_too_little_of_an_object_is_an_error():
+    distance = np.full((144, 176), np.nan, np.float32)
+    distance[70, 60:100] = 1.0
+    with pytest.raises(DetectionError, match=rf"too small in the depth image: \d+ vertices, {LEAST_VERTICES} needed"):
+        grid_mesh(InitialDetection(distance, TOF, 100))
+
+
+def test_an_object_of_a_single_pixel_is_an_error():
+    distance = np.full((144, 176), np.nan, np.float32)
+    distance[70, 60] = 1.0
+    with pytest.raises(DetectionError, match="too small"):
+        grid_mesh(InitialDetection(distance, TOF, 100))
+
+
+def test_nothing_in_sight_is_an_error():
+    nothing = observation(tof=depth_image(np.full((144, 176), np.nan)))
+    with pytest.raises(DetectionError, match="no connected surface"):
+        detect_object(nothing, RIG, "tof", nearest.Settings().build(), 300)
+
+
+def test_without_a_depth_image_there_is_no_mesh_yet():
+    for seen in (observation(), observation(color=gradient_image())):
+        with pytest.raises(DetectionError, match="no depth image from tof yet"):
+            detect_object(seen, RIG, "tof", nearest.Settings().build(), 300)
+
+
+def gradient_image() -> ColorImage:
+    columns, rows = np.meshgrid(np.arange(320), np.arange(240))
+    return ColorImage(np.stack([columns // 2, rows, 255 - rows], axis=-1).astype(np.uint8))

@@ -1,0 +1,26 @@
+"""Doubts about a detected object: a region that selects the scene is told, an object is not."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.detection.plausibility import warnings
+from abs_service.tracker.detection.regions import box, nearest, seed
+from tests.abs_service.tracker.detection.test_segmentation import EVERYWHERE, SHEET, detect
+
+
+@pytest.mark.parametrize("region", [EVERYWHERE, seed.Settings((50, 40), largest_step_m=5.0).build()])
+def test_a_region_that_selects_the_scene_is_told(region):
+    (doubt,) = warnings(detect(SHEET, region))
+    assert doubt.startswith("the object fills ")
+    assert "% of all returns, from side to side: is the region right?" in doubt
+
+
+@pytest.mark.parametrize("region", [nearest.Settings(), box.Settings((-0.1, -0.1, 0.5), (0.1, 0.1, 1.5))])
+def test_an_object_in_the_scene_raises_no_doubts(region):
+    assert warnings(detect(SHEET, region.build())) == ()
+
+
+def test_a_large_object_that_ends_in_the_image_raises_no_doubts():
+    distance = np.full((48, 64), 2.0, np.float32)
+    distance[5:43, 6:58] = 1.0  # 64 % of the image
+    assert warnings(detect(distance, nearest.Settings().build())) == ()

@@ -1,0 +1,60 @@
+"""What a region selects has the size of an object, or the distances have the wrong unit."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.regions import box, nearest
+from abs_service.tracker.detection.segmentation import detect_object
+from calib.camera import Camera
+from calib.noise.structured_light import StructuredLight
+from calib.rig import Rig, Sensor
+from tests.abs_service.tracker.scenes import depth_image, observation
+
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
+RIG = Rig("r", {"tof": Sensor("tof", CAMERA, StructuredLight())})
+EVERYWHERE = box.Settings((-1e4, -1e4, -1e4), (1e4, 1e4, 1e4)).build()
+#: A sheet of 0.33 × 0.33 m and a wall behind it.
+SHEET = np.full((48, 64), 2.0, np.float32)
+SHEET[10:30, 10:30] = 1.0
+
+
+def detect(distance: np.ndarray, region=EVERYWHERE):
+    return detect_object(observation(tof=depth_image(distance.astype(np.float32))), RIG, "tof", region, 300)
+
+
+def test_the_object_is_what_the_region_selects():
+    seen = detect(SHEET, nearest.Settings().build())
+    assert np.nanmax(seen.distance) == 1.0
+    np.testing.assert_array_equal(seen.surroundings, SHEET)
+
+
+@pytest.mark.parametrize("region", [EVERYWHERE, nearest.Settings().build()])
+@pytest.mark.parametrize(("scale", "wide"), [(1e-3, r"\d\.\d mm wide"), (1e3, r"\d{4} m wide")])
+def test_distances_in_millimetres_or_thousandths_are_noticed_with_every_region(scale, wide, region):
+    with pytest.raises(DetectionError, match=rf"would be {wide}: is the depth scale .*sensors\.tof\.depth\.scale"):
+        detect(SHEET * scale, region)
+
+
+def test_an_object_smaller_than_any_is_refused():
+    speck = box.Settings((-0.001, -0.001, 0.0), (0.001, 0.001, 5.0)).build()
+    with pytest.raises(DetectionError, match=r"the object would be [0-4]\.\d mm wide"):
+        detect(np.full((48, 64), 0.02), speck)
+
+
+def test_an_object_larger_than_any_is_refused():
+    with pytest.raises(DetectionError, match=r"the object would be \d\d m wide"):
+        detect(np.full((48, 64), 30.0))
+
+
+def test_a_few_wrong_pixels_do_not_make_an_object_larger():
+    distance = SHEET.copy()
+    distance[40, :30] = 150.0  # 1 % of the image
+    assert detect(distance).points.shape == (48 * 64, 3)
+
+
+def test_an_image_without_returns_is_left_to_the_region():
+    with pytest.raises(DetectionError, match="holds no surface"):
+        detect(np.full((48, 64), np.nan))
+    assert not DepthView.of(np.full((48, 64), np.nan, np.float32), CAMERA).measured.any()

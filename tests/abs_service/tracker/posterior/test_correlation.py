@@ -1,0 +1,66 @@
+"""Design effect of correlated residuals, and the misfit of neighbours."""
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.posterior.correlation import BEYOND, DesignEffects
+from abs_service.tracker.posterior.covariance import leverages
+from abs_service.tracker.posterior.misfit import NeighborMean
+from abs_service.tracker.terms.linearization import Linearization
+from tests.abs_service.tracker.scenes import flat, sheet
+
+MESH = sheet(21, 31, flat)
+DIM = 5
+
+
+def effect(draw, frames: int = 60, halves: bool = False) -> float:
+    """Design effect after some frames of residuals draw(generator), with smooth derivatives."""
+    generator = np.random.default_rng(3)
+    x, y = MESH.vertices[:, 0], MESH.vertices[:, 1]
+    jacobian = np.stack([np.ones_like(x), x, y, x * y, x**2], axis=1)
+    inverse = np.asarray(np.linalg.inv(jacobian.T @ jacobian + 1e-6 * np.eye(DIM)), np.float64)
+    effects, found = DesignEffects(MESH), np.ones(1)
+    for _ in range(frames):
+        residual = draw(generator)
+        cuts = (slice(0, 300), slice(300, None)) if halves else (slice(None),)
+        parts = [Linearization(residual[cut], jacobian[cut], positions=MESH.vertices[cut]) for cut in cuts]
+        found = effects.update(inverse, [parts], leverages(inverse, [parts]))
+    return float(found[0])
+
+
+def test_independent_residuals_have_an_effect_near_one():
+    assert effect(lambda generator: generator.standard_normal(len(MESH.vertices))) < 1.6
+
+
+def test_residuals_that_neighbours_share_have_the_effect_of_their_number():
+    """Cells of the clusters' own size: 2.5 × 2.5 distances, so some six equal residuals each."""
+    side = 2.5 * np.sqrt(MESH.area / len(MESH.vertices))
+    cells = np.floor(MESH.vertices[:, :2] / side).astype(int)
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
+    size = np.mean(np.bincount(cell.ravel())[cell.ravel()])
+    found = effect(lambda generator: generator.standard_normal(cell.max() + 1)[cell.ravel()])
+    assert found == pytest.approx(1 + BEYOND * (size - 1), rel=0.2)
+
+
+def test_a_cluster_may_lie_in_two_parts():
+    def draw(generator):
+        return generator.standard_normal(len(MESH.vertices))
+
+    assert effect(draw) == pytest.approx(effect(draw, halves=True))
+
+
+def test_residuals_without_a_position_have_no_effect():
+    effects = DesignEffects(MESH)
+    sensed = [[Linearization(np.ones(4), np.ones((4, 2)))], []]
+    found = effects.update(np.eye(2), sensed, leverages(np.eye(2), sensed))
+    np.testing.assert_array_equal(found, [1, 1])
+
+
+def test_the_mean_over_neighbours_is_that_of_two_rings():
+    mean = NeighborMean(MESH)
+    np.testing.assert_allclose(mean(np.ones(len(MESH.vertices))), 1)
+    single = np.zeros(len(MESH.vertices))
+    single[10 * 31 + 15] = 1.0
+    spread = mean(single).reshape(21, 31)
+    assert np.count_nonzero(spread) == 19  # two rings of a grid of triangles
+    assert not spread[:, :13].any()

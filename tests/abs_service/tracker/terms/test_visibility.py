@@ -1,0 +1,283 @@
+"""Occluded vertices and pixels are ignored in the cost."""
+
+import numpy as np
+import pytest
+
+from abs_service.pairing.images import ColorImage
+from abs_service.tracker.models.base import Surface
+from abs_service.tracker.models.rigid import Rigid
+from abs_service.tracker.synthesis.rasterization.raster import Raster
+from abs_service.tracker.synthesis.sparse import SparseView
+from abs_service.tracker.synthesis.window import WHOLE
+from abs_service.tracker.terms.base import Bounds
+from abs_service.tracker.terms.depth.background import Background
+from abs_service.tracker.terms.depth.depth import FREE_SCALE_M, DepthTerm
+from abs_service.tracker.terms.depth.visibility import classify
+from abs_service.tracker.terms.photometric.color import ColorTerm
+from abs_service.tracker.terms.photometric.shadow import Shadow
+from calib import pose
+from calib.camera import Camera
+from calib.lenses.lens import Lens
+from calib.noise.color import GaussianColor
+from calib.noise.gaussian_polynomial import GaussianPolynomial
+from tests.abs_service.tracker.scenes import CAMERA, as_surface, depth_image, flat, plane_distance, sheet, sparse
+
+
+def folded():
+    """A sheet whose right third lies 0.1 m before its middle third, facing away."""
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.where(x > 0.05, 0.9, 1.0)
+
+    mesh = sheet(9, 31, height)
+    vertices = mesh.vertices.copy()
+    right = vertices[:, 0] > 0.05
+    vertices[right, 0] = 0.1 - vertices[right, 0]
+    return type(mesh)(vertices, mesh.faces, mesh.colors, mesh.chart)
+
+
+def test_a_raster_of_a_plane_is_the_plane():
+    normal = np.array([-0.2, 0.1, 1.0])
+    mesh = sheet(height=lambda x, y: 1.0 + 0.2 * x - 0.1 * y)
+    for lens in (Lens(), Lens(np.array([-0.15, 0.03, 1e-3, -1e-3, 0.005]))):
+        camera = Camera(64, 48, 150.0, 152.0, 31.2, 23.9, lens, CAMERA.T_rs)
+        distance = Raster(camera, mesh.faces).render(mesh.vertices.T.astype(np.float32))
+        inside = np.isfinite(distance)
+        assert 0.6 * 45 * 30 < np.count_nonzero(inside) < 1.4 * 45 * 30  # 0.3 × 0.2 m at 150 px and 1 m
+        np.testing.assert_allclose(distance[inside], plane_distance(camera, normal, 1.0)[inside], atol=5e-5)
+
+
+def test_the_nearest_of_two_surfaces_is_seen():
+    mesh = folded()
+    distance = Raster(CAMERA, mesh.faces).render(mesh.vertices.T.astype(np.float32))
+    column, row = np.floor(CAMERA.project(np.array([0.0, 0.0, 1.0])) + 0.5).astype(int)
+    assert distance[row, column] < 0.95
+
+
+def test_what_is_behind_the_camera_is_not_rendered():
+    mesh = sheet()
+    behind = (mesh.vertices * (1, 1, -1)).T.astype(np.float32)
+    assert np.isinf(Raster(CAMERA, mesh.faces).render(behind)).all()
+
+
+def test_vertices_behind_the_mesh_s_own_surface_and_those_that_face_away_are_no_samples():
+    mesh = folded()
+    view = SparseView(CAMERA, mesh.faces, mesh.colors)
+    surface = as_surface((mesh.vertices, mesh.normals))
+    assert (view.synthesize(surface).pixel[0] >= 0).all()
+    view.look(surface)
+    pixel = view.synthesize(surface).pixel[0]
+    x, near = mesh.vertices[:, 0], mesh.vertices[:, 2] < 0.95
+    covered = ~near & (x > -0.03) & (x < 0.03) & (np.abs(mesh.vertices[:, 1]) < 0.07)
+    assert (pixel[covered] == -1).all()
+    assert (pixel[near & (x < 0.03)] == -1).all()  # they face away
+    assert (pixel[x < -0.08] > 0).all()
+
+
+def test_what_is_hidden_stays_hidden_for_every_candidate_of_the_frame():
+    mesh = folded()
+    model, view = Rigid(mesh), SparseView(CAMERA, mesh.faces, mesh.colors)
+    view.look(model.deform(np.zeros((1, 6))))
+    candidates = np.random.default_rng(1).normal(0, 0.02, (5, 6))
+    pixel = view.synthesize(model.deform(candidates)).pixel
+    assert np.array_equal(pixel < 0, np.broadcast_to(pixel[0] < 0, pixel.shape))
+    view.look(model.deform(np.array([[np.pi, 0, 0, 0, 0, 0.0]])))
+    assert not np.array_equal(view.synthesize(model.deform(candidates)).pixel[0] < 0, pixel[0] < 0)
+
+
+def test_an_open_sheet_hides_nothing_from_any_side():
+    mesh = sheet(height=flat)
+    surface = as_surface((mesh.vertices, mesh.normals))
+    for x in np.linspace(-0.6, 0.6, 7):
+        camera = Camera(64, 48, 150.0, 152.0, 31.2, 23.9, T_rs=pose.look_at([x, 0.1, 0.0], [0.0, 0.0, 1.0]))
+        view = SparseView(camera, mesh.faces, mesh.colors)
+        view.look(surface)
+        assert (view.synthesize(surface).pixel > 0).all()
+
+
+def board(camera: Camera, background: float = 1.6) -> np.ndarray:
+    """Distances of a flat sheet at z = 1 m before a wall."""
+    mesh = sheet(height=flat)
+    distance = Raster(camera, mesh.faces).render(mesh.vertices.T.astype(np.float32))
+    return np.where(np.isfinite(distance), distance, plane_distance(camera, np.array([0, 0, 1.0]), background))
+
+
+STRAIGHT = Camera(140, 72, 220.0, 220.0, 69.5, 35.5)
+MESH = sheet(height=flat)
+PREDICTED = Raster(STRAIGHT, MESH.faces).render(MESH.vertices.T.astype(np.float32))
+EXPECTED = np.isfinite(PREDICTED)
+
+
+def test_a_sheet_before_a_wall_is_the_object_and_the_wall_is_free():
+    seen = classify(board(STRAIGHT).astype(np.float32), PREDICTED, STRAIGHT.fx)
+    assert np.count_nonzero(seen.object) > 0.8 * np.count_nonzero(EXPECTED)  # all but its rim
+    assert not (seen.object & ~EXPECTED).any()
+    assert not seen.foreground.any()
+    assert not seen.hole.any()
+    assert (seen.free_m[EXPECTED] == 0).all()
+    assert seen.free_m[35, 24] == pytest.approx((36.5 - 24) / 220, abs=0.012)  # the sheet begins at column 36.5
+
+
+def test_what_stands_before_the_sheet_is_foreground_also_beside_it():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[20:45, :62] = 0.85
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    hand = np.zeros_like(EXPECTED)
+    hand[20:45, :62] = True
+    assert seen.foreground[22:43, 2:60].all()
+    assert not seen.foreground[~hand].any()
+    assert seen.object[:, 72:102][EXPECTED[:, 72:102]].mean() > 0.8
+
+
+def test_a_hole_inside_the_outline_is_told_from_missing_returns_at_its_rim():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[~EXPECTED] = np.nan  # a background out of range
+    distance[:, 82:] = np.nan
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert seen.hole[30:42, 84:96].all()
+    assert not seen.hole[:9].any()
+    assert (seen.free_m == 0).all()
+
+
+def test_a_missing_return_beside_the_sheet_is_free_space_where_the_background_has_none():
+    """The sheet has moved 12 pixels (55 mm) to the left, so the prediction hangs over the empty background."""
+    first = board(STRAIGHT).astype(np.float32)
+    first[~EXPECTED] = np.nan
+    background = Background()
+    background.observe(np.isnan(first), EXPECTED, WHOLE, first.shape)
+    moved = np.roll(first, -12, axis=1)
+    moved[30:33, 60:64] = np.nan  # a hole in the sheet
+    missing = np.isnan(moved)
+    empty = background.observe(missing, EXPECTED, WHOLE, first.shape)
+    assert not empty[30:33, 60:64].any()
+    assert np.array_equal(empty, missing & ~np.pad(np.ones((3, 4), bool), ((30, 39), (60, 76))))
+    seen = classify(moved, PREDICTED, STRAIGHT.fx, empty)
+    row = seen.free_m[36]
+    assert np.all(row[97:102] > 0)
+    assert np.all(np.diff(row[97:102]) > 0)  # farther from the sheet, more to be pushed back
+    assert not row[40:90].any()
+    # Deeper than the object can move between two frames, a missing return is a hole all the same.
+    deep = first.copy()
+    deep[:, 70:] = np.nan
+    deep_seen = classify(deep, PREDICTED, STRAIGHT.fx, background.observe(np.isnan(deep), EXPECTED, WHOLE, deep.shape))
+    assert deep_seen.hole[36, 80:92].all()
+    assert np.all(deep_seen.free_m[36, 99:102] > 0)
+
+
+def test_a_hole_goes_on_to_the_rim_that_it_reaches():
+    distance = board(STRAIGHT).astype(np.float32)
+    distance[~EXPECTED] = np.nan
+    distance[:, 82:] = np.nan
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert seen.hole[30:42, 84:104].all()  # the sheet ends at column 102.5
+    assert not seen.hole[:, 107:].any()
+    assert not seen.hole[:, :60].any()
+
+
+def test_a_prediction_that_nothing_agrees_with_classifies_nothing():
+    distance = (board(STRAIGHT) - 0.2).astype(np.float32)
+    seen = classify(distance, PREDICTED, STRAIGHT.fx)
+    assert not seen.object.any()
+    assert not seen.foreground.any()
+    assert not seen.hole.any()
+    assert not seen.free_m.any()
+
+
+def test_a_surface_that_moved_as_a_whole_is_still_the_object():
+    distance = board(STRAIGHT).astype(np.float32)
+    columns = np.arange(STRAIGHT.width)
+    turned = np.where(EXPECTED, distance - 0.0012 * (columns - 52), distance).astype(np.float32)
+    seen = classify(turned, PREDICTED, STRAIGHT.fx)
+    assert not seen.foreground.any()
+
+
+def term_before(distance: np.ndarray) -> DepthTerm:
+    noise = GaussianPolynomial(((3e-3,),))
+    term = DepthTerm("tof", sparse(STRAIGHT, MESH), len(MESH.vertices), noise, Bounds(0.05, 1.6, 4.6))
+    term.observe(depth_image(distance), as_surface((MESH.vertices, MESH.normals)))
+    return term
+
+
+def moved(x: float) -> Surface:
+    return as_surface((MESH.vertices + np.array([x, 0, 0]), MESH.normals))
+
+
+def test_behind_an_occluder_no_motion_pays():
+    """All but a patch in the middle is hidden: the sheet may slide; in full sight its rims would meet the wall."""
+    distance = board(STRAIGHT)
+    covered = distance.copy()
+    covered[:, 27:112] = 0.85
+    covered[25:47, 57:82] = distance[25:47, 57:82]
+    slides = [moved(0.0), moved(0.03), moved(-0.03)]
+    costs = np.array([[term_before(image).cost(slide)[0] for slide in slides] for image in (covered, distance)])
+    assert np.ptp(costs[0]) < 5
+    assert np.ptp(costs[1]) > 20
+    fit = term_before(covered).fit(slides[0])
+    assert fit.occluded > 0.6 * len(MESH.vertices)
+    assert fit.inliers >= 0.9 * fit.visible
+
+
+def test_free_space_pushes_back_the_more_the_farther():
+    term = term_before(board(STRAIGHT))
+    steps = [float(term.cost(moved(x))[0]) for x in (0.0, 0.03, 0.06, 0.1)]
+    growth = np.diff(steps)
+    assert (growth > 0).all()
+    assert growth[1] / 0.03 > growth[0] / 0.03
+    assert growth[2] / 0.04 > growth[1] / 0.03
+
+
+@pytest.mark.parametrize("x", [-0.06, 0.04])
+def test_the_search_is_told_the_way_back_from_free_space(x):
+    """The slope of what is linearised is that of the cost; depth itself says nothing about sliding along a plane."""
+    term, model = term_before(board(STRAIGHT)), Rigid(MESH)
+    theta = np.array([0, 0, 0, x, 0, 0])
+    sparse_jacobian = model.sparse_jacobian(theta)
+    linear = term.linearize(model.deform(theta[None]), sparse_jacobian)
+    ahead, behind = (
+        np.mean([term.cost(moved(x + sign * step))[0] for step in np.linspace(0.008, 0.02, 9)]) for sign in (1, -1)
+    )
+    steps = np.count_nonzero(np.abs(MESH.vertices[:, 0] + x) > 0.15)
+    slope = linear.jacobian[:, 3] @ linear.residual
+    assert steps > 0
+    assert slope * x > 0
+    assert slope == pytest.approx(np.sign(x) * steps / FREE_SCALE_M, rel=0.25)
+    assert (ahead - behind) / 0.028 * np.sign(x) > abs(slope)  # and more vertices leave the object
+    within = as_surface((MESH.vertices * (0.9, 0.9, 1), MESH.normals))
+    measured = np.isfinite(term._residuals(term._view.synthesize(within))[2])
+    assert term.linearize(within, sparse_jacobian).residual.size == np.count_nonzero(measured)
+
+
+def test_an_occluder_that_a_depth_sensor_sees_hides_colours_from_another_camera():
+    camera = Camera(160, 120, 300.0, 300.0, 79.5, 59.5, T_rs=pose.from_rotation_vector([0, 0, 0], [0.05, 0, 0]))
+    distance = board(STRAIGHT)
+    distance[20:45, 52:77] = 0.85
+    points = term_before(distance).foreground()
+    term = ColorTerm("color", sparse(camera, MESH), MESH.colors, GaussianColor(), Bounds(0.05, 16, 19))
+    black = ColorImage(np.zeros((120, 160, 3), np.uint8))
+    surface = as_surface((MESH.vertices, MESH.normals))
+    term.observe(black, surface)
+    before, cost = term.fit(surface), term.cost(surface)[0]
+    term.hide(points)
+    after = term.fit(surface)
+    assert before.occluded == 0
+    low, high = camera.project(points).min(axis=0), camera.project(points).max(axis=0)
+    place = camera.project(MESH.vertices)
+    inside = np.all((place > low + 0.5) & (place < high - 0.5), axis=1)
+    near = np.all((place > low - 3) & (place < high + 3), axis=1)
+    assert np.count_nonzero(inside) > 5
+    assert np.count_nonzero(inside) <= after.occluded <= np.count_nonzero(near)
+    assert term.cost(surface)[0] == pytest.approx(
+        cost - after.occluded * (19 - 0.05 - 3 * np.log(15 * np.sqrt(2 * np.pi)) - 1.5)
+    )
+
+
+def test_points_behind_a_camera_cast_no_shadow():
+    points = np.array([[0.0, 0, -1], [0, 0, 0], [5, 0, 0.5]])
+    assert not Shadow(STRAIGHT).mask(points).any()
+
+
+def test_missing_returns_of_an_object_that_fills_the_image_are_holes():
+    distance = np.full((48, 64), 1.0, np.float32)
+    distance[10:14, 20:30] = np.nan
+    seen = classify(distance, np.full((48, 64), 1.0, np.float32), 150.0)
+    assert np.array_equal(seen.hole, np.isnan(distance))

@@ -1,0 +1,79 @@
+"""A simulated device's exposures straight into a tracking, without processes, clocks or files."""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service import config, wiring
+from abs_service.tracker.estimate import Estimate
+from abs_service.tracker.models.base import DeformationModel
+from abs_service.tracker.posterior.posterior import Posterior
+from abs_service.tracking.observer import Observer
+from abs_service.tracking.plan import Plan, make_posterior
+from abs_service.tracking.session import TrackingSession
+from abs_service.tracking.truth import Errors
+from calib.rig import Rig
+from drivers.contract.frame import Frame, FrameSet
+from drivers.simulated import address
+from drivers.simulated.simulation import Simulation
+from evaluation.sequences import TruthEvaluator
+
+CONFIG = config.load_default()
+TRACKER = next(iter(CONFIG.trackers))
+
+
+def default_plan(**changes: object) -> Plan:
+    """The default rig's plan with some parts exchanged."""
+    return dataclasses.replace(wiring.plan(CONFIG, TRACKER), **changes)
+
+
+def rig_of(simulation: Simulation) -> Rig:
+    """The default rig around a simulation's cameras."""
+    return wiring.rig(CONFIG, TRACKER, {name: head.camera for name, head in simulation.heads.items()})
+
+
+def simulate(uri: str) -> Simulation:
+    """The simulation of an address."""
+    return address.parse(uri).build()
+
+
+def frame_set(frames: list[Frame], seq: int) -> FrameSet:
+    """Frames of one exposure."""
+    return FrameSet(seq, frames[0].t_host_ns, {frame.key: frame for frame in frames})
+
+
+@dataclass(frozen=True)
+class Step:
+    """An estimate, and how far it is from the truth where that is known."""
+
+    estimate: Estimate
+    errors: Errors | None
+
+
+def drive(
+    tracking: TrackingSession,
+    simulation: Simulation,
+    exposures: Iterable[int],
+    change: Callable[[int, list[Frame]], list[Frame]] = lambda k, frames: frames,
+    in_time: Callable[[], bool] = lambda: True,
+) -> Iterator[Step]:
+    """Tracks exposures; `change` alters the frames of an exposure before the tracker sees them."""
+    evaluator = TruthEvaluator(tracking)
+    for k in exposures:
+        frames, truth = simulation.expose(k)
+        estimate = tracking.track(frame_set(change(k, frames), k), in_time)
+        yield Step(estimate, evaluator.errors(estimate, truth.points_r))
+
+
+def mean_errors(steps: list[Step]) -> tuple[float, float]:
+    """Mean vertex and surface error [mm] of the steps with a known error."""
+    errors = [step.errors for step in steps if step.errors is not None]
+    return float(np.mean([e.vertex_mm for e in errors])), float(np.mean([e.surface_mm for e in errors]))
+
+
+def posterior_of(model: DeformationModel, rig: Rig, frames: list[Frame]) -> Posterior:
+    """Likelihood and priors of a model that has observed the frames of one exposure."""
+    observation = Observer(rig).observe(frame_set(frames, 0))
+    return make_posterior(default_plan(), rig, model, observation)[0]

@@ -1,0 +1,133 @@
+"""Reinitialization of a lost object, and hysteresis until it counts as tracked again."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.terms.base import RimFit, SensorFit
+from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
+from abs_service.tracking.session import TrackingSession
+from drivers.contract.frame import Frame, Kind
+from tests.abs_service.tracker.scenes import sheet
+from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
+
+FRAME_NS = 33_000_000
+OFF_SHARE = 0.3
+SHEET = simulate("simulated://sheet?seed=1")
+
+
+def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
+    nothing = np.zeros(0)
+    made = Estimate(**dict.fromkeys((field.name for field in dataclasses.fields(Estimate)), nothing))  # pyright: ignore
+    return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons)
+
+
+def test_a_tracked_object_needs_no_attempt():
+    monitor = LossMonitor(Settings(), OFF_SHARE)
+    assert [monitor.with_hysteresis(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
+    assert not monitor.attempt_due(10**12)
+
+
+def test_attempts_are_due_after_a_delay_and_then_periodically():
+    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1), OFF_SHARE)
+    tries = []
+    for k in range(1, 16):
+        if monitor.attempt_due(k * FRAME_NS):
+            tries.append(k)
+        monitor.with_hysteresis(estimate(k, Status.LOST))
+    assert tries == [8, 12]  # 0.2 s after frame 1, then every 0.1 s
+
+
+def test_a_good_estimate_restarts_the_delay():
+    monitor = LossMonitor(Settings(after_s=0.1), OFF_SHARE)
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    monitor.with_hysteresis(estimate(1, Status.DEGRADED, ("no frame from color",)))
+    monitor.with_hysteresis(estimate(9, Status.LOST))
+    assert not monitor.attempt_due(10 * FRAME_NS)
+    assert monitor.attempt_due(13 * FRAME_NS)
+
+
+def test_a_mesh_that_stays_off_its_outline_is_made_anew():
+    monitor, tries = LossMonitor(Settings(misfit_s=0.2), OFF_SHARE), []
+    off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, RimFit(visible=60, outside=12, inside=12)),)
+    for k in range(1, 20):
+        if monitor.attempt_due(k * FRAME_NS):
+            tries.append(k)
+        monitor.with_hysteresis(dataclasses.replace(estimate(k, Status.DEGRADED), fits=off if k != 3 else ()))
+    assert tries == [11, 18]  # 0.2 s after frame 4, and again as long after the next one
+
+
+def test_after_a_loss_the_first_good_estimates_are_degraded():
+    monitor = LossMonitor(Settings(confirm=3), OFF_SHARE)
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    after = [monitor.with_hysteresis(estimate(k, Status.TRACKING)) for k in range(1, 5)]
+    assert [e.status for e in after] == [Status.DEGRADED, Status.DEGRADED, Status.TRACKING, Status.TRACKING]
+    assert after[1].reasons == ("found again 2 of 3 estimates ago",)
+    assert after[2].reasons == ()
+
+
+def test_objects_of_another_size_are_rejected():
+    monitor = LossMonitor(Settings(size_ratio=2.0), OFF_SHARE)
+    lost = sheet(size=(0.3, 0.2))
+    assert lost.area == pytest.approx(0.06, rel=0.05)
+    assert not monitor.differs_in_size(sheet(size=(0.25, 0.2)), lost)
+    assert monitor.differs_in_size(sheet(size=(1.5, 1.0)), lost)
+    assert monitor.differs_in_size(sheet(size=(0.1, 0.1)), lost)
+
+
+def without_object(k: int, frames: list[Frame]) -> list[Frame]:
+    """Nothing but a wall with a large opening from exposure 20 to 50, and grey light."""
+    if not 20 <= k < 50:
+        return frames
+    return [dataclasses.replace(frame, data=_empty(frame)) for frame in frames]
+
+
+def _empty(frame: Frame) -> np.ndarray:
+    wall, opening = (round(z / 5 * 2**14) for z in (1.6, 3.2))
+    data = np.full_like(frame.data, {Kind.DEPTH: wall, Kind.AMPLITUDE: 2000, Kind.COLOR: 90}[frame.kind])
+    if frame.kind == Kind.DEPTH:
+        data[:, : data.shape[1] * 11 // 20] = opening
+    return data
+
+
+def test_a_returning_object_is_reinitialized_with_a_new_mesh():
+    plan = dataclasses.replace(default_plan(), reinitialization=Settings(after_s=0.3, every_s=0.1))
+    tracking = TrackingSession(rig_of(SHEET), plan)
+    # In between it has moved for three seconds, so that the last estimate is no good start.
+    exposures = [*range(50), *range(140, 160)]
+    steps = []
+    for k, step in zip(exposures, drive(tracking, SHEET, exposures, without_object)):
+        steps.append((k, step, tracking.mesh_version))
+    status = {k: step.estimate.status for k, step, _ in steps}
+    assert {status[k] for k in range(20)} == {Status.TRACKING}
+    assert {status[k] for k in range(22, 50)} == {Status.LOST}
+    assert any("cm², not" in reason for k, step, _ in steps if 35 <= k < 50 for reason in step.estimate.reasons)
+    assert [version for k, _, version in steps if k == 49] == [1]
+    assert {status[k] for k in range(150, 160)} == {Status.TRACKING}
+    errors = [step.errors.vertex_mm for k, step, _ in steps if k >= 150 and step.errors is not None]
+    assert len(errors) == 10
+    assert max(errors) < 3
+
+
+def test_reinitialize_makes_a_new_mesh_in_the_next_frame():
+    tracking = TrackingSession(rig_of(SHEET), default_plan())
+    versions = []
+    for k, step in enumerate(drive(tracking, SHEET, range(6))):
+        assert step.estimate.status == Status.TRACKING
+        versions.append(tracking.mesh_version)
+        if k == 2:
+            tracking.reinitialize()
+    assert versions == [1, 1, 1, 2, 2, 2]
+
+
+def test_the_mesh_is_kept_for_keep_s_after_the_loss():
+    monitor = LossMonitor(Settings(keep_s=1.0), OFF_SHARE)
+    assert not monitor.keeps_mesh(0)
+    monitor.with_hysteresis(estimate(0, Status.LOST))
+    assert monitor.keeps_mesh(FRAME_NS)
+    assert not monitor.keeps_mesh(1_100_000_000)
+    lost_for_good = LossMonitor(Settings(), OFF_SHARE)
+    lost_for_good.with_hysteresis(estimate(0, Status.LOST))
+    assert not lost_for_good.keeps_mesh(FRAME_NS)

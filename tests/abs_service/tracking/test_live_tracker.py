@@ -1,0 +1,279 @@
+"""A live tracker takes frame sets, counts what it passed over, and announces its mesh before it uses it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.health_pb2 import Health as Message
+
+from abs_service.bus import keys
+from abs_service.bus.contract import IMAGES
+from abs_service.bus.frames import FrameSubscriber
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.pairing.synchroniser import Synchroniser
+from abs_service.tracker.detection.regions import box
+from abs_service.tracker.optimizers import cma
+from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
+from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
+from abs_service.tracking.session import TrackingSession, streams
+from drivers.contract.frame import Kind
+from drivers.encoding import codec
+from tests.abs_service.bus.loopback import LoopbackBus
+from tests.abs_service.tracking.driving import default_plan, rig_of, simulate
+
+SIMULATION = simulate("simulated://sheet?seed=1")
+RIG = rig_of(SIMULATION)
+MEMBERS = streams(RIG.sensors.values())
+
+
+class Bench:
+    """A live tracker on a loopback bus with a clock that only the test moves."""
+
+    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, **parts):
+        self.now_ns = 0
+        self.bus = LoopbackBus()
+        self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
+        self.headers = HeaderFactory("demo", self.wall)
+        self.health = Health(self.bus, "track/sheet", self.headers)
+        frames = FrameSubscriber(self.bus, MEMBERS)
+        self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
+        self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
+        self.live = LiveTracker(
+            self.tracking,
+            self.sets,
+            EstimatePublisher(self.bus, self.headers, "sheet", "nurbs", RIG.calib_id),
+            self.health,
+            NoiseMonitor(self.health),
+            self.clock,
+            budget_ms,
+        )
+        self.tick_ns = 0
+
+    def clock(self):
+        """Time passes whenever the tracker looks at it."""
+        self.now_ns += self.tick_ns
+        return self.now_ns
+
+    def expose(self, k, change=lambda frame: frame, kinds=tuple(Kind)):
+        """Publishes exposure k, which has just been taken."""
+        self.now_ns = max(self.now_ns, SIMULATION.time_ns(k))
+        for taken in SIMULATION.expose(k)[0]:
+            if taken.kind in kinds:
+                frame = dataclasses.replace(change(taken), t_arrival_ns=self.now_ns)
+                header = self.headers.at(frame.t_host_ns, frame.seq)
+                publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
+                publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
+
+    def sent(self, topic, message):
+        return [message.FromString(sample.payload) for sample in self.bus.sent if sample.topic == topic]
+
+    @property
+    def states(self):
+        return self.sent("sheet/state", DeformationState)
+
+    @property
+    def said(self):
+        """The last health."""
+        self.live.report()
+        self.health.publish()
+        return self.sent("health/track/sheet", Message)[-1]
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def test_an_exposure_becomes_an_estimate(bench):
+    bench.expose(0)
+    bench.now_ns += 7_000_000
+    bench.live.process_next()
+    (state,) = bench.states
+    assert state.status == DeformationState.STATUS_TRACKING
+    assert (state.header.t_host_ns, state.header.seq, state.header.rig) == (0, 0, "demo")
+    assert state.age_ms == pytest.approx(7)
+    assert (state.skipped, state.generations, len(state.theta)) == (0, 2, 48)
+    said = bench.said
+    assert said.level == Message.LEVEL_OK
+    assert (said.labels["phase"], said.counters["estimates"]) == ("tracking", 1)
+
+
+def test_the_topology_is_announced_before_the_first_state_that_uses_it(bench):
+    for k in range(2):
+        bench.expose(k)
+        bench.live.process_next()
+    topics = [sample.topic for sample in bench.bus.sent if sample.topic.startswith("sheet/")]
+    assert topics == ["sheet/topology", "sheet/state", "sheet/mesh", "sheet/state", "sheet/mesh"]
+    (topology,) = bench.sent("sheet/topology", MeshTopology)
+    assert {state.mesh_version for state in bench.states} == {topology.mesh_version}
+    meshes = bench.sent("sheet/mesh", DeformedMesh)
+    assert all(len(mesh.vertices_f32) == len(topology.rest_vertices_f32) for mesh in meshes)
+    assert [mesh.header.t_host_ns for mesh in meshes] == [state.header.t_host_ns for state in bench.states]
+    # Whoever comes later asks.
+    assert [MeshTopology.FromString(s.payload) for s in bench.bus.query("sheet/topology", 0.0)] == [topology]
+
+
+def test_before_a_tracker_is_known_to_be_fast_the_newest_set_wins_and_the_others_are_counted(bench):
+    for k in range(3):
+        bench.expose(k)
+    bench.live.process_next()
+    bench.expose(3)
+    bench.live.process_next()
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(2), SIMULATION.time_ns(3)]
+    assert [state.skipped for state in bench.states] == [2, 0]
+    assert bench.said.counters["skipped"] == 2
+
+
+def test_a_tracker_that_is_faster_than_the_cameras_works_off_what_a_stall_left(bench):
+    for k in range(4):  # three quick turns and a slow one
+        bench.expose(k)
+        bench.live.process_next()
+        bench.now_ns += 20_000_000 if k < 3 else 120_000_000
+        if k < 3:
+            bench.live.process_next()  # finds nothing
+    for k in range(4, 7):
+        bench.expose(k)
+    for _ in range(3):
+        bench.live.process_next()
+        bench.now_ns += 20_000_000
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in range(7)]
+    assert bench.said.counters["skipped"] == 0
+
+
+def test_a_slower_tracker_takes_the_newest(bench):
+    for k in range(6):
+        bench.expose(k)
+        if k % 2:
+            bench.live.process_next()
+            bench.now_ns += 50_000_000
+    assert [state.header.t_host_ns for state in bench.states] == [SIMULATION.time_ns(k) for k in (1, 3, 5)]
+    assert [state.skipped for state in bench.states] == [1, 1, 1]
+
+
+def test_topologies_are_numbered_by_themselves_so_that_a_recorder_misses_none(bench):
+    for k in range(3):
+        bench.expose(k)
+        bench.live.process_next()
+    bench.tracking.reinitialize()
+    bench.expose(3)
+    bench.live.process_next()
+    assert [topology.header.seq for topology in bench.sent("sheet/topology", MeshTopology)] == [1, 2]
+
+
+def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
+    for k in range(10):
+        bench.expose(k)
+    bench.live.process_next()
+    assert bench.states[0].header.t_host_ns == SIMULATION.time_ns(9)
+    counters = bench.said.counters
+    dropped = [number for name, number in counters.items() if name.startswith("dropped.")]
+    assert len(dropped) == 3
+    assert counters["skipped"] + dropped[0] == 9
+
+
+def test_without_frames_nothing_is_published(bench):
+    bench.live.process_next()
+    assert bench.bus.sent == []
+
+
+def test_a_set_that_waits_for_nothing_any_more_is_taken_at_its_deadline(bench):
+    bench.expose(0)
+    bench.live.process_next()
+    bench.expose(1, kinds=(Kind.DEPTH, Kind.AMPLITUDE))
+    bench.live.process_next()
+    assert len(bench.states) == 1
+    bench.now_ns += 200_000_000
+    bench.live.process_next()
+    state = bench.states[1]
+    assert state.status == DeformationState.STATUS_DEGRADED
+    assert list(state.reasons) == ["no frame from color"]
+    assert [(sensor.sensor, sensor.missing) for sensor in state.sensors] == [("tof", False), ("color", True)]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert said.message == "DEGRADED: no frame from color"
+
+
+def test_without_an_object_it_reports_initializing_and_sends_no_topology(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, data=np.zeros_like(frame.data)))
+    bench.live.process_next()
+    assert bench.states[0].status == DeformationState.STATUS_INITIALIZING
+    assert "no connected surface" in bench.states[0].reasons[0]
+    assert bench.states[0].mesh_version == 0
+    assert bench.sent("sheet/topology", MeshTopology) == []
+    assert bench.said.labels["phase"] == "initializing"
+
+
+def test_frames_that_do_not_fit_the_rig_are_an_error_that_passes(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, data=frame.data[:100]))
+    bench.live.process_next()
+    said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert "pixels, but the camera model of sensors." in said.message
+    assert said.counters["rejected"] == 1
+    assert bench.states == []
+    # In a new epoch the sensor may have another size.
+    bench.expose(1, lambda frame: dataclasses.replace(frame, epoch=1))
+    bench.live.process_next()
+    assert len(bench.states) == 1
+    assert bench.said.level == Message.LEVEL_OK
+
+
+def test_what_the_residuals_say_of_the_noise_models_is_in_health(bench):
+    for k in (0, 31):
+        bench.expose(k)
+        bench.live.process_next()
+    assert bench.said.gauges["residual_variance.tof"] == pytest.approx(1, abs=0.5)
+
+
+def test_malformed_messages_are_counted_and_explained(bench):
+    bench.bus.publisher("tof/depth/image", codec.IMAGE_SCHEMA, IMAGES).put(b"\xff", b"\xff")
+    bench.live.process_next()
+    bench.expose(0)
+    bench.live.process_next()
+    said = bench.said
+    assert said.counters["malformed.tof/depth/image"] == 1
+    assert "are no foxglove.RawImage" in said.labels["malformed"]
+    assert len(bench.states) == 1
+
+
+def test_the_budget_bounds_the_search_of_all_but_the_first_frame():
+    bench = Bench(budget_ms=5)
+    bench.tick_ns = 10_000_000  # every look at the clock takes 10 ms
+    for k in range(2):
+        bench.expose(k)
+        bench.live.process_next()
+    assert [state.generations for state in bench.states] == [2, 1]
+    assert bench.states[1].solve_ms >= 10
+    assert [state.budget_ms for state in bench.states] == [5, 5]
+
+
+def test_doubts_about_the_object_are_in_every_state_and_in_health():
+    bench = Bench(region=box.Settings((-9.0, -9.0, 0.0), (9.0, 9.0, 9.0)))
+    for k in range(2):
+        bench.expose(k)
+        bench.live.process_next()
+    first, second = bench.states
+    (doubt,) = first.warnings
+    assert "is the region right?" in doubt
+    assert list(second.warnings) == [doubt]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert doubt in said.message
+
+
+def test_a_wrong_depth_scale_is_a_warning_until_it_is_right(bench):
+    bench.expose(0, lambda frame: dataclasses.replace(frame, scale=frame.scale * 1e-3))
+    bench.live.process_next()
+    (state,) = bench.states
+    assert state.status == DeformationState.STATUS_INITIALIZING
+    assert "is the depth scale right?" in state.warnings[0]
+    said = bench.said
+    assert said.level == Message.LEVEL_WARNING
+    assert state.warnings[0] in said.message
+    bench.expose(1, lambda frame: dataclasses.replace(frame, epoch=1))
+    bench.live.process_next()
+    assert list(bench.states[1].warnings) == []
+    assert bench.said.level == Message.LEVEL_OK

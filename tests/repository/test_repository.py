@@ -1,0 +1,158 @@
+"""Promises of the repository itself: it works elsewhere, installs what it pins, and its changelog knows the version."""
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, packages_distributions, requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.version import Version
+
+import abs_service
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("abs_service", "drivers", "calib")
+CONSTRAINTS = ("constraints.txt", "constraints-all.txt")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+EXTRAS = PROJECT["project"]["optional-dependencies"]
+OPTIONAL = [line for extra in EXTRAS.values() for line in extra]
+
+# Where a path means the same on every Linux machine.
+STANDARD = re.compile(r"/(bin|dev|etc|lib|opt|proc|run|sbin|srv|sys|usr|var)/")
+ABSOLUTE_PATH = re.compile(r"(?<![\w./:~$}-])(?:/[\w.+-]+){2,}")
+HOME = re.compile(r"/(home/\w+|root|Users/\w+)/")
+PACKAGE_INDEX = re.compile(r"index[-_]url|find[-_]links|trusted[-_]host|\b(pypi|pythonhosted|npmjs)[.](org|com)", re.I)
+
+
+def test_every_file_is_portable() -> None:
+    found = [
+        f"{path}:{number}: {complaint}"
+        for path, text in _tracked_texts()
+        for number, line in enumerate(text.splitlines(), start=1)
+        for complaint in _not_portable(line)
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize("line", [f"data = '{ROOT}/tests'", "cd /home/" + "ann/code", "pip install --index" + "-url x"])
+def test_a_line_that_works_on_one_machine_only_is_noticed(line: str) -> None:
+    assert list(_not_portable(line))
+
+
+@pytest.mark.parametrize("line", ["#!/usr/bin/env bash", "/tof/depth/image", "https://example.org/a/b", "a/b/c"])
+def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
+    assert not list(_not_portable(line))
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted"),
+    [
+        ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
+        ("constraints-all.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
+        ("constraints-all.txt", OPTIONAL),
+    ],
+)
+def test_every_requirement_is_pinned_as_asked(name: str, wanted: list[str]) -> None:
+    pins = _pins(name)
+    assert [line for line in map(Requirement, wanted) if pins[line.name] not in line.specifier] == [], (
+        "make constraints"
+    )
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
+    """An installer that insists on hashes accepts nothing less; a list compiled from old metadata may fall short."""
+    pins = _pins(name)
+    assert {f"{pin} wants {wanted}" for pin in pins for wanted in _requirements(pin) if wanted not in pins} == set()
+
+
+def test_running_and_testing_use_the_same_versions() -> None:
+    assert _pins("constraints.txt").items() <= _pins("constraints-all.txt").items()
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_every_pin_has_a_hash_and_no_address(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    assert all("--hash=sha256:" in pin for pin in re.split(r"\n(?=\w)", text)[1:])
+    assert "://" not in text
+
+
+def test_the_newest_entry_of_the_changelog_is_this_version() -> None:
+    headings = re.findall(r"^## \[(.+?)\]", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)
+    assert headings[0] in {"Unreleased", abs_service.__version__}
+    assert abs_service.__version__ in headings
+
+
+def test_files_and_functions_are_short_enough_to_read_at_once() -> None:
+    texts = {path: path.read_text(encoding="utf-8") for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+    long = [f"{path} has {n} lines, the limit is 250" for path in texts if (n := len(texts[path].splitlines())) > 250]
+    for path, text in texts.items():
+        for function in (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)):
+            limit = 60 if "kernel" in map(ast.unparse, function.decorator_list) else 40
+            if (lines := _lines_of_code(function)) > limit:
+                long.append(f"{path}: {function.name} has {lines} lines, the limit is {limit}")
+    assert long == []
+
+
+def test_what_the_packages_import_is_required_by_name() -> None:
+    wanted = [*PROJECT["project"]["dependencies"], *OPTIONAL]
+    declared = {_normal(Requirement(line).name) for line in wanted}
+    distributions = dict(packages_distributions()) | {"pydantic_core": ["pydantic"]}  # pydantic's own, documented by it
+    undeclared = {
+        f"{path.relative_to(ROOT)}: {module}"
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+        for module in _imported(path) - sys.stdlib_module_names - {*PACKAGES, "absmsg"}
+        if module in distributions and not declared & set(map(_normal, distributions[module]))
+    }
+    assert undeclared == set()
+
+
+def _tracked_texts() -> list[tuple[str, str]]:
+    listing = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    if listing.returncode != 0:
+        pytest.skip("not a git checkout")
+    paths = [name for name in listing.stdout.split("\0") if name and (ROOT / name).is_file()]
+    contents = [(name, (ROOT / name).read_bytes()) for name in paths]
+    return [(name, data.decode("utf-8", errors="replace")) for name, data in contents if b"\0" not in data[:4096]]
+
+
+def _not_portable(line: str) -> list[str]:
+    paths = [match[0] for match in ABSOLUTE_PATH.finditer(line) if not STANDARD.match(match[0])]
+    complaints = [f"{path} exists on this machine only" for path in paths if Path(path).exists()]
+    complaints += [f"{match[0]} is somebody's home" for match in [HOME.search(line)] if match]
+    complaints += [f"{match[0]} belongs into your own pip settings" for match in [PACKAGE_INDEX.search(line)] if match]
+    return complaints
+
+
+def _pins(name: str) -> dict[str, Version]:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return {pin: Version(version) for pin, version in re.findall(r"^([\w-]+)==([^\s;]+)", text, re.M)}
+
+
+def _requirements(package: str) -> set[str]:
+    """Requirements of the installed `package`; empty if it is not installed."""
+    try:
+        wanted = map(Requirement, requires(package) or [])
+    except PackageNotFoundError:
+        return set()
+    return {_normal(line.name) for line in wanted if line.marker is None or line.marker.evaluate({"extra": ""})}
+
+
+def _normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def _imported(path: Path) -> set[str]:
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    plain = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    return {name.split(".")[0] for name in [*plain, *(n.module or "" for n in nodes if isinstance(n, ast.ImportFrom))]}
+
+
+def _lines_of_code(function: ast.FunctionDef) -> int:
+    first = function.body[1] if ast.get_docstring(function) and len(function.body) > 1 else function.body[0]
+    return (function.body[0].lineno - function.lineno) + ((function.end_lineno or 0) - first.lineno + 1)
