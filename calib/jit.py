@@ -90,7 +90,8 @@ class _Kernel:
         """
         used = ((name, value.digest if isinstance(value, _Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
-        return hashlib.sha256(repr((_readable(self.function), values)).encode()).hexdigest()[:12]
+        made_of = self.function.__module__, _readable(self.function), values  # cached code imports its modules by name
+        return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 
     @functools.cached_property
     def _globals(self) -> dict[str, Any]:

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 
@@ -59,6 +60,13 @@ def test_what_is_compiled_is_named_by_all_that_it_is_made_from() -> None:
     variants = [after, composed(after, inner=squared), composed(after, inner=composed(doubled, FACTOR=5))]
     assert len({digest(one) for one in variants}) == 3
     assert digest(composed(after, inner=doubled)) == digest(after) == digest(after_too)
+
+
+def test_code_that_has_moved_to_another_module_is_compiled_anew() -> None:
+    """Compiled code imports the modules that it was made from by name."""
+    moved = FunctionType(getattr(doubled, "function").__code__, globals(), "doubled")  # noqa: B009
+    moved.__module__ = "calib.elsewhere"
+    assert digest(kernel(moved)) != digest(doubled)
 
 
 PARTS = """
