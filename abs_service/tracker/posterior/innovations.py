@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Time constant of the running means [s].
-MEMORY_S = 0.15
+MEMORY_S = 0.5
 
 
 class Innovations:

@@ -10,7 +10,7 @@ whose covariance is B (`covariance`). Where the sensors outweigh W, G is zero an
 nothing is measured, G is one, and the errors add up:
 
 - q, the motion that was not predicted, has the deviation of the innovations (`motion_prior`). Where nothing has been
-  measured in the last frames, G⁴ ≈ 1, the velocity is not known either, and the whole motion counts.
+  measured in the last frames, G⁸ ≈ 1, the velocity is not known either, and the whole motion counts.
 - A share `LASTING` of the variance of s is the same in every frame: the noise of the first frame in mesh and
   appearance. Its error is R_t s with R_t = G R_{t−1} + Σ. So is that of whole sides of the outline. The rest is this
   frame's own noise, and independent.
@@ -65,6 +65,7 @@ class ErrorPropagation:
         if self._began:
             self._moved.flat[:: len(unpredicted) + 1] += unpredicted**2
             unheld = gain @ gain
+            unheld = unheld @ unheld
             unheld = unheld @ unheld * moved
             self._moved += unheld @ unheld.T
         self._began = True
