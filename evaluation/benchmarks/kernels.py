@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.appearance import with_appearance
-from abs_service.tracker.detection.sheet_mesh import Sheet
-from abs_service.tracker.detection.strip_detection import Strip
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
+from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel

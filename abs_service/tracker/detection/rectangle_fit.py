@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose

@@ -9,7 +9,7 @@ from annotated_types import Interval
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import InitialDetection
-from abs_service.tracker.detection.strip_detection import Strip, find_strip
+from abs_service.tracker.detection.strip.strip_detection import Strip, find_strip
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.parts.arc import arc
 from calib import pose

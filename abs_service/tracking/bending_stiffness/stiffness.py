@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.elastica import heavy_elastica
+from abs_service.tracker.detection.strip.elastica import heavy_elastica
 from abs_service.tracker.models.gravity import Gravity
 
 Vector = NDArray[np.float64]

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_segments import connected_surfaces
 from abs_service.tracker.detection.depth_view import DepthView
+from abs_service.tracker.detection.segments.depth_segments import connected_surfaces
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import hybrid
 from abs_service.tracker.synthesis.rasterization.raster import Raster

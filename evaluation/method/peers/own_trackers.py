@@ -12,7 +12,7 @@ from abs_service.tracker import status
 from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.detection.initial_detection import InitialDetection
 from abs_service.tracker.detection.regions import nearest
-from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models import flexpad, nurbs

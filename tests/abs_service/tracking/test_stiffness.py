@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.tracker.detection.strip_detection import Strip
+from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.bending_stiffness.stiffness import (
     LEAST_FRAMES,

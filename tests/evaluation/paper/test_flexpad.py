@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from calib import pose
 from evaluation.experiment import Context
 from evaluation.paper import flexpad

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.within import Restricted, restricted
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 from calib import pose
 
 LEAST_PIXELS = 16

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.within import load_mask
+from abs_service.tracker.detection.segments.within import load_mask
 
 LEAST_PIXELS = 16
 

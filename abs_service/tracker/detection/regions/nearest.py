@@ -8,11 +8,11 @@ import numpy as np
 from annotated_types import Ge, Gt
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_segments import large_surfaces
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.plausibility import is_scene
-from abs_service.tracker.detection.within import Restricted, restricted
+from abs_service.tracker.detection.segments.depth_segments import large_surfaces
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.color_growth import grown_by_color
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
-from abs_service.tracker.detection.within import Restricted, restricted
+from abs_service.tracker.detection.segments.color_growth import grown_by_color
+from abs_service.tracker.detection.segments.seeds import ColorSeed, MotionSeed, PixelSeed, Seed, Surfaces
+from abs_service.tracker.detection.segments.within import Restricted, restricted
 
 Level = Annotated[int, Ge(0), Le(255)]
 

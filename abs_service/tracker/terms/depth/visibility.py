@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_segments import connected_surfaces
+from abs_service.tracker.detection.segments.depth_segments import connected_surfaces
 from abs_service.tracker.terms.depth.background import DEEPEST_M
 from calib.jit import kernel
 

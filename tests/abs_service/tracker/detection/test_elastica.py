@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from abs_service.tracker.detection.elastica import STEPS, heavy_elastica
+from abs_service.tracker.detection.strip.elastica import STEPS, heavy_elastica
 
 
 @given(st.floats(-1.5, 1.5), st.floats(0.01, 60))

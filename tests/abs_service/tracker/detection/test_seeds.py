@@ -10,11 +10,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from abs_service.tracker.detection.color_growth import grown_by_color
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, UndecidedError
 from abs_service.tracker.detection.regions import mask, seed
-from abs_service.tracker.detection.seeds import Seeded
+from abs_service.tracker.detection.segments.color_growth import grown_by_color
+from abs_service.tracker.detection.segments.seeds import Seeded
 from calib import pose
 from calib.camera import Camera
 

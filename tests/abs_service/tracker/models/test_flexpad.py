@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad, Settings

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from abs_service.tracker.detection.sheet_mesh import Sheet
-from abs_service.tracker.detection.strip_detection import Strip
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
+from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.models.flexpad import FULL_HEIGHT, FlexPad

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from abs_service.tracker.detection.sheet_mesh import Sheet
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.models.flexpad import FlexPad
 from abs_service.tracker.models.nurbs import Settings

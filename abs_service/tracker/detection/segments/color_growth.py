@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.seeds import Seeded, alike, joined
+from abs_service.tracker.detection.segments.seeds import Seeded, alike, joined
 
 #: Number of colours that the core of an object is described by: of its print, in light and shade.
 COLORS = 5

@@ -7,7 +7,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.elastica import Elastica, heavy_elastica
+from abs_service.tracker.detection.strip.elastica import Elastica, heavy_elastica
 
 Vector = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.samples import farthest_first
+from abs_service.tracker.detection.shapes.samples import farthest_first
 from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
 
 #: Vertices are chosen among so many; more are slower and no better.

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.depth_segments import large_surfaces, surface_at
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, UndecidedError
+from abs_service.tracker.detection.segments.depth_segments import large_surfaces, surface_at
 
 #: Radius of the disc around a seed's pixel that belongs to the object, as a share of the image's width.
 DISC = 1 / 64

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.detection.elastica_fit import (
+from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
+from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
+from abs_service.tracker.detection.strip.elastica_fit import (
     LARGEST_GAP,
     NOISE_M,
     FittedElastica,
@@ -17,8 +19,6 @@ from abs_service.tracker.detection.elastica_fit import (
     load_deviation,
     normals_at,
 )
-from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.sheet_mesh import Sheet
 from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.camera import Camera

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import at_points
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.paint import NO_PAINT, Paint
-from abs_service.tracker.detection.registration import register
-from abs_service.tracker.detection.samples import Samples
+from abs_service.tracker.detection.shapes.paint import NO_PAINT, Paint
+from abs_service.tracker.detection.shapes.registration import register
+from abs_service.tracker.detection.shapes.samples import Samples
 from abs_service.tracker.detection.templates.base import BindsToMesh, Model_co, ModelSettings, Sight
 from abs_service.tracker.mesh import Mesh
 from calib import pose
