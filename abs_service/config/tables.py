@@ -93,7 +93,7 @@ class TrackerTable(Table):
         model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
         template: likewise of `abs_service.tracker.detection.templates`.
         mesh: the triangle mesh.
-        priors, vertex_offsets: `Settings` of `tracker.posterior.priors` and `tracking.offsets.vertex_offsets`.
+        priors, vertex_offsets: `Settings` of `tracker.posterior.priors.settings` and `tracking.offsets.vertex_offsets`.
         status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
         budget_ms: time that the live search may take per frame set; replay does not look at the clock.
         budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
@@ -107,7 +107,7 @@ class TrackerTable(Table):
     mesh: MeshTable = MeshTable()
     synthesis: Annotated[Any, Plugin("abs_service.tracker.synthesis")] = Field(default={"type": "sparse"})
     objective: Annotated[Any, Plugin("abs_service.tracker.objectives")] = Field(default={"type": "likelihood"})
-    priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors")] = Field(default={})
+    priors: Annotated[Any, SettingsOf("abs_service.tracker.posterior.priors.settings")] = Field(default={})
     vertex_offsets: Annotated[Any, SettingsOf("abs_service.tracking.offsets.vertex_offsets")] = Field(default={})
     status: Annotated[Any, SettingsOf("abs_service.tracker.status")] = Field(default={})
     reinitialization: Annotated[Any, SettingsOf("abs_service.tracking.monitors.loss_monitor")] = Field(default={})

@@ -16,11 +16,11 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
-from abs_service.tracker.posterior import priors
-from abs_service.tracker.posterior.motion_prior import MotionPrior
 from abs_service.tracker.posterior.posterior import Posterior
-from abs_service.tracker.posterior.priors import ShapePrior
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors import settings as priors
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.tracker import Tracker
 from abs_service.tracking.monitors import loss_monitor

@@ -11,7 +11,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Nurbs, Settings
 from abs_service.tracker.objectives.likelihood import Settings as Likelihood
 from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.observer import Observer

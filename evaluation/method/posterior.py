@@ -24,7 +24,7 @@ from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from calib.noise.color import GaussianColor
 from evaluation.coverage import inside_region

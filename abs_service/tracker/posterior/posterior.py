@@ -9,9 +9,9 @@ from abs_service.pairing.observation import Observation
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian, Surface
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.posterior.curvature import Quadratic, gauss_newton, posterior_covariance
-from abs_service.tracker.posterior.motion_prior import MotionPrior
-from abs_service.tracker.posterior.priors import ShapePrior
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.base import SensorFit, inlier_share
 from abs_service.tracker.terms.linearization import Linearization
 

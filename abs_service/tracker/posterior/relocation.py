@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.curvature import gauss_newton
-from abs_service.tracker.posterior.priors import ShapePrior
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization
 
 #: Steps of the coarse fit, σ of the distances between vertices and points [m], and σ of the relative edge stretch.

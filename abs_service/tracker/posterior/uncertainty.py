@@ -18,8 +18,8 @@ from abs_service.tracker.posterior.covariance import (
 )
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.misfit import NeighborMean
-from abs_service.tracker.posterior.motion_prior import MotionPrior
 from abs_service.tracker.posterior.posterior import FramePosterior
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.propagation import ErrorPropagation
 
 

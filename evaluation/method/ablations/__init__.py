@@ -15,7 +15,7 @@ from abs_service.report.content import Section
 from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
-from abs_service.tracker.posterior import priors
+from abs_service.tracker.posterior.priors import settings as priors
 from abs_service.tracking.plan import Plan
 from calib.noise.base import DepthNoise
 from calib.noise.constant import Constant

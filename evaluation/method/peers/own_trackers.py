@@ -19,7 +19,7 @@ from abs_service.tracker.models import flexpad, nurbs
 from abs_service.tracker.models.base import DeformationModel
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
-from abs_service.tracker.posterior import priors
+from abs_service.tracker.posterior.priors import settings as priors
 from abs_service.tracker.synthesis import sparse
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.plan import OptimizerSettings, Plan

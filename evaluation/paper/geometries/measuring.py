@@ -11,7 +11,7 @@ from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.estimate import Status
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es, hybrid
-from abs_service.tracker.posterior import priors
+from abs_service.tracker.posterior.priors import settings as priors
 from abs_service.tracker.synthesis import sparse
 from abs_service.tracking.monitors import loss_monitor
 from abs_service.tracking.plan import OptimizerSettings, Plan

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.models.nurbs import Settings as NurbsSettings
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm

@@ -21,9 +21,9 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
-from abs_service.tracker.posterior.motion_prior import MotionPrior
-from abs_service.tracker.posterior.priors import Settings as PriorSettings
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import Linearization, stack
 from abs_service.tracking.session import TrackingSession
 from calib import pose

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.posterior.motion_prior import MotionPrior
-from abs_service.tracker.posterior.priors import Settings
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, around, placed

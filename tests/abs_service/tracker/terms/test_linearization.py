@@ -11,9 +11,9 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
-from abs_service.tracker.posterior.motion_prior import MotionPrior
-from abs_service.tracker.posterior.priors import Settings as PriorSettings
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
+from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.synthesis.sparse import Sparse
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm

@@ -8,15 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import SparseJacobian
-from abs_service.tracker.posterior.motion_prior import (
+from abs_service.tracker.posterior.priors.motion_prior import (
     FIRST_INTERVAL_S,
     LAG_MARGIN,
     LONGEST_INTERVAL_S,
     MARGIN,
     MotionPrior,
 )
-from abs_service.tracker.posterior.priors import Settings, ShapePrior
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.settings import Settings
+from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from tests.abs_service.tracker.scenes import as_surface, flat, sheet
 

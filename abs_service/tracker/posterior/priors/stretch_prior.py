@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.edge_runs import EdgeRuns
+from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
 from abs_service.tracker.terms.linearization import Linearization, split
 from calib.jit import kernel
 

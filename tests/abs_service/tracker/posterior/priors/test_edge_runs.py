@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from abs_service.tracker.detection.grid_mesh import triangles
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.nurbs import Settings as Nurbs
-from abs_service.tracker.posterior.edge_runs import EdgeRuns
-from abs_service.tracker.posterior.stretch_prior import StretchPrior
+from abs_service.tracker.posterior.priors.edge_runs import EdgeRuns
+from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from tests import reference
 from tests.abs_service.tracker.scenes import as_surface, sheet
 from tests.abs_service.tracker.test_kernels import few, seeds

@@ -10,8 +10,8 @@ the prior holds it back; noise makes them differ. So their product widens the pr
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.posterior.innovations import Innovations
-from abs_service.tracker.posterior.priors import Settings
+from abs_service.tracker.posterior.priors.innovations import Innovations
+from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 

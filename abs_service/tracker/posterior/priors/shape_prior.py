@@ -1,32 +1,10 @@
-"""Settings of the priors, and the prior of the shape: negative log-densities of theta, without hand-tuned weights."""
-
-from dataclasses import dataclass
-from typing import Annotated
+"""Prior of the shape: the negative log-density of theta that a deformation model states."""
 
 import numpy as np
-from annotated_types import Gt
 from numpy.typing import NDArray
 
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
-
-
-@dataclass(frozen=True)
-class Settings:
-    """TOML keys of the priors.
-
-    Attributes:
-        stretch: standard deviation of an edge's relative change of length. Paper: 0.01; rubber: 0.2.
-        speed: largest standard deviation of a parameter's rate of change around the predicted one, expressed as the
-            speed of the surface that it moves [m/s]; it becomes smaller while the object moves as predicted.
-        least_speed: smallest standard deviation [m/s].
-        memory_s: time constant of the exponential decay of the predicted velocity [s].
-    """
-
-    stretch: Annotated[float, Gt(0)] = 0.02
-    speed: Annotated[float, Gt(0)] = 0.3
-    least_speed: Annotated[float, Gt(0)] = 0.02
-    memory_s: Annotated[float, Gt(0)] = 0.1
 
 
 class ShapePrior:

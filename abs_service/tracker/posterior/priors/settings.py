@@ -1,0 +1,24 @@
+"""TOML keys of the priors."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from annotated_types import Gt
+
+
+@dataclass(frozen=True)
+class Settings:
+    """TOML keys of the priors.
+
+    Attributes:
+        stretch: standard deviation of an edge's relative change of length. Paper: 0.01; rubber: 0.2.
+        speed: largest standard deviation of a parameter's rate of change around the predicted one, expressed as the
+            speed of the surface that it moves [m/s]; it becomes smaller while the object moves as predicted.
+        least_speed: smallest standard deviation [m/s].
+        memory_s: time constant of the exponential decay of the predicted velocity [s].
+    """
+
+    stretch: Annotated[float, Gt(0)] = 0.02
+    speed: Annotated[float, Gt(0)] = 0.3
+    least_speed: Annotated[float, Gt(0)] = 0.02
+    memory_s: Annotated[float, Gt(0)] = 0.1
