@@ -18,8 +18,8 @@ class DepthTable(Table):
     measured = (1 + scale) · distance + offset, for radial distances.
 
     Attributes:
-        offset: [m].
-        scale: dimensionless.
+        offset: constant error of a distance [m].
+        scale: error of a distance relative to it.
     """
 
     offset: FiniteFloat = 0.0

@@ -23,7 +23,12 @@ _MATRIX = ("width", "height", "fx", "fy", "cx", "cy")
 
 
 class PoseTable(BaseModel):
-    """A pose: rotation vector [rad] and translation [m]. A 4 × 4 matrix, row by row, may stand in its place."""
+    """A pose: rotation vector [rad] and translation [m]. A 4 × 4 matrix, row by row, may stand in its place.
+
+    Attributes:
+        rotation_vector: axis of the rotation times its angle [rad].
+        translation: position of the sensor's centre in the rig [m].
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -58,10 +63,12 @@ class CameraTable(BaseModel):
     """Calibration that replaces the device's own: the image with its camera matrix and lens, the pose, or both.
 
     Attributes:
-        width, height: image size [px].
-        fx, fy, cx, cy: camera matrix [px].
-        lens: coefficients of the distortion in OpenCV's order; fewer mean zeros.
-        lens_model: what they are coefficients of: `brown_conrady` (k1, k2, p1, p2, k3 … k6) or `fisheye` (k1 … k4).
+        width, height: image size [px]; these and the next four keys belong together.
+        fx, fy: focal length [px].
+        cx, cy: coordinate of the principal point [px].
+        lens: coefficients of the distortion in OpenCV's order; missing ones are 0.
+        lens_model: distortion that they are coefficients of: `brown_conrady` (k1, k2, p1, p2, k3 … k6) or
+            `fisheye` (k1 … k4).
         T_rs: pose that maps sensor coordinates to rig coordinates.
     """
 

@@ -18,7 +18,7 @@ class BusTable(Table):
 
     Attributes:
         endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
-        shared_memory: whether images travel through shared memory on one host.
+        shared_memory: images travel through shared memory between processes of one host.
     """
 
     endpoint: Endpoint = "tcp/127.0.0.1:7447"
@@ -26,11 +26,11 @@ class BusTable(Table):
 
 
 class DeviceTable(Table):
-    """`[devices.<name>]`: one thing that delivers images.
+    """`[devices.<name>]`: one device that delivers images.
 
     Attributes:
-        uri: names its driver and which device.
-        controls: what is set whenever it is opened; `abs-service devices URI` lists what there is.
+        uri: its driver and which of the driver's devices it is; `abs-service devices` lists the attached ones.
+        controls: values that are set whenever it is opened; `abs-service devices URI` lists its controls.
     """
 
     uri: DeviceUri
@@ -42,16 +42,16 @@ class SensorTable(Table):
 
     Attributes:
         device: name of the device that it belongs to.
-        head: what the device calls it; "" if it is the sensor's name.
+        head: name that the device has for it; "" if that is the sensor's name.
         camera: calibration in place of the device's own.
-        noise: `Settings` of a module of `calib.noise` or `abs_service.tracker.measurements`; None if the sensor is
-            recorded, but no tracker uses it.
-        texture: likewise of what it sees of the surface besides: a time-of-flight camera's amplitudes, for example.
-        outlier_share: share of its measurements that come from anywhere; None for the objective's own.
-        range_m: distances that a depth sensor can report at all; None for the objective's own.
-        no_return: `Settings` of `calib.no_return`, how often a depth sensor has no return from a surface.
+        noise: noise model of its measurements; a sensor without one is recorded, but no tracker can use it.
+        texture: noise model of the second picture of a depth sensor, such as the amplitudes of a time-of-flight camera;
+            without one, it is not compared.
+        outlier_share: share of outliers among its measurements; without it, the objective's `outlier_share` counts.
+        range_m: measuring range of a depth sensor [m]; without it, the objective's `range_m` counts.
+        no_return: probability that a depth sensor has no return from a surface.
         depth: systematic error of its distances.
-        time_offset_ms: what has to be added to its exposures' times to get those of the others.
+        time_offset_ms: offset that is added to the times of its exposures to agree with the other sensors' [ms].
     """
 
     device: str
@@ -71,7 +71,7 @@ class SynchronisationTable(Table):
 
     Attributes:
         reference: stream whose exposures pace the trackers; "" if each tracker names its own.
-        tolerance_ms: largest difference between its stamp and another stream's.
+        tolerance_ms: largest difference between the time of its exposure and that of another stream's [ms].
     """
 
     reference: Stream | Literal[""] = ""
@@ -79,7 +79,11 @@ class SynchronisationTable(Table):
 
 
 class MeshTable(Table):
-    """`mesh` of a tracker: the triangle mesh whose deformation is estimated; `vertices` is their number."""
+    """`[trackers.<name>.mesh]`: the triangle mesh whose deformation is estimated.
+
+    Attributes:
+        vertices: approximate number of its vertices.
+    """
 
     vertices: Annotated[int, Field(ge=4, le=100_000)] = 300
 
@@ -89,14 +93,20 @@ class TrackerTable(Table):
 
     Attributes:
         sensors: names of the sensors whose measurements count.
-        reference: stream that paces this tracker; "" if it is that of `[synchronisation]`.
-        model, region, synthesis, objective, optimizer: `Settings` of a module of `abs_service.tracker.models`, ….
-        template: likewise of `abs_service.tracker.detection.templates`.
-        mesh: the triangle mesh.
-        priors, vertex_offsets: `Settings` of `tracker.posterior.priors.settings` and `tracking.offsets.vertex_offsets`.
-        status, reinitialization: `Settings` of `abs_service.tracker.status` and `.loss`.
-        budget_ms: time that the live search may take per frame set; replay does not look at the clock.
-        budget_evaluations: how often a search may compute the cost of a candidate per frame set, live and in replay.
+        reference: stream whose exposures pace this tracker; "" if it is that of `[synchronisation]`.
+        model: deformation model, which defines the parameters Θ.
+        region: part of the first depth image that is the object.
+        template: prior knowledge of the object's shape.
+        mesh: triangle mesh whose deformation is estimated.
+        synthesis: computation of the measurements that a deformation predicts.
+        objective: cost of a deformation, given the measurements.
+        priors: knowledge of stretch and motion before any measurement.
+        vertex_offsets: offsets of the vertices from the model's surface, learnt over frames.
+        status: limits between TRACKING, DEGRADED and LOST.
+        reinitialization: recovery of a lost object.
+        optimizer: search for the deformation of least cost.
+        budget_ms: time that the live search may take per frame set [ms]; replay does not look at the clock.
+        budget_evaluations: number of candidates whose cost a search may compute per frame set, live and in replay.
     """
 
     sensors: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -120,14 +130,15 @@ class RecordTable(Table):
     """`[record]`: what is kept on disk.
 
     Attributes:
-        enabled: whether `run` records.
+        enabled: `abs-service run` writes recordings.
         directory: folder of the recordings, created if it does not exist.
-        compression: of MCAP chunks.
-        chunk_bytes: size of a chunk before compression.
-        flush_s: longest time until a message is on disk, and so the most that a crash can lose.
-        rotate_bytes, rotate_s: size and age at which a new file begins.
-        minimum_free_bytes: free space at which recording ends.
-        queue_bytes: messages that may wait for a slow disk; more are dropped and counted.
+        compression: compression of the chunks of the MCAP files.
+        chunk_bytes: size of a chunk before compression [bytes].
+        flush_s: longest time until a message is on disk, and so the most that a crash can lose [s].
+        rotate_bytes: size of a file at which a new one begins [bytes].
+        rotate_s: age of a file at which a new one begins [s].
+        minimum_free_bytes: free space on the disk at which recording ends [bytes].
+        queue_bytes: size of the messages that may wait for a slow disk [bytes]; more are dropped and counted.
     """
 
     enabled: bool = True
@@ -145,10 +156,11 @@ class RunTable(Table):
     """`[run]`: limits and timeouts of the supervisor.
 
     Attributes:
-        max_restarts, restart_window_s: a process that needs more restarts than this within this time is given up.
-        startup_timeout_s: timeout for the health of a process that starts or compiles its kernels.
-        stall_timeout_s: timeout for its health afterwards; a process that exceeds it is restarted.
-        stop_timeout_s: time that all processes together have to end in order before they are killed.
+        max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up.
+        restart_window_s: time over which the restarts of a process are counted [s].
+        startup_timeout_s: longest time without health of a process that starts or compiles its kernels [s].
+        stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted.
+        stop_timeout_s: time that all processes together have to end in order before they are killed [s].
     """
 
     max_restarts: Annotated[int, Field(ge=0)] = 5
@@ -163,6 +175,18 @@ class ServiceConfig(Table):
 
     In a file, `calibration` may name a calibration file, whose content is put into the sensors' tables; here it is what
     is remembered of that file.
+
+    Attributes:
+        version: version of the file format.
+        name: name of the rig on the wire: keys are `abs/NAME/…`.
+        calibration: calibration file, whose keys of the sensors are put into their tables.
+        bus: transport between the processes.
+        devices: the devices by name.
+        sensors: the optical heads of the devices by name.
+        synchronisation: time tolerance between images of one moment.
+        trackers: the trackers by name; without any, the rig only records.
+        record: the recorder.
+        run: limits and timeouts of the supervisor.
     """
 
     version: Literal[1]

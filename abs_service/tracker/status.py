@@ -26,7 +26,8 @@ class Settings:
         degraded_folded: share of folded faces above which an estimate is DEGRADED.
         degraded_deviation_m: standard deviation of the position of a vertex, median over the mesh, above which an
             estimate is DEGRADED [m].
-        degraded_unheld_m: the same by the measurements of one frame alone, without the past [m].
+        degraded_unheld_m: the same standard deviation from the measurements of one frame alone, without the past, above
+            which an estimate is DEGRADED [m].
     """
 
     degraded_below: Annotated[float, Interval(gt=0, lt=1)] = 0.6

@@ -17,7 +17,7 @@ class LightBarrier:
     """Beam from the sensor's centre along its z axis, with the error rates of its receiver.
 
     Attributes:
-        length_m: from the lamp to the receiver [m].
+        length_m: length of the beam, from the lamp to the receiver [m].
         miss: probability that an interrupted beam is reported as free.
         false_alarm: probability that a free beam is reported as interrupted, including interruption by other objects.
     """

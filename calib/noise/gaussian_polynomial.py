@@ -23,9 +23,9 @@ class GaussianPolynomial:
     Attributes:
         sigma: coefficients of the deviation [m]; row i for the distance's power i, column j for the amplitude's power
             j.
-        mu: coefficients of the mean offset [m].
+        mu: coefficients of the mean offset [m], likewise.
         distances: calibrated range of distances [m].
-        amplitudes: calibrated range of amplitudes.
+        amplitudes: calibrated range of amplitudes, in the sensor's unit.
         least_sigma: lower bound of the deviation [m].
     """
 

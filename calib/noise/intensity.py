@@ -23,12 +23,12 @@ class GaussianIntensity:
     in skewness.
 
     Attributes:
-        stream: stream of the sensor.
+        stream: stream of the sensor that is compared.
         sigma: constant part of the standard deviation, in units of the stream.
-        relative: proportional part of the standard deviation.
+        relative: proportional part of the standard deviation, relative to the measured value.
         illumination: `active` for the sensor's own light, whose return falls with distance and angle of incidence;
             `passive` for ambient light, under which a surface looks the same from everywhere.
-        full_scale: largest value of the stream; outliers are uniform up to it.
+        full_scale: largest value of the stream, in its units; outliers are uniform up to it.
     """
 
     stream: Stream

@@ -26,11 +26,11 @@ class TofAmplitude:
 
     Attributes:
         sigma: deviation of a bright return, coefficients of the powers of the distance [m].
-        sigma_amplitude: deviation times amplitude [m].
+        sigma_amplitude: deviation times amplitude [m times the sensor's amplitude unit].
         mu: mean offset of a bright return, coefficients of the powers of the distance [m].
-        mu_amplitude: mean offset times amplitude [m].
+        mu_amplitude: mean offset times amplitude [m times the sensor's amplitude unit].
         distances: calibrated range of distances [m].
-        amplitudes: calibrated range of amplitudes, above 0.
+        amplitudes: calibrated range of amplitudes, above 0, in the sensor's unit.
         least_sigma: lower bound of the deviation [m].
     """
 

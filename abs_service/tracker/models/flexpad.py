@@ -41,18 +41,19 @@ class Settings:
     """TOML keys of the model.
 
     Attributes:
-        width_m, height_m: long and short side of the sheet [m]; 0 uses the detected size.
-        size_tolerance: largest relative difference between a given and the detected side.
+        width_m: long side of the sheet [m]; 0 uses the detected length.
+        height_m: short side of the sheet [m]; 0 uses the detected length.
+        size_tolerance: largest relative difference between a given and the detected side; no effect with a template.
         least_radius_m: radius [m] of the sheet when a bend is 2, its largest value.
         bend_deviation: prior standard deviation of a bend. Opposite bends of neighbouring directions nearly cancel, so
             measurements alone do not determine their common magnitude.
-        least_pixels: the sheet must have so many pixels to be found.
-        largest_bow_m: largest height by which it may arch over them [m].
-        least_gap_m: pixels within this distance of its plane, or within four deviations if that is more, are its [m].
-        least_overlap: least share of the pixels of the sheet or of the rectangle around it that both have in common.
-
-    The last four are thresholds of the detection in the first depth image; with a template, `size_tolerance` and they
-    do not count.
+        least_pixels: least number of pixels of the sheet in the first depth image; no effect with a template.
+        largest_bow_m: largest height by which the sheet may arch over its plane in the first depth image [m]; no effect
+            with a template.
+        least_gap_m: distance from the sheet's plane up to which a pixel belongs to it in the first depth image, or four
+            deviations if that is more [m]; no effect with a template.
+        least_overlap: least share of the pixels of the sheet or of the rectangle around it that both have in common in
+            the first depth image; no effect with a template.
     """
 
     width_m: Annotated[float, Interval(ge=0, le=10)] = 0.0

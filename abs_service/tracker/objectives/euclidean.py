@@ -34,10 +34,11 @@ class Settings:
     Attributes:
         depth_weight: cost of a squared metre between measured and synthesised distance.
         color_weight: cost of a squared level between measured and synthesised colour, grey or Bayer channel.
-        cutoff_m: distances that differ by more, and vertices without a measurement, cost as much as this [m].
-        cutoff_levels: likewise for colours, in levels of 256.
-        intensity_weight: cost of a squared unit between measured and synthesised intensity.
-        cutoff_intensity: intensities that differ by more cost as much as this.
+        cutoff_m: difference of distances above which the cost grows no more [m]; vertices without a measurement cost
+            as much.
+        cutoff_levels: difference of colours above which the cost grows no more, in levels of 256.
+        intensity_weight: cost of a squared unit of the stream between measured and synthesised intensity.
+        cutoff_intensity: difference of intensities above which the cost grows no more, in units of the stream.
         barrier_weight: cost of a light barrier whose reading contradicts the mesh.
     """
 

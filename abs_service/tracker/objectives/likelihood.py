@@ -27,8 +27,9 @@ class Settings:
     Attributes:
         outlier_share: share ε of outliers (mixed pixels, occluders, deviations from the model); it bounds the cost of a
             single measurement. The density is the larger of (1 − ε) times the noise model's and ε times the uniform
-            one, at most log 2 from their sum.
-        range_m: measuring range of a depth sensor; outliers are uniform over it.
+            one, at most log 2 from their sum. A sensor's own `outlier_share` goes before it.
+        range_m: measuring range of a depth sensor [m]; outliers are uniform over it. A sensor's own `range_m` goes
+            before it.
         misplacement_px: texture registration noise: standard deviation of the position of the appearance on the mesh,
             in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges, such
             as those of a checkerboard.

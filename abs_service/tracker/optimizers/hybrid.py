@@ -40,7 +40,7 @@ class Settings:
         generations: maximum number of generations per frame of CMA-ES.
         step: initial standard deviation of its candidates, in deviations of the priors.
         fallback_above: CMA-ES starts when the outlier share after the descent exceeds its running mean by this.
-        fallback_until: CMA-ES continues in the next frames until the excess is below this.
+        fallback_until: CMA-ES continues in the next frames until that excess is below this.
         restarts: maximum number of times that the population doubles in the first frame.
     """
 

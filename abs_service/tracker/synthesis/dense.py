@@ -26,7 +26,7 @@ class Settings:
 
     Attributes:
         step: spacing of the compared pixels in rows and columns [px].
-        detail: subdivisions of every mesh edge at which the appearance is sampled.
+        detail: number of subdivisions of every mesh edge at which the appearance is sampled.
     """
 
     step: Annotated[int, Interval(ge=1, le=16)] = 1

@@ -19,7 +19,8 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        lowest, highest: opposite corners (x, y, z) of the box in the rig's frame before it is turned [m].
+        lowest: corner of least x, y, z of the box in the rig's frame, before it is turned [m].
+        highest: corner of largest x, y, z of the box in the rig's frame, before it is turned [m].
         rotation: rotation vector that turns the box about its centre, in the rig's frame [rad].
         within: mask image as of the region `mask`; pixels outside are ignored.
     """

@@ -19,7 +19,8 @@ class Settings:
     """TOML keys of the region.
 
     Attributes:
-        farthest_m, nearest_m: range of the radial distances of the object [m].
+        farthest_m: largest radial distance of the object [m].
+        nearest_m: smallest radial distance of the object [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.

@@ -19,15 +19,15 @@ Level = Annotated[int, Ge(0), Le(255)]
 
 @dataclass(frozen=True)
 class Settings:
-    """TOML keys of the region; one of pixel, color and motion_s says where the object is.
+    """TOML keys of the region.
 
     Attributes:
-        pixel: column and row of a pixel of the object in the depth image [px].
+        pixel: column and row of a pixel of the object in the depth image [px]. One of `pixel`, `color` and `motion_s`
+            is needed.
         color: red, green, blue of the object; the largest surface of about this colour is it.
-        motion_s: the object is what moved within so many seconds [s].
-        grow: where the object ends at the seed's surface: at steps in distance ("depth"), or at edges of its colours,
-            too ("color").
-        least_motion_m: how much nearer than before a moved surface is [m].
+        motion_s: time within which the object moves [s]; what has moved in it is the object.
+        grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
+        least_motion_m: least change towards the sensor of a surface that has moved [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
         least_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
         within: mask image as of the region `mask`; pixels outside are ignored.

@@ -1,4 +1,4 @@
-"""TOML keys of the priors."""
+"""Priors of stretch and motion: negative log-densities of theta, without hand-tuned weights."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +14,7 @@ class Settings:
         stretch: standard deviation of an edge's relative change of length. Paper: 0.01; rubber: 0.2.
         speed: largest standard deviation of a parameter's rate of change around the predicted one, expressed as the
             speed of the surface that it moves [m/s]; it becomes smaller while the object moves as predicted.
-        least_speed: smallest standard deviation [m/s].
+        least_speed: smallest standard deviation of that rate, while the object moves as predicted [m/s].
         memory_s: time constant of the exponential decay of the predicted velocity [s].
     """
 
