@@ -12,7 +12,7 @@ TOF = "color + tof"
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_another_sensor_does_no_harm() -> None:
-    found = sensors.run(sensors.Settings(1, 50, sensors.QUICK.subsets), Context(0))
+    found = sensors.run(sensors.Settings(6, 50, sensors.QUICK.subsets), Context(0))  # single ones scatter by a third
     assert all(goal.met for goal in found.goals), found.goals
     assert all("of 7 ratios" in goal.name for goal in found.goals)
     errors = found.values["errors_mm"]

@@ -124,7 +124,8 @@ def depth_cost(
         out: costs (population,).
     """
     for k in prange(pixel.shape[0]):
-        out[k] = _cost_of(pixel[k], distance[k], missing[min(k, missing.shape[0] - 1)], texture, inlier, outlier)
+        own = min(np.intp(k), missing.shape[0] - 1)  # a divided loop counts without sign
+        out[k] = _cost_of(pixel[k], distance[k], missing[own], texture, inlier, outlier)
 
 
 @kernel
