@@ -165,3 +165,10 @@ def test_what_could_not_be_measured_meets_no_goal() -> None:
     for goal in (at_most("Error", math.nan, 2.0), at_least("Ratio", math.nan, 2.0)):
         assert not goal.met
         assert "not measured" in goal.verdict().text
+
+
+def test_the_header_of_every_experiment_states_goals_and_seeds():
+    """Written before the run; see the rules in evaluation/README.md."""
+    headers = {name: one.__doc__.lower() for name, one in __main__.available().items()}
+    assert len(headers) > 10
+    assert [name for name, text in headers.items() if "goal" not in text or "seeds" not in text] == []

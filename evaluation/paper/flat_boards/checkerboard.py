@@ -1,4 +1,7 @@
-"""E4 and E5 on a checker board: black and white are mixed everywhere, so the bias of the black nearly cancels."""
+"""E4 and E5 on a checker board: black and white are mixed everywhere, so the bias of the black nearly cancels.
+
+Statistic, goals and seeds: those of `comparison`.
+"""
 
 import numpy as np
 
