@@ -127,7 +127,7 @@ def _undetermined(found: NoiseCalibration) -> list[Verdict]:
 
 
 def _missing(found: NoiseCalibration) -> list[Verdict]:
-    """How often returns are missing, where targets tell."""
+    """Frequency of missing returns, if targets tell."""
     if not found.missing.targets:
         return []
     share, distance, cosine = (

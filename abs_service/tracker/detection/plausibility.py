@@ -26,7 +26,7 @@ SCENE_MARGIN = 0.08
 
 
 class ExtentError(DetectionError):
-    """What was detected, or everything in sight, has an impossible size: the distances have the wrong unit."""
+    """Impossible size of the object, or of everything in sight: the distances have the wrong unit."""
 
 
 def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor: str) -> None:

@@ -39,7 +39,7 @@ class Measurement:
         return ChannelTerm(sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.misplacement)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """What the colour sensors saw, which measure all three channels of a vertex; else what the sensor saw itself.
+        """Values from the colour sensors, which measure all three channels of a vertex; else the sensor's own.
 
         The colours are given the defocus and the crosstalk of this sensor.
         """

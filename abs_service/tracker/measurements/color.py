@@ -34,7 +34,7 @@ class Measurement:
         return ColorTerm(sensor.name, synthesizer, looks, self.noise, bounds, comparison.misplacement)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """What the sensor saw itself, because no two cameras agree on a colour; else what others saw."""
+        """The sensor's own values, because no two cameras agree on a colour; else what others saw."""
         return known(seen, first.colors)
 
     def colors(self, seen: Values) -> Values:

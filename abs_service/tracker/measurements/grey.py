@@ -37,7 +37,7 @@ class Measurement:
         return ChannelTerm(sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.misplacement)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """What the sensor saw itself; else the luma of what others saw."""
+        """The sensor's own values; else the luma of what others saw."""
         return known(seen, first.colors @ LUMA[:, None])
 
     def colors(self, seen: Values) -> Values:

@@ -46,7 +46,7 @@ class Measurement:
         return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.misplacement)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """What the sensor saw, per unit of its own light if it has one."""
+        """The sensor's own values, per unit of its own light if it has one."""
         return seen / _brightness(sensor.camera, first.mesh) if self.noise.illumination == "active" else seen
 
 

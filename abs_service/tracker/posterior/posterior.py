@@ -116,18 +116,24 @@ class FramePosterior:
         return quadratic
 
     def linearized_near(self, theta: NDArray[np.float64]) -> Linearized:
-        """The last linearisation with its residuals moved to theta (dim,) if that is near, else a new one."""
+        """A linearisation near theta (dim,) with its residuals moved there."""
+        near = self._nearest(theta)
+        step = theta - near.theta
+        return replace(near, sensed=[[part.moved(step) for part in source] for source in near.sensed])
+
+    def covariance(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Inverse curvature Σ (dim, dim) of the cost at the estimate theta (dim,), Laplace's approximation."""
+        return posterior_covariance(self._nearest(theta).quadratic)
+
+    def _nearest(self, theta: NDArray[np.float64]) -> Linearized:
+        """The last linearisation if it is near theta (dim,), else a new one."""
         last = self.linearized
         if last is not None:
             step = theta - last.theta
             if 0.5 * step @ last.quadratic.curvature @ step < REUSED_WITHIN * self.dimension:
-                return replace(last, sensed=[[part.moved(step) for part in source] for source in last.sensed])
+                return last
         self.linearize(theta)
-        return self.linearized_near(theta)
-
-    def covariance(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Inverse curvature Σ (dim, dim) of the cost at the estimate theta (dim,), Laplace's approximation."""
-        return posterior_covariance(self.linearized_near(theta).quadratic)
+        return self._nearest(theta)
 
     def prior(self, theta: NDArray[np.float64]) -> Quadratic:
         """Gauss–Newton approximation of the priors alone near theta (dim,)."""

@@ -31,7 +31,7 @@ PRINT_PX = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seeded:
-    """What a seed says of an image.
+    """Result of a seed in one image.
 
     Attributes:
         core: pixels (height, width) that are the object's.
@@ -94,7 +94,7 @@ class ColorSeed:
 
 
 class MotionSeed:
-    """What moved in front of what was there before; asked with images in order of time, it compares the last of them.
+    """The surface that moved in front of what was there before; compares the last of images in order of time.
 
     Args:
         seconds: for how long images are compared [s].
