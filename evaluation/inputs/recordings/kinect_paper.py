@@ -26,6 +26,11 @@ FOLDER = "sl_kinect_paper"
 CAMERA = a.Camera(640, 480, fx=528.0144, fy=528.0144, cx=320.0, cy=240.0)
 RATE_HZ = 30.0
 
+#: The measured points and the depth image of a number show what the colour image with this much larger a number shows:
+#: optical flow between colour images takes the points of every frame with a truth to those of the next one within 0.2
+#: to 0.5 px then, and within 0.4 to 6 px without (`beside_flow`).
+COLORS_LATER = 1
+
 #: z of a wall behind the sheet [m], where the data has no background.
 WALL_M = 0.85
 
@@ -121,24 +126,30 @@ class UnboundError(RuntimeError):
 
 
 def truth(folder: Path, frames: int) -> Truth:
-    """The measured points of the first frames that have some."""
+    """The measured points of the first frames that have some, and a colour image."""
     with np.load(folder / "truth.npz") as stored:
-        numbers, points = stored["frames"][:frames], stored["points_mm"][:frames] * 1e-3
-        return Truth(tuple(int(number) for number in numbers), points, float(stored["sigma_mm"]) * 1e-3)
+        numbers = [int(number) for number in stored["frames"][:frames] if _color_path(folder, int(number)).exists()]
+        points = stored["points_mm"][: len(numbers)] * 1e-3
+        return Truth(tuple(numbers), points, float(stored["sigma_mm"]) * 1e-3)
 
 
-def beside_flow(folder: Path, known: Truth) -> NDArray[np.float64]:
+def beside_flow(folder: Path, known: Truth, later: int = COLORS_LATER) -> NDArray[np.float64]:
     """Median distance (frames − 1,) [px] of measured points from where the images show them to have gone.
 
     That is, from where optical flow takes them since the frame with a truth before; without the tracker.
+
+    Args:
+        folder: of the recording.
+        known: the measured points.
+        later: difference of the numbers of a colour image and of the points that it is taken to show.
     """
     result = []
-    for k, (first, last) in enumerate(pairwise(known.numbers)):
-        shown = [cv2.cvtColor(color(folder, number), cv2.COLOR_RGB2GRAY) for number in range(first, last + 1)]
+    for before, after, (first, last) in zip(known.points[:-1], known.points[1:], pairwise(known.numbers), strict=True):
+        shown = [cv2.cvtColor(color(folder, k, later), cv2.COLOR_RGB2GRAY) for k in range(first, last + 1)]
         grey = [np.asarray(image, np.uint8) for image in shown]
         everywhere = [np.ones(image.shape, bool) for image in grey]
-        there = features.tracks(grey, everywhere, CAMERA.project(known.points[k]))[-1]
-        miss = np.linalg.norm(CAMERA.project(known.points[k + 1]) - there, axis=1)
+        there = features.tracks(grey, everywhere, CAMERA.project(before))[-1]
+        miss = np.linalg.norm(CAMERA.project(after) - there, axis=1)
         result.append(np.nanmedian(miss) if np.isfinite(miss).any() else np.nan)
     return np.array(result)
 
@@ -154,9 +165,9 @@ def images(folder: Path, cell: Cell, last: int) -> Iterator[tuple[int, Points, N
             yield number, depth_m, color(folder, number) if cell.color else None
 
 
-def color(folder: Path, number: int) -> NDArray[np.uint8]:
-    """Red, green, blue (height, width, 3) of a frame."""
-    return np.asarray(_image(folder / f"color_{number:06d}.jpg", cv2.IMREAD_COLOR_RGB), np.uint8)
+def color(folder: Path, number: int, later: int = COLORS_LATER) -> NDArray[np.uint8]:
+    """Red, green, blue (height, width, 3) of what the points and the depth image of this number show."""
+    return np.asarray(_image(_color_path(folder, number, later), cv2.IMREAD_COLOR_RGB), np.uint8)
 
 
 def follow(folder: Path, cell: Cell, known: Truth, clock: Callable[[], int] = time.process_time_ns) -> PaperRun:
@@ -214,6 +225,10 @@ def share_inside(error: Points, covariance: Points) -> float:
     """Share of the errors (n, 3) that are in the 95 % region of their covariances (n, 3, 3); NaN is outside."""
     known = np.isfinite(covariance).all(axis=(1, 2))
     return float(inside_region(error[known], covariance[known]).sum() / len(error))
+
+
+def _color_path(folder: Path, number: int, later: int = COLORS_LATER) -> Path:
+    return folder / f"color_{number + later:06d}.jpg"
 
 
 def _image(path: Path, flags: int) -> NDArray[Any]:
