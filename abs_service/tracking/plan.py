@@ -18,6 +18,7 @@ from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.optimizers.base import Optimizer
 from abs_service.tracker.posterior.posterior import Posterior
 from abs_service.tracker.posterior.priors import settings as priors
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.shape_prior import ShapePrior
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
@@ -125,7 +126,7 @@ def make_posterior(
         plan.objective.build(rig, mesh, synthesizer),
         StretchPrior(mesh, plan.priors.stretch),
         ShapePrior(model.rest, model.prior),
-        MotionPrior(model.rest, model.scales, plan.priors),
+        MotionPrior(model.rest, ChangeMetric(model.scales, model.roughness), plan.priors),
     )
     return posterior, mesh
 

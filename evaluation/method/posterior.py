@@ -24,6 +24,7 @@ from abs_service.tracker.estimate import Estimate
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
 from abs_service.tracker.terms.linearization import stack
 from calib.noise.color import GaussianColor
@@ -139,7 +140,7 @@ def _prior(
     surface = model.deform(estimate.theta[None])
     parts = StretchPrior(model.mesh, settings.stretch).linearize(surface, SparseJacobian.from_dense(jacobian))
     stretch = stack(parts, jacobian.shape[2]).jacobian
-    motion = np.diag(1 / (model.scales * settings.speed * interval_s))
+    motion = ChangeMetric(model.scales, model.roughness).root / (settings.speed * interval_s)
     rows = np.concatenate([stretch, model.prior, motion])
     return rows.T @ rows
 

@@ -66,6 +66,8 @@ class DeformationModel(Protocol):
         mesh: the mesh it deforms, vertices in the order of `deform`'s output.
         rest: parameters Θ⁰ (dim,) that leave the mesh undeformed.
         scales: change (dim,) of each parameter that moves the surface by about one metre.
+        roughness: its product (k,) with a change of theta tells how unsmooth the change is, in the unit of a
+            displacement [m]; k is 0 if every change is smooth.
         prior: square root (k, dim) of the precision matrix of a Gaussian prior: its product with Θ − Θ⁰ is standard
             normal; k is 0 without a prior.
     """
@@ -73,6 +75,7 @@ class DeformationModel(Protocol):
     mesh: Mesh
     rest: NDArray[np.float64]
     scales: NDArray[np.float64]
+    roughness: NDArray[np.float64]
     prior: NDArray[np.float64]
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:

@@ -118,6 +118,7 @@ class FlexPad:
         mesh: a grid on the flat sheet.
         rest: zeros (15,).
         scales: (15,).
+        roughness: none (0, 15).
         prior: (9, 15), Gaussian with zero mean for bends and height map.
     """
 
@@ -135,6 +136,7 @@ class FlexPad:
         self._deform = composed(_deform, roll=roll)
         self.rest = np.zeros(DIMENSION)
         self.scales = _scales(points, least_radius, self._half)
+        self.roughness = np.zeros((0, DIMENSION))
         self.prior = np.eye(9, DIMENSION) / np.array([bend_deviation] * 8 + [HEIGHT_DEVIATION])[:, None]
         self.mesh = mesh
 

@@ -76,7 +76,7 @@ class Gravity:
         mesh: a grid on the strip in its detected shape, rows along it.
         rest: the detected angles, no motion.
         scales: (dim,).
-        prior: none (0, dim).
+        roughness, prior: none (0, dim).
         strip: the detected strip.
         segments: number of segments.
     """
@@ -93,7 +93,7 @@ class Gravity:
         pose_scales = [np.full(3, 1 / strip.length), np.ones(3)] if is_free else []
         self.rest = np.concatenate([strip.bends(segments), np.zeros(6 if is_free else 0)])
         self.scales = np.concatenate([1 / arms, *pose_scales])
-        self.prior = np.zeros((0, len(self.rest)))
+        self.roughness = self.prior = np.zeros((0, len(self.rest)))
         self.mesh = replace(flat, vertices=self.deform(self.rest[None]).vertices[0].T.astype(np.float64))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:

@@ -114,6 +114,14 @@ def _sides(mesh: Mesh) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return size / step * length, size / step
 
 
+def second_differences(rows: int, columns: int) -> NDArray[np.float64]:
+    """Second differences (k, rows · columns) of a grid of values; the sum of their squares is its thin-plate energy."""
+    along, across = np.eye(rows), np.eye(columns)
+    by_row, by_column = np.kron(np.diff(along, 2, axis=0), across), np.kron(along, np.diff(across, 2, axis=0))
+    mixed = np.sqrt(2) * np.kron(np.diff(along, axis=0), np.diff(across, axis=0))
+    return np.concatenate([by_row, by_column, mixed], dtype=np.float64)
+
+
 class Nurbs:
     """A mesh bound to a NURBS surface; Θ lists x, y, z of the control points row by row [m].
 
@@ -121,6 +129,7 @@ class Nurbs:
         mesh: the mesh, its vertices sorted by knot span; a vertex at the surface's edge is moved onto its normal there.
         rest: control points Θ⁰ (dim,) of the rest surface [m].
         scales: ones (dim,), because every parameter is a length.
+        roughness: second differences (k, dim) of the control points' displacements along u and w, and mixed ones.
         prior: none (0, dim).
     """
 
@@ -140,6 +149,7 @@ class Nurbs:
         ordered = mesh.reordered(order)
         self.rest = control.reshape(-1)
         self.scales = np.ones_like(self.rest)
+        self.roughness = np.asarray(np.kron(second_differences(*shape), np.eye(3)), np.float64)
         self.prior = np.zeros((0, self.rest.size))
         self._span_start = np.searchsorted(span[order], np.arange(len(self._span_control) + 1)).astype(np.int32)
         self._span = span[order]

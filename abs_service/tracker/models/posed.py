@@ -64,6 +64,7 @@ class Posed:
         mesh: the shape's mesh.
         rest: no motion, the shape at rest.
         scales: the rotation [rad] that moves the farthest vertex by one metre, one metre, the shape's own.
+        roughness: the shape's own.
         prior: the shape's own, then one row per rigid motion that the shape contains.
     """
 
@@ -74,6 +75,7 @@ class Posed:
         radius = max(np.linalg.norm(shape.mesh.vertices - self._centroid, axis=1).max(), 1e-3)
         self.rest = np.concatenate([np.zeros(6), shape.rest])
         self.scales = np.concatenate([np.full(3, 1 / radius), np.ones(3), shape.scales])
+        self.roughness = np.pad(shape.roughness, ((0, 0), (6, 0)))
         self.prior = np.pad(np.concatenate([shape.prior, _gauge(shape)]), ((0, 0), (6, 0)))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:

@@ -42,7 +42,7 @@ class Rigid:
         mesh: the mesh.
         rest: zeros (6,).
         scales: (6,): the rotation [rad] that moves the farthest vertex by one metre, and one metre.
-        prior: none (0, 6).
+        roughness, prior: none (0, 6).
     """
 
     def __init__(self, mesh: Mesh):
@@ -54,7 +54,7 @@ class Rigid:
         self._normals_32 = np.ascontiguousarray(mesh.normals.T, np.float32)
         radius = np.linalg.norm(self._arms, axis=1).max()
         self.scales = np.repeat([1 / max(radius, 1e-3), 1.0], 3)
-        self.prior = np.zeros((0, 6))
+        self.roughness = self.prior = np.zeros((0, 6))
 
     def deform(self, thetas: NDArray[np.float64]) -> Surface:
         """Moves the mesh with every row of `thetas` (population, 6)."""

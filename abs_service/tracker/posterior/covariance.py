@@ -125,12 +125,11 @@ def unheld_deviation(
 
     Args:
         curvature: (dim, dim), of likelihood and priors.
-        precision: diagonal (dim,) of the motion prior, which is removed.
-        least_precision: diagonal (dim,) of the widest motion prior, of which hardly anything is kept.
+        precision: of the motion prior (dim, dim), which is removed.
+        least_precision: of the widest motion prior (dim, dim), of which hardly anything is kept.
         sparse_jacobian: derivative of the vertices.
     """
-    alone = curvature.copy()
-    alone.flat[:: len(alone) + 1] += KEPT_PRIOR * least_precision - precision
+    alone = curvature - precision + KEPT_PRIOR * least_precision
     some = np.linspace(0, len(sparse_jacobian.local) - 1, PROBES).astype(np.intp)
     rows = np.zeros((PROBES, 3, len(alone)))
     np.put_along_axis(

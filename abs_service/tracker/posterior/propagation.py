@@ -9,7 +9,7 @@ with what the object has done since the frame before, q, and the score s of the 
 whose covariance is B (`covariance`). Where the sensors outweigh W, G is zero and nothing of the past is left. Where
 nothing is measured, G is one, and the errors add up:
 
-- q, the motion that was not predicted, has the deviation of the innovations (`motion_prior`). Where nothing has been
+- q, the motion that was not predicted, has the size of the innovations (`motion_prior`). Where nothing has been
   measured in the last frames, G⁸ ≈ 1, the velocity is not known either, and the whole motion counts.
 - A share `LASTING` of the variance of s is the same in every frame: the noise of the first frame in mesh and
   appearance. Its error is R_t s with R_t = G R_{t−1} + Σ. So is that of whole sides of the outline. The rest is this
@@ -38,9 +38,9 @@ class ErrorPropagation:
         self._response = np.zeros_like(self._moved)  # R
         self._began = False
 
-    def restart(self, deviation: NDArray[np.float64]) -> None:
-        """Restarts with independent errors of a standard deviation (dim,), after a relocation."""
-        self._moved, self._response, self._began = np.diag(deviation**2), np.zeros_like(self._moved), False
+    def restart(self, covariance: NDArray[np.float64]) -> None:
+        """Restarts with errors of a covariance (dim, dim), after a relocation."""
+        self._moved, self._response, self._began = covariance, np.zeros_like(covariance), False
 
     def update(
         self,
@@ -54,24 +54,22 @@ class ErrorPropagation:
         """Covariance (dim, dim) of the estimate of a frame.
 
         Args:
-            unpredicted: standard deviation (dim,) of the motion where measurements show the object's velocity.
+            unpredicted: covariance (dim, dim) of the motion where measurements show the object's velocity.
             moved: that of the motion where nothing shows it.
             inverse: Σ (dim, dim).
             scores: covariance (dim, dim) of the gradient, W included.
             shared: the same of errors that are equal in all frames.
-            precision: diagonal (dim,) of W.
+            precision: W (dim, dim).
         """
-        gain = inverse * precision
+        gain = inverse @ precision
         if self._began:
-            self._moved.flat[:: len(unpredicted) + 1] += unpredicted**2
             unheld = gain @ gain
             unheld = unheld @ unheld
-            unheld = unheld @ unheld * moved
-            self._moved += unheld @ unheld.T
+            unheld = unheld @ unheld
+            self._moved = self._moved + unpredicted + unheld @ moved @ unheld.T
         self._began = True
         self._moved = gain @ self._moved @ gain.T
-        own = scores.copy()
-        own.flat[:: len(own) + 1] -= precision
+        own = scores - precision
         self._moved += (1 - LASTING) * inverse @ own @ inverse
         self._response = gain @ self._response + inverse
         return self._response @ (LASTING * own + shared) @ self._response.T + self._moved

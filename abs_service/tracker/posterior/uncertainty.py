@@ -56,7 +56,7 @@ class Uncertainty:
 
     def relocate(self) -> None:
         """Forgets the past, after the mesh was laid over a detected object."""
-        self._errors.restart(self._motion.deviation)
+        self._errors.restart(self._motion.longest_covariance)
         self._begun = False
 
     def estimate(

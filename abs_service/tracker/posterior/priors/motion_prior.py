@@ -1,19 +1,20 @@
 """Motion prior: Θ is normal around its extrapolation from the past, as wide as the object's motion is unpredictable.
 
 Its deviation v, a rate of change, adapts to the innovations: the differences between estimate and prediction, per
-second and in the unit of the parameters' scales. In a frame with the covariance Σ of Θ and the prior's precision W, the
-likelihood determines γ = Σᵢ (1 − WᵢᵢΣᵢᵢ) parameters (MacKay, Neural Computation 4, 1992, eq. 4.9), and the evidence for
-v² is the sum of the squared innovations divided by γ. Successive innovations are alike when the object accelerates and
-the prior holds it back; noise makes them differ. So their product widens the prior far more.
+second, as lengths by `ChangeMetric`, whose matrix is B. In a frame of duration t with the covariance Σ of Θ and the
+prior's precision W = B / (v t)², the likelihood determines γ = dim − tr(WΣ) parameters (MacKay, Neural Computation 4,
+1992, eq. 4.9), and the evidence for v² is the squared length of the innovation divided by γ. Successive innovations are
+alike when the object accelerates and the prior holds it back; noise makes them differ. So their product widens the
+prior far more.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.innovations import Innovations
 from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.terms.linearization import Linearization
-from calib.jit import kernel
 
 #: Radius of the search around the prediction, in standard deviations of the widest motion prior.
 FARTHEST = 4.0
@@ -29,17 +30,22 @@ MARGIN, LAG_MARGIN = 2.0, 10.0
 class MotionPrior:
     """Motion prior: Θ_t is normal around its extrapolation from the past frames.
 
+    Args:
+        rest: parameters (dim,) that leave the mesh undeformed.
+        metric: length of a change of theta.
+        settings: bounds of its width.
+
     Attributes:
         predicted: predicted parameters (dim,) of the current frame.
         reach_m: radius around the predicted surface within which the surface is searched [m].
-        speed: standard deviation of the parameters' rates of change around the predicted ones [m/s].
+        speed: standard deviation v of the rate of change around the predicted one, per direction of Θ [m/s].
     """
 
-    def __init__(self, rest: NDArray[np.float64], scales: NDArray[np.float64], settings: Settings):
+    def __init__(self, rest: NDArray[np.float64], metric: ChangeMetric, settings: Settings):
         self.predicted = rest
         self.reach_m = np.inf
         self.speed = self._next_speed = settings.speed
-        self._settings, self._scales = settings, scales
+        self._settings, self._metric = settings, metric
         self._theta = rest
         self._velocity = np.zeros_like(rest)
         self._t_ns: int | None = None
@@ -48,33 +54,33 @@ class MotionPrior:
         self._innovations = Innovations(len(rest))
 
     @property
-    def deviation(self) -> NDArray[np.float64]:
-        """Standard deviation (dim,) of the parameters around the predicted ones after the longest interval."""
-        return self._scales * self._settings.speed * LONGEST_INTERVAL_S
+    def longest_covariance(self) -> NDArray[np.float64]:
+        """Covariance (dim, dim) of the parameters around the predicted ones after the longest interval."""
+        return (self._settings.speed * LONGEST_INTERVAL_S) ** 2 * self._metric.inverse
 
     @property
     def precision(self) -> NDArray[np.float64]:
-        """Inverse variance (dim,) of the parameters around the predicted ones."""
-        return self._inverse_deviation**2
+        """Inverse covariance W (dim, dim) of the parameters around the predicted ones."""
+        return self._metric.matrix / self._deviation_m**2
 
     @property
     def least_precision(self) -> NDArray[np.float64]:
-        """Inverse variance (dim,) of the widest prior, that of an object whose motion is unknown."""
-        return 1 / (self._scales * self._settings.speed * self._elapsed_s) ** 2
+        """Inverse covariance (dim, dim) of the widest prior, that of an object whose motion is unknown."""
+        return self._metric.matrix / (self._settings.speed * self._elapsed_s) ** 2
 
     @property
     def unpredicted(self) -> NDArray[np.float64]:
-        """Standard deviation (dim,) of the motion between two frames that was not predicted, lately."""
-        return self._scales * self._elapsed_s * np.sqrt(self._innovations.variance)
+        """Covariance (dim, dim) of the motion between two frames that was not predicted, lately."""
+        return self._elapsed_s**2 * self._innovations.variance * self._metric.inverse
 
     @property
     def unseen(self) -> NDArray[np.float64]:
-        """Standard deviation (dim,) of a motion between two frames that nothing shows: wider than those seen lately."""
-        return MARGIN * self._scales * self._elapsed_s * np.sqrt(self._innovations.squared_speed)
+        """Covariance (dim, dim) of a motion between two frames that nothing shows: wider than those seen lately."""
+        return (MARGIN * self._elapsed_s) ** 2 * self._innovations.squared_speed * self._metric.inverse
 
     @property
-    def _inverse_deviation(self) -> NDArray[np.float64]:
-        return 1 / (self._scales * self.speed * self._elapsed_s)
+    def _deviation_m(self) -> float:
+        return self.speed * self._elapsed_s
 
     def predict(self, t_ns: int) -> None:
         """Predicts theta at time `t_ns` [ns]; the velocity decays with the age of the last estimate."""
@@ -110,44 +116,24 @@ class MotionPrior:
         """
         self._velocity, self._theta = (theta - self._theta) / self._elapsed_s, theta
         if self._began:  # before, the difference is that from the detected shape
-            determined = float(np.sum(1 - self.precision * np.diag(covariance)))
+            determined = len(theta) - float(np.vdot(self.precision, covariance))
             speed = self._innovations.update(
-                self._innovation(theta), self._velocity / self._scales, determined, self._elapsed_s
+                self._innovation(theta), self._metric.root @ self._velocity, determined, self._elapsed_s
             )
             self._next_speed = self._limited(max(MARGIN * speed, LAG_MARGIN * np.sqrt(self._innovations.lasting)))
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:
         """Negative log-density (population,) of parameters (population, dim), up to a constant."""
-        out = np.empty(len(thetas))
-        _half_squares_of_each(thetas, self.predicted, self._inverse_deviation, out)
-        return out
+        return self._metric.squares(thetas, self.predicted) / (2 * self._deviation_m**2)
 
     def linearize(self, theta: NDArray[np.float64]) -> Linearization:
         """The normalised residuals of parameters (dim,), and their derivatives."""
-        return Linearization((theta - self.predicted) * self._inverse_deviation, np.diag(self._inverse_deviation))
+        rows = self._metric.root / self._deviation_m
+        return Linearization(rows @ (theta - self.predicted), rows)
 
     def _innovation(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Innovation (dim,) as a rate of change of the surface [m/s]."""
-        return (theta - self.predicted) / (self._scales * self._elapsed_s)
+        return self._metric.root @ (theta - self.predicted) / self._elapsed_s
 
     def _limited(self, speed: float) -> float:
         return float(np.clip(speed, self._settings.least_speed, self._settings.speed))
-
-
-@kernel
-def _half_squares_of_each(
-    thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """`_half_square_of_each` for every candidate of a population."""
-    for k in range(thetas.shape[0]):
-        out[k] = _half_square_of_each(thetas[k], center, scales)
-
-
-@kernel
-def _half_square_of_each(theta: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64]) -> float:
-    """Half the squared length of scales (dim,) times Θ − center."""
-    total = 0.0
-    for d in range(center.size):
-        length = scales[d] * (theta[d] - center[d])
-        total += length * length
-    return 0.5 * total

@@ -21,6 +21,7 @@ from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma_es
 from abs_service.tracker.posterior.curvature import gauss_newton, search_metric
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
@@ -69,6 +70,8 @@ def test_at_rest_it_is_the_shape_at_rest():
     assert MODEL.mesh is SHAPE.mesh
     np.testing.assert_array_equal(MODEL.rest[6:], SHAPE.rest)
     np.testing.assert_array_equal(MODEL.scales[6:], SHAPE.scales)
+    np.testing.assert_array_equal(MODEL.roughness[:, 6:], SHAPE.roughness)
+    assert not MODEL.roughness[:, :6].any()
 
 
 @dataclass
@@ -78,6 +81,7 @@ class Waves:
     mesh: Mesh = field(default_factory=lambda: MESH)
     rest: np.ndarray = field(default_factory=lambda: np.zeros(2))
     scales: np.ndarray = field(default_factory=lambda: np.ones(2))
+    roughness: np.ndarray = field(default_factory=lambda: np.array([[0.0, 2.0]]))
     prior: np.ndarray = field(default_factory=lambda: np.array([[3.0, 4.0]]))
 
     def deform(self, thetas: np.ndarray) -> Surface:
@@ -136,7 +140,7 @@ def test_what_only_deforms_the_shape_costs_nothing():
 
 
 def test_the_curvature_is_regular_although_pose_and_shape_can_do_the_same():
-    motion = MotionPrior(MODEL.rest, MODEL.scales, PriorSettings())
+    motion = MotionPrior(MODEL.rest, ChangeMetric(MODEL.scales, MODEL.roughness), PriorSettings())
     motion.predict(0)
     jacobian = MODEL.jacobian(MODEL.rest)
     measured = jacobian[:, 2] / 5e-3  # every vertex's z, to 5 mm

@@ -9,14 +9,14 @@ from abs_service.tracker.posterior.propagation import LASTING, ErrorPropagation
 
 DIM, FRAMES = 3, 40
 NONE = np.zeros((DIM, DIM))
-PRECISION = np.array([4.0, 1.0, 1.0])
+PRECISION = np.array([[4.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 1.0]])
 
 
 def setting() -> tuple[np.ndarray, np.ndarray]:
     """Curvature of the measurements, which see nothing of the last parameter, and Σ."""
     rows = np.random.default_rng(0).standard_normal((12, DIM)) * (3.0, 1.0, 0.0)
     measured = rows.T @ rows
-    return measured, np.asarray(np.linalg.inv(measured + np.diag(PRECISION)))
+    return measured, np.asarray(np.linalg.inv(measured + PRECISION))
 
 
 def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of_the_first_frame():
@@ -28,22 +28,20 @@ def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of
         for frame in range(FRAMES):
             moved = step * generator.standard_normal(DIM) if frame else np.zeros(DIM)
             score = lasting + np.sqrt(1 - LASTING) * half @ generator.standard_normal(DIM)
-            error = inverse @ (PRECISION * (error + moved) + score)
+            error = inverse @ (PRECISION @ (error + moved) + score)
         errors.append(error)
     propagation, found = ErrorPropagation(DIM), np.eye(DIM)
     for _ in range(FRAMES):
-        found = propagation.update(
-            np.full(DIM, step), np.zeros(DIM), inverse, measured + np.diag(PRECISION), NONE, PRECISION
-        )
+        found = propagation.update(step**2 * np.eye(DIM), NONE, inverse, measured + PRECISION, NONE, PRECISION)
     scale = np.sqrt(np.outer(np.diag(found), np.diag(found)))
     np.testing.assert_allclose(np.cov(np.transpose(errors)) / scale, found / scale, atol=0.08)
 
 
 def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not():
     measured, inverse = setting()
-    propagation, moved = ErrorPropagation(DIM), np.array([0.1, 0.1, 0.2])
-    scores = measured + np.diag(PRECISION)
-    found = [np.diag(propagation.update(np.zeros(DIM), moved, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
+    propagation, moved = ErrorPropagation(DIM), np.diag([0.1, 0.1, 0.2]) ** 2
+    scores = measured + PRECISION
+    found = [np.diag(propagation.update(NONE, moved, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
     assert found[0][2] == pytest.approx(0, abs=1e-12)  # the first frame defines where the points are
     np.testing.assert_allclose(np.diff([variance[2] for variance in found]), 0.2**2, rtol=1e-6)
     assert found[-1][0] < 1.5 * found[5][0]
@@ -52,9 +50,9 @@ def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not
 def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     _, inverse = setting()
     propagation = ErrorPropagation(DIM)
-    propagation.update(np.zeros(DIM), np.zeros(DIM), inverse, np.diag(PRECISION), NONE, PRECISION)
-    propagation.restart(np.full(DIM, 5.0))
-    found = propagation.update(np.zeros(DIM), np.zeros(DIM), inverse, np.diag(PRECISION), NONE, PRECISION)
+    propagation.update(NONE, NONE, inverse, PRECISION, NONE, PRECISION)
+    propagation.restart(25 * np.eye(DIM))
+    found = propagation.update(NONE, NONE, inverse, PRECISION, NONE, PRECISION)
     assert found[2, 2] == pytest.approx(25)
 
 
@@ -63,8 +61,8 @@ def test_a_direction_that_no_measurement_holds_is_found_in_a_single_frame():
     local = np.zeros((30, 3, 2))
     local[:, 0, 0] = local[:, 1, 1] = 1.0
     jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
-    prior, measured = np.full(2, 1e4), np.diag([0.0, 1e6])
-    found = unheld_deviation(measured + np.diag(prior), prior, prior, jacobian)
+    prior, measured = 1e4 * np.eye(2), np.diag([0.0, 1e6])
+    found = unheld_deviation(measured + prior, prior, prior, jacobian)
     assert found == pytest.approx(np.sqrt(1 / (KEPT_PRIOR * 1e4) + 1 / (1e6 + KEPT_PRIOR * 1e4)), rel=1e-6)
-    held = unheld_deviation(np.diag([1e6, 1e6]) + np.diag(prior), prior, prior, jacobian)
+    held = unheld_deviation(1e6 * np.eye(2) + prior, prior, prior, jacobian)
     assert held == pytest.approx(np.sqrt(2e-6), rel=1e-3)

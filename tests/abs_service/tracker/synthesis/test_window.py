@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.pairing.images import BAYER_ORDERS, ChannelImage, ColorImage
 from abs_service.tracker.models.base import Surface
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
@@ -190,7 +191,7 @@ def test_values_of_a_window_are_placed_in_the_image():
 
 
 def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():
-    prior = MotionPrior(np.zeros(3), np.ones(3), Settings(speed=0.3))
+    prior = MotionPrior(np.zeros(3), ChangeMetric(np.ones(3), np.zeros((0, 3))), Settings(speed=0.3))
     prior.predict(0)
     assert np.isinf(prior.reach_m)  # no motion is known in the first frame
     prior.update(np.zeros(3), np.zeros((3, 3)))

@@ -11,6 +11,7 @@ from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.nurbs import Settings
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import euclidean, likelihood
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings as PriorSettings
 from abs_service.tracker.posterior.priors.stretch_prior import StretchPrior
@@ -232,7 +233,9 @@ def test_stretch_rows_are_derivatives_of_the_stretch_cost():
 
 
 def test_motion_rows_are_derivatives_of_the_motion_cost():
-    prior = MotionPrior(np.array([1.0, 2.0]), np.array([1.0, 3.0]), PriorSettings(speed=0.3))
+    prior = MotionPrior(
+        np.array([1.0, 2.0]), ChangeMetric(np.array([1.0, 3.0]), np.array([[1.0, -2.0]])), PriorSettings(speed=0.3)
+    )
     prior.predict(0)
     assert not prior.linearize(prior.predicted).residual.any()
     theta, step = prior.predicted + np.array([0.02, 0.01]), np.array([0.01, -0.02])

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from abs_service.tracker.models.base import SparseJacobian
+from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
 from abs_service.tracker.posterior.priors.motion_prior import (
     FIRST_INTERVAL_S,
     LAG_MARGIN,
@@ -24,9 +25,14 @@ from tests.abs_service.tracker.scenes import as_surface, flat, sheet
 MS = 1_000_000
 KNOWN = np.zeros((2, 2))
 
+#: Roughness of a model of two parameters whose changes are all smooth.
+SMOOTH = np.zeros((0, 2))
+
 
 def prior(speed: float = 0.3, memory_s: float = 1e9) -> MotionPrior:
-    return MotionPrior(np.zeros(2), np.array([1.0, 2.0]), Settings(speed=speed, memory_s=memory_s))
+    return MotionPrior(
+        np.zeros(2), ChangeMetric(np.array([1.0, 2.0]), SMOOTH), Settings(speed=speed, memory_s=memory_s)
+    )
 
 
 def test_before_any_motion_it_expects_none():
@@ -203,7 +209,7 @@ def test_without_measurements_the_motion_is_that_of_before():
 
 
 def test_equal_bounds_fix_the_prior():
-    motion = MotionPrior(np.zeros(2), np.ones(2), Settings(speed=0.1, least_speed=0.1))
+    motion = MotionPrior(np.zeros(2), ChangeMetric(np.ones(2), SMOOTH), Settings(speed=0.1, least_speed=0.1))
     assert set(follow(motion, [1e-6, 1e-3, 0.1])) == {0.1}
 
 
