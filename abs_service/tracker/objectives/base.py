@@ -45,7 +45,7 @@ class Objective(Protocol):
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains."""
+        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains."""
         ...
 
 
@@ -82,6 +82,10 @@ class TermSum:
         return [term.fit(surface) for term in self._active]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains; the largest."""
+        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains; the largest."""
         none = np.zeros(surface.vertices.shape[2])
-        return reduce(np.maximum, (term.misfit(surface) for term in self._active), none)
+        return reduce(_larger, (term.misfit(surface) for term in self._active), none)
+
+
+def _larger(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.abs(one) >= np.abs(other), one, other)

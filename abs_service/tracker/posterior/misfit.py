@@ -1,7 +1,9 @@
 """Misfit of the model: where measurements disagree with the mesh by more than noise, the mesh is off by as much.
 
-A model of few parameters cannot follow every shape. Its covariance does not know: outliers have no part in it. Their
-squared distances, averaged over neighbouring vertices, are added to the covariance of the vertices in all directions.
+A model of few parameters cannot follow every shape. Its covariance does not know: outliers have no part in it. Where it
+misses the shape, neighbouring vertices miss it to the same side; an outlier of the sensor stands alone. So the signed
+distances are averaged over each vertex and its neighbours, and the squares of these means, averaged once more, are
+added to the covariance of the vertices in all directions.
 """
 
 import numpy as np
@@ -11,8 +13,8 @@ from numpy.typing import NDArray
 from abs_service.tracker.mesh import Mesh
 
 
-class NeighborMean:
-    """Mean over the vertices that are at most two edges away.
+class Misfit:
+    """Variance of the vertices that the misfit of the model shows.
 
     Args:
         mesh: the mesh.
@@ -22,10 +24,8 @@ class NeighborMean:
         n, edges = len(mesh.vertices), mesh.edges
         rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
         ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-        self._weights = scipy.sparse.csr_array(ring @ ring)
-        self._weights.data[:] = 1.0
-        self._count = np.asarray(self._weights.sum(axis=1), np.float64)
+        self._mean = scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
 
-    def __call__(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Means (n,) of values (n,)."""
-        return (self._weights @ values) / self._count if values.any() else values
+    def variance(self, excess: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance (n,) [m²] from signed distances (n,) [m] beyond what noise explains."""
+        return self._mean @ (self._mean @ excess) ** 2 if excess.any() else excess

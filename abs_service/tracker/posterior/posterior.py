@@ -161,7 +161,7 @@ class FramePosterior:
         return self._fitted[1]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Squared distance (n,) [m²] of each vertex from its measurements beyond what noise explains."""
+        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains."""
         return self._of.objective.misfit(surface)
 
     def outlier_share(self, theta: NDArray[np.float64]) -> float:

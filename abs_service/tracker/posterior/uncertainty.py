@@ -17,7 +17,7 @@ from abs_service.tracker.posterior.covariance import (
     unheld_deviation,
 )
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
-from abs_service.tracker.posterior.misfit import NeighborMean
+from abs_service.tracker.posterior.misfit import Misfit
 from abs_service.tracker.posterior.posterior import FramePosterior
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.propagation import ErrorPropagation
@@ -51,7 +51,7 @@ class Uncertainty:
         self._mesh_noise = MeshNoise(model)
         self._effects = DesignEffects(model.mesh)
         self._errors = ErrorPropagation(len(model.rest))
-        self._neighbor_mean = NeighborMean(model.mesh)
+        self._misfit = Misfit(model.mesh)
         self._begun = False
 
     def relocate(self) -> None:
@@ -83,7 +83,7 @@ class Uncertainty:
         vertices = (
             propagated(near.sparse_jacobian, covariance)
             + along_normals(surface, self._mesh_noise.variance)
-            + isotropic(self._neighbor_mean(frame.misfit(surface)))
+            + isotropic(self._misfit.variance(frame.misfit(surface)))
         )
         unheld_m = unheld_deviation(curvature, precision, self._motion.least_precision, near.sparse_jacobian)
         return Covariances(covariance, vertices, unheld_m)

@@ -181,5 +181,5 @@ class Term(Protocol):
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Squared distance (n,) [m²] of each vertex from its measurement beyond what noise explains; or one zero ()."""
+        """Signed distance (n,) [m] of each vertex from its measurement beyond what noise explains; or one zero ()."""
         ...

@@ -187,19 +187,21 @@ class DepthTerm:
         )
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Squared distance (n,) [m²] of each vertex from its measurement beyond what noise explains.
+        """Signed distance (n,) [m] of each vertex from its measurement beyond what noise explains.
 
-        Zero where nothing is measured, and everywhere if the samples of the synthesis are not the vertices.
+        In free space it is that from the object. Zero where nothing is measured, and everywhere if the samples of the
+        synthesis are not the vertices.
         """
         seen = self._view.synthesize(surface)
         if seen.pixel.shape[1] != surface.vertices.shape[2]:
             return np.zeros(())
         residual, inverse, cost = self._residuals(seen)
         pixel = np.maximum(seen.pixel[0], 0)
-        excess = np.maximum(residual**2 - INLIER_DEVIATIONS**2, 0.0) / np.maximum(inverse, 1e-9) ** 2
-        free = self._free_m.ravel()[pixel].astype(np.float64) ** 2
+        excess = np.sqrt(np.maximum(residual**2 - INLIER_DEVIATIONS**2, 0.0)) / np.maximum(inverse, 1e-9)
+        signed = np.copysign(np.minimum(excess, LARGEST_MISFIT_M), residual)
+        free = self._free_m.ravel()[pixel].astype(np.float64)
         usable = (seen.pixel[0] > 0) & ~(self._obscured[pixel] | self._doubtful[pixel])
-        return np.where(usable, np.where(cost < np.inf, np.minimum(excess, LARGEST_MISFIT_M**2), free), 0.0)
+        return np.where(usable, np.where(cost < np.inf, signed, free), 0.0)
 
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""

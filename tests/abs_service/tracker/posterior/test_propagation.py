@@ -9,7 +9,7 @@ from abs_service.tracker.posterior.propagation import LASTING, ErrorPropagation
 
 DIM, FRAMES = 3, 40
 NONE = np.zeros((DIM, DIM))
-PRECISION = np.array([[4.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 1.0]])
+PRECISION = np.array([[4.0, 0.5, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def setting() -> tuple[np.ndarray, np.ndarray]:
