@@ -1,11 +1,10 @@
-"""Design effect of correlated residuals, and the misfit of neighbours."""
+"""Design effect of correlated residuals."""
 
 import numpy as np
 import pytest
 
 from abs_service.tracker.posterior.correlation import BEYOND, DesignEffects
 from abs_service.tracker.posterior.covariance import leverages
-from abs_service.tracker.posterior.misfit import NeighborMean
 from abs_service.tracker.terms.linearization import Linearization
 from tests.abs_service.tracker.scenes import flat, sheet
 
@@ -54,13 +53,3 @@ def test_residuals_without_a_position_have_no_effect():
     sensed = [[Linearization(np.ones(4), np.ones((4, 2)))], []]
     found = effects.update(np.eye(2), sensed, leverages(np.eye(2), sensed))
     np.testing.assert_array_equal(found, [1, 1])
-
-
-def test_the_mean_over_neighbours_is_that_of_two_rings():
-    mean = NeighborMean(MESH)
-    np.testing.assert_allclose(mean(np.ones(len(MESH.vertices))), 1)
-    single = np.zeros(len(MESH.vertices))
-    single[10 * 31 + 15] = 1.0
-    spread = mean(single).reshape(21, 31)
-    assert np.count_nonzero(spread) == 19  # two rings of a grid of triangles
-    assert not spread[:, :13].any()

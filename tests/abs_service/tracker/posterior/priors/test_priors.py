@@ -181,7 +181,8 @@ def follow(motion: MotionPrior, steps: list[float], held: float = 1.0, begin: in
     speeds = []
     motion.predict(round(begin * 1e9 / 30))
     for k, step in enumerate([0.0, *steps], start=begin + 1):
-        motion.update(motion.predicted + np.array([step, 0.0]), (1 - held) * np.linalg.inv(motion.precision))
+        known = np.asarray((1 - held) * np.linalg.inv(motion.precision), np.float64)
+        motion.update(motion.predicted + np.array([step, 0.0]), known)
         motion.predict(round(k * 1e9 / 30))
         speeds.append(motion.speed)
     return speeds[1:]
