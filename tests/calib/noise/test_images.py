@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from calib.noise import bayer, binary, color, grey, intensity
 from calib.noise.base import LEVELS, NoiseError
-from calib.noise.bayer import GaussianBayer
-from calib.noise.binary import LightBarrier
-from calib.noise.color import GaussianColor
 from calib.noise.fit import image_noise
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images import bayer, binary, color, grey, intensity
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.binary import LightBarrier
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.grey import GaussianGrey
+from calib.noise.images.intensity import GaussianIntensity
 from drivers.simulated.address import parse
 from tests import reference
 
