@@ -138,16 +138,10 @@ class MotionPrior:
 def _half_squares_of_each(
     thetas: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """`_half_square_of_each` for every candidate of a population."""
+    """Half the squared length of scales (dim,) times Θ − center, for every candidate."""
     for k in range(thetas.shape[0]):
-        out[k] = _half_square_of_each(thetas[k], center, scales)
-
-
-@kernel
-def _half_square_of_each(theta: NDArray[np.float64], center: NDArray[np.float64], scales: NDArray[np.float64]) -> float:
-    """Half the squared length of scales (dim,) times Θ − center."""
-    total = 0.0
-    for d in range(center.size):
-        length = scales[d] * (theta[d] - center[d])
-        total += length * length
-    return 0.5 * total
+        total = 0.0
+        for d in range(center.size):
+            length = scales[d] * (thetas[k, d] - center[d])
+            total += length * length
+        out[k] = 0.5 * total
