@@ -5,6 +5,7 @@ Numbers in parentheses are the paper's equations. The service uses nothing of th
 
 from tests.reference.cameras import bend, distance, distance_at_center, distort, distort_fisheye, project, seen_pixel
 from tests.reference.likelihood import (
+    ChannelNoise,
     channel_cost,
     color_cost,
     depth_cost,
@@ -29,6 +30,7 @@ from tests.reference.models import (
 from tests.reference.warping import warped
 
 __all__ = [
+    "ChannelNoise",
     "base_spline",
     "base_spline_slope",
     "bend",
