@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from calib.camera import Camera
 from calib.no_return import CAUTIOUS, NoReturn
 from calib.noise.base import DepthNoise, ImageNoise
-from calib.noise.binary import LightBarrier
+from calib.noise.images.binary import LightBarrier
 
 Noise = DepthNoise | ImageNoise | LightBarrier
 

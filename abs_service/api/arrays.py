@@ -12,7 +12,7 @@ from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.noise.base import DepthNoise
-from calib.noise.grey import GaussianGrey
+from calib.noise.images.grey import GaussianGrey
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 

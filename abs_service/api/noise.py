@@ -1,12 +1,12 @@
 """Noise models of sensors, by their public names; docs/noise.md has their formulas and how to measure them."""
 
-from calib.noise.bayer import Settings as Bayer
-from calib.noise.binary import Settings as LightBarrier
-from calib.noise.color import Settings as Color
 from calib.noise.constant import Settings as Constant
 from calib.noise.gaussian_polynomial import Settings as GaussianPolynomial
-from calib.noise.grey import Settings as Grey
-from calib.noise.intensity import Settings as Intensity
+from calib.noise.images.bayer import Settings as Bayer
+from calib.noise.images.binary import Settings as LightBarrier
+from calib.noise.images.color import Settings as Color
+from calib.noise.images.grey import Settings as Grey
+from calib.noise.images.intensity import Settings as Intensity
 from calib.noise.measured import Settings as Measured
 from calib.noise.per_pixel import Settings as PerPixel
 from calib.noise.pixel_polynomial import Settings as PixelPolynomial

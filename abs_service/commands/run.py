@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     with (
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,
-        _display(as_json=arguments.json) as display,
+        make_display(as_json=arguments.json) as display,
         _logging_to(display),
     ):
         starts = partial(spawn, display, path, config.to_toml(rig))
@@ -153,7 +153,8 @@ def _pass_on(display: Display, component: str, line: str) -> None:
         display.note(f"{component}: {line}")
 
 
-def _display(as_json: bool) -> Display:
+def make_display(as_json: bool) -> Display:
+    """JSON, the live table in a terminal, or plain lines elsewhere."""
     if as_json:
         return JsonDisplay(sys.stdout, sys.stderr)
     return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)

@@ -1,1 +1,1 @@
-"""Noise models, one per file; a rig file names them with `type`."""
+"""Noise models of distances, one per file, and of images in `images`; a rig file names them with `type`."""

@@ -34,8 +34,8 @@ from abs_service.tracker.synthesis import sparse, undistorted, warped
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import SynthesisSettings
 from calib import jit, pose
-from calib.noise.bayer import GaussianBayer
-from calib.noise.color import GaussianColor
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import flat, sheet

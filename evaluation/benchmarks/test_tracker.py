@@ -17,7 +17,7 @@ from abs_service.tracker.terms.linearization import Linearization
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.session import TrackingSession
 from evaluation.benchmarks import rates
-from tests.abs_service.tracker.differences import central_differences
+from tests.abs_service.tracker.models.differences import central_differences
 from tests.abs_service.tracker.scenes import sheet
 from tests.abs_service.tracking.driving import default_plan, frame_set, rig_of, simulate
 from tests.calib.noise.texels import render_texture

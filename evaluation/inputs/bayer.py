@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from abs_service.report.content import Cell, Column, Section, Table
 from abs_service.tracker.models import nurbs
-from calib.noise.bayer import GaussianBayer
-from calib.noise.color import GaussianColor
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet, Kind

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from abs_service import config, wiring
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.models import nurbs
-from calib.noise.binary import LightBarrier
-from calib.noise.color import GaussianColor
+from calib.noise.images.binary import LightBarrier
+from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Noise, Rig, Sensor
 from drivers.contract.frame import FrameSet

@@ -17,7 +17,7 @@ from abs_service.report.content import Column, Picture, Section, Table, drawing
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracking.plan import OptimizerSettings
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.intensity import GaussianIntensity
 from calib.noise.tof_amplitude import TofAmplitude
 from calib.rig import Rig, Sensor
 from drivers.simulated.scene.texture import smooth_pattern

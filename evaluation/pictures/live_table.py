@@ -26,10 +26,8 @@ class _LastTable(TableDisplay):
     def __init__(self) -> None:
         super().__init__(Console(file=io.StringIO(), force_terminal=True, width=108, height=40))
         self._recorder = Console(file=io.StringIO(), record=True, width=108)
-        self._last: RigView | None = None
 
     def update(self, view: RigView) -> None:
-        self._last = view
         if view.elapsed_s > DURATION_S - 1 and not self._recorder.export_text(clear=False):
             self._recorder.print(draw(view, Text("")))
 
@@ -45,7 +43,7 @@ def main() -> None:
     display = _LastTable()
     options = argparse.ArgumentParser()
     run.add_arguments(options)
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "_display", return_value=display):
+    with tempfile.TemporaryDirectory() as folder, mock.patch.object(run, "make_display", return_value=display):
         run.run(options.parse_args(["--duration", str(DURATION_S), "--out", folder]))
     display.save(picture)
 

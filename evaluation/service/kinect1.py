@@ -17,8 +17,8 @@ from drivers.kinect1 import unpacking
 from drivers.kinect1.reference_plane import ReferencePlane
 from drivers.kinect1.transport.packets import DEPTH
 from evaluation.experiment import Context, Findings, UnavailableError, at_least
+from evaluation.service.kinect1_receiver import Outcome
 from tests.drivers.kinect1.emulation import testbed
-from tests.drivers.kinect1.endurance import Outcome
 
 TITLE = "Kinect v1: whole images and CPU time, by emulated cameras"
 
@@ -86,7 +86,7 @@ def _row(streams: str, losses: tuple[float, ...], duration_s: float) -> tuple[Ce
 
 
 def _measure(streams: str, losses: tuple[float, ...], duration_s: float) -> list[Outcome]:
-    program = [sys.executable, "-m", "tests.drivers.kinect1.endurance", str(duration_s), *map(str, losses)]
+    program = [sys.executable, "-m", "evaluation.service.kinect1_receiver", str(duration_s), *map(str, losses)]
     done = testbed.run([*program, "--streams", streams], timeout_s=duration_s + 120, cameras=len(losses))
     if done.returncode != 0:
         raise RuntimeError(done.stderr)

@@ -15,6 +15,7 @@ class RecordingSink:
     """Records frames, truths, states and warnings, and waits for conditions on them."""
 
     def __init__(self) -> None:
+        self.items: list[Frame | Truth] = []  # in the order in which they came
         self.frames: list[Frame] = []
         self.truths: list[Truth] = []
         self.states: list[tuple[DeviceState, str]] = []
@@ -23,12 +24,15 @@ class RecordingSink:
 
     def on_frame(self, frame: Frame) -> None:
         with self.changed:
+            self.items.append(frame)
             self.frames.append(frame)
             self.changed.notify_all()
 
     def on_truth(self, truth: Truth) -> None:
         with self.changed:
+            self.items.append(truth)
             self.truths.append(truth)
+            self.changed.notify_all()
 
     def on_state(self, state: DeviceState, reason: str) -> None:
         with self.changed:

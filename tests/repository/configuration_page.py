@@ -25,8 +25,8 @@ INTRO = """\
 <!-- Written by `.venv/bin/python -m tests.repository.configuration_page`: edit the docstrings that it is made from. -->
 
 The sections follow the order of a rig file; `NAME` is a name of your choice.
-[abs_service/rigs/demo.toml](../abs_service/rigs/demo.toml) is a complete file to begin with, [examples](../examples)
-has others, and `abs-service check rig.toml` says which keys or values are wrong.
+[abs_service/rigs/demo.toml](../abs_service/rigs/demo.toml) is a complete file to begin with,
+[examples/rigs](../examples/rigs) has others, and `abs-service check rig.toml` says which keys or values are wrong.
 
 *value* is the type and range: an integer may stand for a number, but not "3" for 3; paths start from the folder of the
 file that names them. A key without a default may be left out unless it is **required**. Equations and sections are

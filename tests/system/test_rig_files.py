@@ -1,4 +1,4 @@
-"""Every rig file in examples/ does what its first lines say, with the commands themselves."""
+"""Every rig file in examples/rigs does what its first lines say, with the commands themselves."""
 
 import json
 import signal
@@ -17,7 +17,7 @@ from tests.system.running import START_S, abs_service, wait_until
 
 pytestmark = pytest.mark.slow
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples" / "rigs"
 #: Those that need recordings or images which are not in the repository.
 WITH_FILES = {"replay", "image_folder"}
 WITHOUT_TRACKER = {"record_only"}
@@ -33,8 +33,8 @@ def example(tmp_path, endpoint):
     """Copies an example to a folder of its own, with an endpoint of its own."""
 
     def copied(name):
-        path = tmp_path / "examples" / f"{name}.toml"
-        path.parent.mkdir()
+        path = tmp_path / "examples" / "rigs" / f"{name}.toml"
+        path.parent.mkdir(parents=True)
         text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
         path.write_text(f'{text}\n[bus]\nendpoint = "{endpoint}"\n', encoding="utf-8")
         return path

@@ -15,7 +15,7 @@ from tests.system.running import START_S, TRACKING, RigListener, wait_until
 
 pytestmark = pytest.mark.slow
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "two_trackers.toml"
+EXAMPLE = Path(__file__).parents[2] / "examples" / "rigs" / "two_trackers.toml"
 NAMES = ("left", "right")
 #: How long both are watched [s]: some hundred estimates each.
 WATCHED_S = 15.0

@@ -30,13 +30,6 @@ def test_a_file_that_is_no_toml(rig_file):
     assert "line 1" in message
 
 
-def test_an_unknown_key(rig_file):
-    rig_file.write_text(rig_file.read_text().replace("vertices = 300", "vertexes = 300"))
-    message = refused("run", rig_file)
-    assert "trackers.sheet.mesh.vertexes" in message
-    assert "vertices" in message
-
-
 def test_a_port_in_use(rig_file, endpoint):
     with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))):
         message = refused("run", rig_file)

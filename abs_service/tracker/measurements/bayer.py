@@ -14,7 +14,7 @@ from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.vertex_values import Values, at_vertices, known, mean_of_known
 from calib.camera import Camera
-from calib.noise.bayer import GaussianBayer
+from calib.noise.images.bayer import GaussianBayer
 from calib.rig import Sensor
 from drivers.contract.frame import Frame, Kind
 

@@ -8,7 +8,7 @@ from abs_service.tracker.measurements.base import Comparison, Decoder
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.barrier import BarrierTerm
-from calib.noise.binary import LightBarrier
+from calib.noise.images.binary import LightBarrier
 from calib.rig import Sensor
 from drivers.contract.frame import Frame, Kind
 

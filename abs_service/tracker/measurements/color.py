@@ -9,7 +9,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.vertex_values import Values, known
-from calib.noise.color import GaussianColor
+from calib.noise.images.color import GaussianColor
 from calib.rig import Sensor
 from drivers.contract.frame import Frame, Kind
 

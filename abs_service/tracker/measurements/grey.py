@@ -12,7 +12,7 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from abs_service.tracker.terms.photometric.vertex_values import Values, known
-from calib.noise.grey import GaussianGrey
+from calib.noise.images.grey import GaussianGrey
 from calib.rig import Sensor
 from drivers.contract.frame import Frame, Kind
 

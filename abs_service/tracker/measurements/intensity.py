@@ -13,7 +13,7 @@ from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.illumination import Active, Passive, lambert
 from abs_service.tracker.terms.photometric.vertex_values import Values
 from calib.camera import Camera
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Sensor
 from drivers.contract.frame import Kind
 

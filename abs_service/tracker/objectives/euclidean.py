@@ -15,12 +15,12 @@ from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.terms.base import Bounds, SensorFit, Term
 from calib.no_return import NEVER
 from calib.noise.base import LOG_SQRT_2PI, DepthNoise
-from calib.noise.bayer import GaussianBayer
-from calib.noise.binary import LightBarrier
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.binary import LightBarrier
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.grey import GaussianGrey
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 
 

@@ -117,9 +117,6 @@ class DenseView:
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
-    def sight(self) -> None:
-        """None: the set of samples depends on the candidate."""
-
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: gradients of the image are more accurate than those of the lattice."""
         samples, _ = self._render(surface)

@@ -153,9 +153,6 @@ class _SharedView:
         common = self._projection.synthesize(surface)
         return Synthesis(common.pixel, common.distance, self._attributes)
 
-    def sight(self) -> None:
-        """None: all sensors share one synthesis, whereas a fused kernel would compute one per sensor."""
-
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
         return np.full((*self._attributes.shape[1:], 2), np.nan, np.float32)

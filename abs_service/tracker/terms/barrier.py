@@ -9,7 +9,7 @@ from abs_service.tracker.terms.base import Bounds, SensorFit
 from abs_service.tracker.terms.linearization import NO_ROWS, PointLinearization
 from calib.camera import Camera
 from calib.jit import kernel
-from calib.noise.binary import LightBarrier
+from calib.noise.images.binary import LightBarrier
 
 
 class BarrierTerm:

@@ -13,8 +13,8 @@ from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.models import nurbs
 from abs_service.tracking.session import TrackingSession
 from calib.camera import Camera
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
+from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
 from calib.warp.pictures import PictureLookup
 from drivers.contract.frame import Frame, FrameSet, Kind

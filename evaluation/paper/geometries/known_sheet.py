@@ -11,7 +11,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD
 from abs_service.tracker.models.nurbs import Nurbs
 from calib.noise.base import DepthNoise
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 from evaluation.scenes.geometries import ASPECT
 from evaluation.scenes.printed_sheet import FULL_SCALE, GREY_DEVIATION

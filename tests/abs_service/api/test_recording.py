@@ -11,7 +11,7 @@ from abs_service import cli
 
 ROOT = Path(__file__).parents[3]
 SAMPLE = ROOT / "recordings" / "sample.mcap"
-RIGS = sorted(ROOT.glob("examples/*.toml"))
+RIGS = sorted(ROOT.glob("examples/rigs/*.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +122,7 @@ def test_every_rig_file_of_the_examples_can_be_loaded(path):
 
 def test_a_tracker_of_a_rig_file_takes_the_cameras_that_it_is_given():
     depth, color = a.Camera(640, 480, 580, 580, 320, 240), a.Camera(640, 480, 525, 525, 320, 240)
-    tracker = a.load_rig(ROOT / "examples" / "kinect.toml").tracker(cameras={"depth": depth, "color": color})
+    tracker = a.load_rig(ROOT / "examples" / "rigs" / "kinect.toml").tracker(cameras={"depth": depth, "color": color})
     depth_m = np.full((480, 640), 0.8)
     depth_m[:, :200] = depth_m[:, 440:] = depth_m[:100] = depth_m[380:] = np.nan
     mosaic = np.full((480, 640), 128, np.uint8)
@@ -133,7 +133,7 @@ def test_a_tracker_of_a_rig_file_takes_the_cameras_that_it_is_given():
 def test_a_rig_file_says_where_its_cameras_are(tmp_path):
     file = tmp_path / "rig.toml"
     camera = "{ width = 64, height = 48, fx = 60.0, fy = 60.0, cx = 31.5, cy = 23.5 }"
-    text = (ROOT / "examples" / "kinect.toml").read_text(encoding="utf-8")
+    text = (ROOT / "examples" / "rigs" / "kinect.toml").read_text(encoding="utf-8")
     file.write_text(text.replace("[sensors.depth]", f"[sensors.depth]\ncamera = {camera}"), encoding="utf-8")
     rig = a.load_rig(file)
     assert list(rig.cameras) == ["depth"]
@@ -142,7 +142,7 @@ def test_a_rig_file_says_where_its_cameras_are(tmp_path):
 
 
 def test_a_name_that_the_rig_does_not_have():
-    rig = a.load_rig(ROOT / "examples" / "two_trackers.toml")
+    rig = a.load_rig(ROOT / "examples" / "rigs" / "two_trackers.toml")
     with pytest.raises(a.ArgumentError, match=rf"name = 'x': the rig has {', '.join(rig.trackers)}"):
         rig.tracker("x")
     with pytest.raises(a.ArgumentError, match="name = '': the rig has"):

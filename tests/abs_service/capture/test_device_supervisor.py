@@ -1,65 +1,24 @@
-"""Devices are kept delivering, under the names of the rig, and what they are is announced."""
+"""Devices are kept delivering, under the names of the rig."""
 
-import dataclasses
 import queue
 import threading
 
 import numpy as np
 import pytest
-from absmsg.v1.common_pb2 import Header
 from absmsg.v1.health_pb2 import Health as Message
-from absmsg.v1.sensor_model_pb2 import Config, SensorModel
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
-from google.protobuf.descriptor_pb2 import FileDescriptorSet
-from google.protobuf.descriptor_pool import DescriptorPool
 
-from abs_service import config
-from abs_service.bus import keys
-from abs_service.bus.health import Health, Level
+from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.capture import device_supervisor, sensor_metadata, stall_detector
+from abs_service.capture import device_supervisor, stall_detector
 from abs_service.capture.device_supervisor import DeviceSupervisor
-from abs_service.commands import capture as command
-from abs_service.commands.capture import MetadataPublisher
 from abs_service.commands.parts import rig_devices
 from abs_service.commands.parts.rig_devices import HeadError, SettingError
-from abs_service.wire.message_header import MESSAGES
-from calib import pose
-from calib.camera import Camera
-from calib.lenses.fisheye import KannalaBrandt
-from drivers.contract.capabilities import Capabilities, StreamInfo
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
-from drivers.contract.device import AddressError, DeviceError, DeviceInfo, DeviceState
+from drivers.contract.device import AddressError, DeviceError, DeviceState
 from drivers.contract.frame import Frame, Kind
-from drivers.encoding.codec import CodecError
-from drivers.encoding.sensor_model import decode_camera
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.abs_service.capture.fake_device import FakeDevice
 from tests.waiting import eventually
-
-CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
-
-
-class FakeDevice:
-    """Does what it is told."""
-
-    capabilities = Capabilities((StreamInfo("head", "image", Kind.COLOR, "mono8", 4, 3, 30.0),))
-    controls = Controls()
-    gauges: dict[str, float] = {}  # noqa: RUF012
-    state = DeviceState.CLOSED
-
-    def __init__(self, heads=("head", "other"), start=lambda sink: None, serial="1"):
-        self.info = DeviceInfo(f"fake://{serial}", "fake", serial)
-        self.cameras = dict.fromkeys(heads, CAMERA)
-        self.counters = {"frames": 1}
-        self.start = start
-        self.closed = threading.Event()
-
-    def stop(self):
-        pass
-
-    def close(self):
-        self.closed.set()
 
 
 class Collector:
@@ -300,94 +259,3 @@ def test_what_fails_after_the_end_is_no_error_of_the_rig(keep):
     fail_now.set()
     assert device.closed.wait(5)
     assert supervisor.fatal_error is None
-
-
-RIG = """
-version = 1
-name = "demo"
-devices.cam.uri = "fake:x"
-[sensors.tof]
-device = "cam"
-head = "head"
-noise = { type = "gaussian_polynomial", sigma = [[1e-2, 2e-3]] }
-outlier_share = 0.1
-[sensors.tof.camera]
-T_rs = { translation = [0.1, 0.2, 0.3] }
-[sensors.color]
-device = "cam"
-head = "other"
-"""
-
-
-@pytest.fixture
-def metadata(tmp_path):
-    bus = LoopbackBus()
-    return bus, MetadataPublisher(bus, HeaderFactory("demo", WallClock()), config.loads(RIG, "rig.toml", tmp_path))
-
-
-def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(metadata):
-    bus, metadata = metadata
-    metadata.add_device("cam", FakeDevice())
-    told = {sample.topic: sample.payload for sample in bus.query("**", 1)}
-    assert set(told) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
-    model = SensorModel.FromString(told["tof/model"])
-    assert (model.noise, model.fx, model.width) == ("gaussian_polynomial", 5.0, 4)
-    assert list(model.noise_parameters["sigma"].values) == [1e-2, 2e-3]
-    assert list(model.noise_parameters["outlier_share"].values) == [0.1]
-    assert "range_m" not in model.noise_parameters
-    assert np.reshape(model.T_rs, (4, 4))[:3, 3].tolist() == [0.1, 0.2, 0.3]
-    assert SensorModel.FromString(told["color/model"]).calib_id == CAMERA.calib_id
-    calibration = CameraCalibration.FromString(told["tof/calibration"])
-    assert list(calibration.K) == [5, 0, 1.5, 0, 5, 1.0, 0, 0, 1]
-    assert (calibration.frame_id, len(calibration.D), len(calibration.P)) == ("tof", 8, 12)
-    assert "[sensors.tof]" in Config.FromString(told["config"]).toml
-    tof, color = FrameTransforms.FromString(told["tf"]).transforms
-    assert (tof.parent_frame_id, tof.child_frame_id, tof.rotation.w) == ("rig", "tof", 1.0)
-    x, y, z, w = pose.to_quaternion(CAMERA.T_rs)
-    assert (color.rotation.x, color.rotation.y, color.rotation.z, color.rotation.w) == (x, y, z, w)
-
-
-def test_a_fisheye_camera_is_published_and_restored_from_recordings():
-    camera = dataclasses.replace(CAMERA, lens=KannalaBrandt(np.array([0.1, 0.02])))
-    told = sensor_metadata.calibration("tof", camera, 0)
-    assert (told.distortion_model, list(told.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
-    model = sensor_metadata.sensor_model(Header(), "tof", camera, {})
-    assert (
-        decode_camera(SensorModel.FromString(model.SerializeToString())).calib_id == camera.calib_id == model.calib_id
-    )
-    model.lens_model = ""
-    assert decode_camera(model).lens.name == "brown_conrady"  # a recording from before there were fisheyes
-    model.lens_model = "mirror"
-    with pytest.raises(CodecError, match=r'lens_model = "mirror" is none of'):
-        decode_camera(model)
-
-
-def test_a_head_that_the_device_does_not_have_is_explained(metadata):
-    _, metadata = metadata
-    with pytest.raises(HeadError, match=r'sensors\.color: device "cam" has no head "other"; it has: head'):
-        metadata.add_device("cam", FakeDevice(heads=["head"]))
-
-
-def test_a_step_of_the_wall_clock_is_reported_once(metadata):
-    bus, metadata = metadata
-    now = {"monotonic": 10**9, "wall": 10**18}
-    clock = WallClock(lambda: now["monotonic"], lambda: now["wall"])
-    health = Health(bus, "capture", HeaderFactory("demo", clock))
-    levels = []
-    for step_ns in (0, 3600 * 10**9, 0):
-        now["monotonic"] += 10**9
-        now["wall"] += 10**9 + step_ns
-        command.tick(metadata, {}, health, clock)
-        levels.append((health.level, health_now(health, bus).counters["clock_steps"]))
-    assert levels == [(Level.OK, 0), (Level.WARNING, 1), (Level.OK, 1)]
-    said = [Message.FromString(sample.payload).message for sample in bus.sent if sample.topic == "health/capture"]
-    assert "the wall clock was set by +3600.000 s; stamps follow it" in said
-
-
-def test_the_schema_describes_every_message_on_the_wire():
-    pool = DescriptorPool()
-    for file in FileDescriptorSet.FromString(sensor_metadata.schema()).file:
-        pool.Add(file)
-    for message in MESSAGES:
-        assert pool.FindMessageTypeByName(message).full_name == message
-    assert keys.SCHEMA == "schema"

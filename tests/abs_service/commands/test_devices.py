@@ -14,7 +14,7 @@ from drivers import opening
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.contract.device import DeviceInfo
 from drivers.contract.discovery import Availability, Found
-from tests.abs_service.capture.test_device_supervisor import FakeDevice
+from tests.abs_service.capture.fake_device import FakeDevice
 
 OAK = Found(DeviceInfo("oak://184430", "OAK-D ToF", "184430", "1.2.3", "USB 3, 5 Gbit/s"))
 KINECT = Found(

@@ -15,7 +15,7 @@ PACKAGES = {
     "region": "abs_service.tracker.detection.regions",
     "template": "abs_service.tracker.detection.templates",
     "depth": "calib.noise",
-    "picture": "calib.noise",
+    "picture": "calib.noise.images",
 }
 
 RIG = Template("""\

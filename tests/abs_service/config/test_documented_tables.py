@@ -1,7 +1,8 @@
-"""The TOML tables in the docs load, and name every key of every template, model and optimizer with its default."""
+"""The TOML tables in the docs load, and name every key of every exchangeable part with its default."""
 
 import re
 import tomllib
+from collections import defaultdict
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -13,17 +14,19 @@ from abs_service.tracker.optimizers.base import Stop
 
 ROOT = Path(__file__).parents[3]
 PACKAGES = {
+    "region": "abs_service.tracker.detection.regions",
     "template": "abs_service.tracker.detection.templates",
     "model": "abs_service.tracker.models",
     "optimizer": "abs_service.tracker.optimizers",
 }
 PAGES = {part: (ROOT / "docs" / f"{part}s.md").read_text(encoding="utf-8") for part in PACKAGES}
-TABLES = {
-    (part, tracker[part]["type"]): tracker[part]
-    for part, page in PAGES.items()
-    for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    for tracker in tomllib.loads(block)["trackers"].values()
-}
+TABLES = defaultdict(list)
+for part, page in PAGES.items():
+    for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL):
+        for tracker in tomllib.loads(block)["trackers"].values():
+            TABLES[part, tracker[part]["type"]].append(tracker[part])
+#: Keys that the pages set to something else than their default, to show what they do.
+SHOWN = {("region", "grow")}
 
 
 def documented(part):
@@ -31,32 +34,36 @@ def documented(part):
 
 
 @pytest.mark.parametrize("part", PACKAGES)
-def test_every_part_has_a_table(part):
+def test_every_part_has_a_table_and_is_in_the_readme(part):
     assert documented(part) == plugins.available(PACKAGES[part])
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    row = next(line for line in readme if line.startswith("|") and f"docs/{part}s.md" in line)
+    assert all(f"`{name}`" in row for name in documented(part))
 
 
 @pytest.mark.parametrize(("part", "name"), TABLES)
-def test_a_table_names_all_keys_with_their_defaults(part, name):
-    made, table = plugins.load(PACKAGES[part], TABLES[part, name], ROOT), TABLES[part, name]
-    assert table.keys() == {"type", *(field.name for field in fields(made))}
-    for field in fields(made):
-        if field.default is not MISSING:
-            assert getattr(made, field.name) == field.default, field.name
+def test_the_tables_of_a_part_name_all_keys_with_their_defaults(part, name):
+    tables = TABLES[part, name]
+    made = [plugins.load(PACKAGES[part], table, ROOT) for table in tables]
+    assert set().union(*tables) == {"type", *(field.name for field in fields(made[0]))}
+    for one, table in zip(made, tables):
+        for field in fields(one):
+            if field.name in table and field.default not in (MISSING, None) and (part, field.name) not in SHOWN:
+                assert getattr(one, field.name) == field.default, field.name
 
 
-def test_every_template_is_in_the_readme():
-    readme = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
-    row = next(line for line in readme if "docs/templates.md" in line)
-    assert all(f"`{name}`" in row for name in documented("template"))
+@pytest.mark.parametrize(
+    ("part", "name", "key"), [("template", "mesh", "path"), ("region", "mask", "file"), ("region", "seed", "within")]
+)
+def test_a_path_starts_from_the_folder_of_the_rig_file(part, name, key):
+    table = next(table for table in TABLES[part, name] if key in table)
+    assert getattr(plugins.load(PACKAGES[part], table, ROOT), key) == ROOT / table[key]
 
 
-def test_the_path_of_a_template_starts_from_the_folder_of_the_rig_file():
-    assert plugins.load(PACKAGES["template"], TABLES["template", "mesh"], ROOT).path == ROOT / "toy.obj"
-
-
-def test_every_optimizer_has_a_row():
-    rows = re.findall(r"^\| `(\w+)` \|", PAGES["optimizer"].partition("## Keys")[0], re.MULTILINE)
-    assert set(rows) == {"type", *documented("optimizer")}
+@pytest.mark.parametrize("part", ["region", "optimizer"])
+def test_every_part_has_a_row(part):
+    rows = re.findall(r"^\| `(\w+)` \|", PAGES[part], re.MULTILINE)
+    assert set(documented(part)) <= set(rows)
 
 
 @pytest.mark.parametrize("key", ["budget_evaluations", "budget_ms"])

@@ -1,4 +1,4 @@
-"""The rigs that come with the service and those in examples/ are understood, all of them."""
+"""The rigs that come with the service and those in examples/rigs are understood, all of them."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ import pytest
 from abs_service import config
 from drivers import simulated
 
-EXAMPLES = sorted((Path(__file__).parents[3] / "examples").glob("*.toml"))
+EXAMPLES = sorted((Path(__file__).parents[3] / "examples" / "rigs").glob("*.toml"))
 
 
 def test_the_default_rig_tracks_and_records_below_where_the_user_is(tmp_path, monkeypatch):

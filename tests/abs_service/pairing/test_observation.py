@@ -11,8 +11,8 @@ from abs_service.tracking.observer import Observer
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.images.color import GaussianColor
 from calib.noise.measured import Measured
 from calib.noise.per_pixel import PerPixel
 from calib.noise.structured_light import StructuredLight

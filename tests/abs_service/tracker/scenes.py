@@ -14,7 +14,7 @@ from calib import pose
 from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
-from calib.noise.color import GaussianColor
+from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
 
 #: A small camera with a lens and a pose of its own; it sees a sheet of 0.3 × 0.2 m at z = 1 m with some room around.

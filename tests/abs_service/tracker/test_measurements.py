@@ -9,12 +9,12 @@ from abs_service.tracker.measurements import bayer, binary, color, depth, grey, 
 from abs_service.tracker.models.base import ModelError
 from abs_service.tracker.objectives import euclidean
 from calib.noise.base import NoiseError
-from calib.noise.bayer import GaussianBayer
-from calib.noise.binary import LightBarrier
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.binary import LightBarrier
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.grey import GaussianGrey
+from calib.noise.images.intensity import GaussianIntensity
 from calib.noise.measured import Measured
 from calib.noise.tof_amplitude import Settings as TofAmplitude
 from calib.rig import Rig, Sensor

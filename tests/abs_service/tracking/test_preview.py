@@ -10,9 +10,6 @@ import pytest
 from abs_service import config, wiring
 from abs_service.tracker.detection.regions import box
 from abs_service.tracker.detection.segmentation import detect_object
-from abs_service.tracker.objectives.base import TermSum
-from abs_service.tracker.terms.depth.depth import DepthTerm
-from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import make_posterior
@@ -71,12 +68,10 @@ def test_the_classes_are_those_of_the_tracker(exposure):
     model = PLAN.model.build(detect_object(observation, RIG, "tof", PLAN.region.build(), PLAN.vertices))
     posterior, _ = make_posterior(PLAN, RIG, model, observation)
     posterior.observe(observation)
-    assert isinstance(posterior.objective, TermSum)
-    (term,) = posterior.objective._terms
-    assert isinstance(term, DepthTerm)
-    assert isinstance(term._outline, RimOutline)
+    (fit,) = posterior.objective.fits(model.deform(model.rest[None]))
     assert seen.found is not None
-    np.testing.assert_array_equal(seen.found.classes, term._outline.classes)
+    free, occluded = (np.sum(seen.found.classes == rim_class) for rim_class in (RimClass.FREE, RimClass.OCCLUDED))
+    assert (fit.rim.visible + fit.rim.occluded, fit.rim.covered) == (free, occluded)
 
 
 def test_the_first_frame_with_the_object_is_shown():

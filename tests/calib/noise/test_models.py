@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from annotated_types import Ge, Gt
 
-from calib.noise import color, constant, gaussian_polynomial, structured_light, tof_amplitude
+from calib.noise import constant, gaussian_polynomial, structured_light, tof_amplitude
 from calib.noise.base import NoiseError, log_density
 from calib.noise.constant import Constant
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.images import color
 from calib.noise.pixel_polynomial import PixelPolynomial
 from calib.noise.region_polynomial import RegionPolynomial
 from calib.noise.structured_light import StructuredLight

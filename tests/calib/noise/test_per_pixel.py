@@ -13,6 +13,7 @@ from calib.noise.base import NoiseError
 from calib.noise.fit.quality import goodness_of_fit
 from calib.noise.fit.samples import Samples
 from calib.noise.fit.shrinkage import Repeats
+from calib.noise.images.color import GaussianColor
 from calib.noise.region_polynomial import blocks
 from calib.noise.tof_amplitude import TofAmplitude
 from tests.calib.noise.models import DISTANCES, HEIGHT, WIDTH, own_of_pixels
@@ -122,8 +123,9 @@ def test_maps_that_are_none_are_named(tmp_path: Path, changes: dict, message: st
 
 def test_the_law_must_be_one_of_depth(tmp_path: Path) -> None:
     own_of_pixels().save(tmp_path / "own.npz")
-    table = {"type": "per_pixel", "file": "own.npz", "law": {"type": "color"}}
     with pytest.raises(NoiseError, match="law must be a noise model of depth"):
-        plugins.load("calib.noise", table, tmp_path).build()
+        per_pixel.Settings(tmp_path / "own.npz", GaussianColor()).build()
+    with pytest.raises(ProblemsError, match=r'law\.type = "color": no such type, allowed: constant'):
+        plugins.load("calib.noise", {"type": "per_pixel", "file": "own.npz", "law": {"type": "color"}}, tmp_path)
     with pytest.raises(ProblemsError):
         plugins.load("calib.noise", {"type": "per_pixel", "file": "own.npz"}, tmp_path)

@@ -1,7 +1,6 @@
 """Real-time playback of recordings."""
 
 import dataclasses
-import threading
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,8 @@ from drivers.contract.device import AddressError, DeviceState, Truth
 from drivers.contract.frame import Frame
 from drivers.opening import open_device
 from drivers.replay import Recording, ReplayDevice
+from tests.drivers.manual_time import ManualTime
+from tests.drivers.recording_sink import RecordingSink
 from tests.drivers.replay.recordings import (
     BOOT_NS,
     CAMERAS,
@@ -18,57 +19,20 @@ from tests.drivers.replay.recordings import (
     write,
 )
 
-
-class Sink:
-    """A sink that sets an event at the end of the replay or after enough frames."""
-
-    def __init__(self, enough: int = 1 << 30) -> None:
-        self.items: list[Frame | Truth] = []
-        self.states: list[tuple[DeviceState, str]] = []
-        self.done = threading.Event()
-        self.enough = enough
-
-    def on_frame(self, frame: Frame) -> None:
-        self.items.append(frame)
-        if len(self.items) >= self.enough:
-            self.done.set()
-
-    def on_truth(self, truth: Truth) -> None:
-        self.items.append(truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        self.states.append((state, reason))
-        if state in {DeviceState.CLOSED, DeviceState.FAILED}:
-            self.done.set()
-
-    def on_warning(self, condition: str, message: str) -> None: ...
-
-
-class Time:
-    """A manual clock, advanced by waiting."""
-
-    def __init__(self) -> None:
-        self.now_ns = 77_000_000_000
-
-    def clock(self) -> int:
-        return self.now_ns
-
-    def wait(self, stop: threading.Event, seconds: float) -> bool:
-        self.now_ns += round(seconds * 1e9)
-        return stop.is_set()
+BEGIN_NS = 77_000_000_000
 
 
 @pytest.mark.parametrize("speed", [1.0, 2.0])
 def test_a_replay_has_real_time_pace_and_current_times(tmp_path: Path, speed: float) -> None:
     items = recorded(6)
-    time, sink = Time(), Sink()
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
     device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), speed, False, time.clock, time.wait)
     device.start(sink)
-    assert sink.done.wait(30)
+    sink.wait_for(DeviceState.CLOSED)
     device.stop()
     assert [item.seq for item in sink.items] == [item.seq for item in items]
     for original, item in zip(items, sink.items):
-        assert item.t_host_ns == 77_000_000_000 + round((original.t_host_ns - BOOT_NS) / speed)
+        assert item.t_host_ns == BEGIN_NS + round((original.t_host_ns - BOOT_NS) / speed)
         if isinstance(item, Frame):
             assert 0 <= item.t_arrival_ns - item.t_host_ns < 10
             assert item.epoch == 0
@@ -83,13 +47,13 @@ def test_a_replay_has_real_time_pace_and_current_times(tmp_path: Path, speed: fl
 
 
 def test_a_replay_can_be_delayed(tmp_path: Path) -> None:
-    time, sink = Time(), Sink()
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
     recording = Recording(write(tmp_path / "a.mcap", recorded(2)))
     device = ReplayDevice("", recording, 1.0, False, time.clock, time.wait, delay_s=6.0)
     device.start(sink)
-    assert sink.done.wait(30)
+    sink.wait_for(DeviceState.CLOSED)
     device.close()
-    assert sink.items[0].t_host_ns == 77_000_000_000 + 6_000_000_000
+    assert sink.items[0].t_host_ns == BEGIN_NS + 6_000_000_000
     assert [state for state, _ in sink.states] == [DeviceState.OPENING, DeviceState.STREAMING, DeviceState.CLOSED]
     with pytest.raises(AddressError, match=r"delay = '-1' must be a number from 0 to 3600"):
         open_device(f"replay://{recording.path}?delay=-1", time.clock)
@@ -97,39 +61,36 @@ def test_a_replay_can_be_delayed(tmp_path: Path) -> None:
 
 def test_every_loop_and_every_start_is_a_new_epoch(tmp_path: Path) -> None:
     items = [item if isinstance(item, Truth) else dataclasses.replace(item, epoch=7_000_000) for item in recorded(2)]
-    time, sink = Time(), Sink(enough=20)
+    time, sink = ManualTime(BEGIN_NS), RecordingSink()
     device = ReplayDevice("", Recording(write(tmp_path / "a.mcap", items)), 1.0, True, time.clock, time.wait)
     device.start(sink)
-    assert sink.done.wait(30)
+    sink.wait(lambda: len(sink.items) >= 20)
     device.stop()
     assert sink.states[-1] == (DeviceState.CLOSED, "stopped")
-    epochs = [item.epoch for item in sink.items if isinstance(item, Frame)]
+    epochs = [frame.epoch for frame in sink.frames]
     assert epochs[:13] == [0] * 6 + [1] * 6 + [2]
-    again = Sink(enough=1)
+    again = RecordingSink()
     device.start(again)
-    assert again.done.wait(30)
+    again.wait(lambda: bool(again.frames))
     device.close()
-    first = next(item for item in again.items if isinstance(item, Frame))
-    assert first.epoch > epochs[-1]
+    assert again.frames[0].epoch > epochs[-1]
 
 
 def test_a_replay_of_a_corrupt_file_fails_with_the_reason(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(20))
-    device = open_device(f"replay://{path}?speed=100", Time().clock)
+    device = open_device(f"replay://{path}?speed=100", ManualTime(BEGIN_NS).clock)
     damage(path)
-    sink = Sink()
+    sink = RecordingSink()
     device.start(sink)
-    assert sink.done.wait(30)
+    reason = sink.wait_for(DeviceState.FAILED)
     device.close()
-    state, reason = sink.states[-1]
-    assert state == DeviceState.FAILED
     assert "is damaged" in reason
 
 
 def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(tmp_path / "Some file.mcap", recorded(2))
     monkeypatch.chdir(tmp_path)
-    device = open_device("replay://Some%20file.mcap?loop=1", Time().clock)
+    device = open_device("replay://Some%20file.mcap?loop=1", ManualTime(BEGIN_NS).clock)
     assert device.cameras["color"].calib_id == CAMERAS["color"].calib_id
     assert device.info.serial == "Some file.mcap"
 
@@ -145,11 +106,11 @@ def test_a_relative_path_and_cameras(tmp_path: Path, monkeypatch: pytest.MonkeyP
 )
 def test_invalid_addresses_raise(query: str, complaint: str) -> None:
     with pytest.raises(AddressError, match=complaint):
-        open_device(f"replay://a.mcap?{query}", Time().clock)
+        open_device(f"replay://a.mcap?{query}", ManualTime(BEGIN_NS).clock)
 
 
 def test_a_sensor_without_a_model_cannot_be_replayed(tmp_path: Path) -> None:
     path = write(tmp_path / "a.mcap", recorded(2), sensors=("tof",))
     assert Recording(path).cameras.keys() == {"tof"}
     with pytest.raises(AddressError, match=r"topic /color/model .* is missing"):
-        open_device(f"replay://{path}", Time().clock)
+        open_device(f"replay://{path}", ManualTime(BEGIN_NS).clock)

@@ -1,66 +1,24 @@
 """The simulated device: timing, counting of late exposures, and validation of addresses."""
 
-import threading
-from dataclasses import dataclass, field
-
 import pytest
 
-from drivers.contract.device import DeviceError, DeviceState, Truth
-from drivers.contract.frame import Frame
+from drivers.contract.device import DeviceError
 from drivers.opening import available, open_device
 from drivers.simulated.address import Address, parse
 from drivers.simulated.device import SimulatedDevice
+from tests.drivers.manual_time import ManualTime
+from tests.drivers.recording_sink import RecordingSink
+
+BEGIN_NS = 5_000_000_000
 
 
-@dataclass
-class Recorder:
-    """A sink that sets an event after enough frames."""
-
-    enough: int
-    frames: list[Frame] = field(default_factory=list)
-    truths: list[Truth] = field(default_factory=list)
-    states: list[DeviceState] = field(default_factory=list)
-    full: threading.Event = field(default_factory=threading.Event)
-
-    def on_frame(self, frame: Frame) -> None:
-        self.frames.append(frame)
-        if len(self.frames) >= self.enough:
-            self.full.set()
-
-    def on_truth(self, truth: Truth) -> None:
-        self.truths.append(truth)
-
-    def on_state(self, state: DeviceState, reason: str) -> None:
-        assert reason
-        self.states.append(state)
-
-    def on_warning(self, condition: str, message: str) -> None: ...
-
-
-@dataclass
-class Time:
-    """A manual clock, advanced by waiting."""
-
-    now_ns: int = 5_000_000_000
-    delays: dict[int, int] = field(default_factory=dict)
-    waits: int = 0
-
-    def clock(self) -> int:
-        return self.now_ns
-
-    def wait(self, stop: threading.Event, seconds: float) -> bool:
-        self.now_ns += round(seconds * 1e9) + self.delays.get(self.waits, 0)
-        self.waits += 1
-        return stop.is_set()
-
-
-def run(query: str, time: Time, frames: int) -> tuple[SimulatedDevice, Recorder]:
+def run(query: str, time: ManualTime, frames: int) -> tuple[SimulatedDevice, RecordingSink]:
     uri = f"simulated://sheet?{query}"
     address = parse(uri)
     device = SimulatedDevice(uri, address.build(), time.clock, time.wait, address.fault)
-    sink = Recorder(frames)
+    sink = RecordingSink()
     device.start(sink)
-    assert sink.full.wait(60)
+    sink.wait(lambda: len(sink.frames) >= frames, 60)
     device.stop()
     return device, sink
 
@@ -69,34 +27,32 @@ SMALL = "sensors=tof,color&tof=32x24&color=32x24"
 
 
 def test_exposures_arrive_when_they_are_due() -> None:
-    time = Time()
+    time = ManualTime(BEGIN_NS)
     device, sink = run(SMALL, time, 9)
     assert [frame.seq for frame in sink.frames[:9]] == [0, 0, 0, 1, 1, 1, 2, 2, 2]
     for frame in sink.frames:
-        assert frame.t_host_ns == 5_000_000_000 + round(frame.seq * 1e9 / 30)
+        assert frame.t_host_ns == BEGIN_NS + round(frame.seq * 1e9 / 30)
         assert 0 <= frame.t_arrival_ns - frame.t_host_ns < 10
     assert device.counters == {"frames": len(sink.frames), "late": 0, "lost": 0}
     assert [truth.t_host_ns for truth in sink.truths[:3]] == [frame.t_host_ns for frame in sink.frames[:9:3]]
 
 
 def test_overdue_exposures_are_delivered_late_with_their_own_timestamps() -> None:
-    device, sink = run(SMALL, Time(delays={1: 110_000_000}), 18)  # 3.3 periods at 30 Hz
+    device, sink = run(SMALL, ManualTime(BEGIN_NS, {1: 110_000_000}), 18)  # 3.3 periods at 30 Hz
     assert [truth.seq for truth in sink.truths][:6] == [0, 1, 2, 3, 4, 5]
-    assert [frame.t_host_ns for frame in sink.frames[::3]][:6] == [
-        5_000_000_000 + round(k * 1e9 / 30) for k in range(6)
-    ]
+    assert [frame.t_host_ns for frame in sink.frames[::3]][:6] == [BEGIN_NS + round(k * 1e9 / 30) for k in range(6)]
     assert [frame.t_arrival_ns - frame.t_host_ns > 30_000_000 for frame in sink.frames[::3]][2:5] == [True, True, False]
     assert device.counters["late"] == 0
 
 
 def test_overdue_exposures_beyond_the_buffer_are_skipped_and_counted() -> None:
-    device, sink = run(SMALL, Time(delays={1: 210_000_000}), 12)  # 6.3 periods at 30 Hz
+    device, sink = run(SMALL, ManualTime(BEGIN_NS, {1: 210_000_000}), 12)  # 6.3 periods at 30 Hz
     assert [truth.seq for truth in sink.truths][:4] == [0, 1, 7, 8]
     assert device.counters["late"] == 5
 
 
 def test_a_temporary_fault_loses_the_declared_frames() -> None:
-    device, sink = run(f"{SMALL}&fault=drop@2", Time(), 12)
+    device, sink = run(f"{SMALL}&fault=drop@2", ManualTime(BEGIN_NS), 12)
     assert [truth.seq for truth in sink.truths][:4] == [0, 1, 3, 5]
     assert device.counters["lost"] >= 3 * 2
 
@@ -104,7 +60,7 @@ def test_a_temporary_fault_loses_the_declared_frames() -> None:
 def test_addresses_open_by_scheme_and_frames_fit_the_streams() -> None:
     heads = "tof,structured_light,color,bayer,ir,barrier"
     uri = f"simulated://board?seed=2&sensors={heads}&rate=15&color=64x48&tof=32x24"
-    device = open_device(uri, Time().clock)
+    device = open_device(uri, ManualTime(BEGIN_NS).clock)
     assert device.info.uri == uri
     assert [f"{s.sensor}/{s.stream}" for s in device.capabilities.streams] == [
         "tof/depth",
@@ -180,7 +136,7 @@ def test_defaults_are_the_demonstration_rig() -> None:
 )
 def test_errors_name_key_value_and_what_is_allowed(uri: str, complaint: str) -> None:
     with pytest.raises(DeviceError, match=complaint):
-        open_device(uri, Time().clock)
+        open_device(uri, ManualTime(BEGIN_NS).clock)
 
 
 def test_every_available_driver_has_an_open_device() -> None:

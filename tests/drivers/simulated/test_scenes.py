@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from drivers.contract.device import DeviceState, Truth
-from drivers.contract.frame import Frame
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 from drivers.simulated.simulation import Simulation
-from tests.waiting import eventually
+from tests.drivers.recording_sink import RecordingSink
 
 
 def build(scene: str, query: str) -> Simulation:
@@ -56,30 +54,14 @@ def test_time_of_flight_measures_both_truths(k: int) -> None:
         assert np.max(away) < 4e-3
 
 
-class Log:
-    """A sink that records the truths and stops the device."""
-
-    def __init__(self) -> None:
-        self.truths: list[Truth] = []
-
-    def on_truth(self, truth: Truth) -> None:
-        self.truths.append(truth)
-
-    def on_frame(self, frame: Frame) -> None: ...
-
-    def on_state(self, state: DeviceState, reason: str) -> None: ...
-
-    def on_warning(self, condition: str, message: str) -> None: ...
-
-
 def test_the_device_delivers_the_truth_of_both() -> None:
-    log = Log()
+    sink = RecordingSink()
     simulation = build("pair", "sensors=tof&tof=32x24")
     waits = iter([False, True])
     device = SimulatedDevice("", simulation, lambda: 0, lambda stop, seconds: next(waits))
-    device.start(log)
-    assert eventually(lambda: len(log.truths) == 2, 60)
-    assert [(truth.seq, truth.surface) for truth in log.truths] == [(0, 0), (0, 1)]
+    device.start(sink)
+    sink.wait(lambda: len(sink.truths) == 2, 60)
+    assert [(truth.seq, truth.surface) for truth in sink.truths] == [(0, 0), (0, 1)]
 
 
 @pytest.mark.parametrize("scene", ["sheet", "board", "pair", "strip"])

@@ -29,18 +29,12 @@ class ShapePrior:
 def _half_squares(
     thetas: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """`_half_square` for every candidate of a population."""
+    """Half the squared length of rows (m, dim) times Θ − center, for every candidate."""
     for k in range(thetas.shape[0]):
-        out[k] = _half_square(thetas[k], center, rows)
-
-
-@kernel
-def _half_square(theta: NDArray[np.float64], center: NDArray[np.float64], rows: NDArray[np.float64]) -> float:
-    """Half the squared length of rows (k, dim) times Θ − center."""
-    total = 0.0
-    for r in range(rows.shape[0]):
-        length = 0.0
-        for d in range(center.size):
-            length += rows[r, d] * (theta[d] - center[d])
-        total += 0.5 * length * length
-    return total
+        total = 0.0
+        for r in range(rows.shape[0]):
+            length = 0.0
+            for d in range(center.size):
+                length += rows[r, d] * (thetas[k, d] - center[d])
+            total += 0.5 * length * length
+        out[k] = total

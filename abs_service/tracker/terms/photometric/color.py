@@ -17,7 +17,7 @@ from abs_service.tracker.terms.photometric.texture_registration_noise import (
 )
 from calib.jit import kernel, prange
 from calib.noise.base import LOG_SQRT_2PI
-from calib.noise.color import GaussianColor
+from calib.noise.images.color import GaussianColor
 
 
 class ColorTerm:

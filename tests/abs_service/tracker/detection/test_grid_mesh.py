@@ -10,7 +10,7 @@ from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.segmentation import detect_object
 from calib import pose
 from calib.camera import Camera
-from calib.noise.color import GaussianColor
+from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import depth_image, observation

@@ -17,7 +17,7 @@ from abs_service.tracker.models.posed import Posed
 from abs_service.tracker.models.rigid import Rigid
 from calib import pose
 from tests import reference
-from tests.abs_service.tracker.differences import central_differences, change
+from tests.abs_service.tracker.models.differences import central_differences, change
 from tests.abs_service.tracker.scenes import sheet, wave
 
 MESH = sheet()

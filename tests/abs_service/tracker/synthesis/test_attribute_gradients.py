@@ -11,9 +11,9 @@ from abs_service.tracker.synthesis.attribute_gradients import FirstOrder, half_p
 from abs_service.tracker.synthesis.sparse import Sparse, SparseView
 from calib import pose
 from calib.camera import Camera
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
-from calib.noise.grey import GaussianGrey
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.grey import GaussianGrey
 from calib.rig import Rig, Sensor
 from tests import reference
 from tests.abs_service.tracker.scenes import CAMERA, FISHEYE, as_surface, flat, sheet

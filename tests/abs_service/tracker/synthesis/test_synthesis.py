@@ -20,10 +20,10 @@ from abs_service.tracking.session import TrackingSession
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.noise.bayer import GaussianBayer
-from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 from drivers.simulated.sensors.optics import OPTICS
 from tests.abs_service.tracker.scenes import as_surface, depth_image, flat, observation, plane_distance, sheet

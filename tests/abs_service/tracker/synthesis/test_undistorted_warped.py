@@ -12,8 +12,8 @@ from abs_service.tracker.synthesis import undistorted, warped
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
 from calib.warp.pinhole import MOST_GROWTH, pinhole_of, resampling
 from tests.abs_service.tracker.scenes import CAMERA, depth_image, observation, plane_distance, sheet

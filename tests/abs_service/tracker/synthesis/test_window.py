@@ -22,9 +22,9 @@ from abs_service.tracker.terms.photometric.color import ColorTerm
 from abs_service.tracker.terms.photometric.illumination import Passive
 from calib.camera import Camera
 from calib.noise.base import write_texture
-from calib.noise.bayer import GaussianBayer
-from calib.noise.color import GaussianColor
 from calib.noise.gaussian_polynomial import GaussianPolynomial
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.color import GaussianColor
 from calib.noise.per_pixel import PerPixel
 from tests.abs_service.tracker.scenes import (
     CAMERA,

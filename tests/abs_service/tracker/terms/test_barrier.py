@@ -15,7 +15,7 @@ from abs_service.tracker.terms.barrier import BarrierTerm
 from abs_service.tracker.terms.base import Bounds
 from calib import pose
 from calib.camera import Camera
-from calib.noise.binary import LightBarrier
+from calib.noise.images.binary import LightBarrier
 from calib.rig import Rig, Sensor
 from tests import reference
 from tests.abs_service.tracker.scenes import as_surface, depth_image, flat, observation, sheet, sparse

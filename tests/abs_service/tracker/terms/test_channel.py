@@ -11,13 +11,14 @@ from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracker.terms.photometric.channel import ChannelTerm
 from abs_service.tracker.terms.photometric.channel_cost import copy, fill
 from abs_service.tracker.terms.photometric.illumination import Active, Passive, lambert
-from calib.noise.bayer import GaussianBayer
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
+from abs_service.tracker.terms.photometric.shadow import Shadow
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.grey import GaussianGrey
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Rig, Sensor
 from tests import reference
+from tests.abs_service.tracker.random_vertices import decided
 from tests.abs_service.tracker.scenes import CAMERA, as_surface, in_sight, observation, sheet, sparse
-from tests.abs_service.tracker.test_kernels import decided
 
 SHARE = 0.05
 seeds = st.integers(0, 2**32 - 1)
@@ -63,7 +64,7 @@ def test_the_cost_is_the_likelihood(name, seed):
     looks[::7] = np.nan
     made = term(noise, looks)
     hands = CAMERA.center + 0.5 * (vertices[vertices[:, 2] > 0][:3] - CAMERA.center)
-    covered = made._shadow.mask(hands)
+    covered = Shadow(CAMERA).mask(hands)
     image.values[~covered & (generator.random(SHAPE) < 0.1)] = np.nan
     made.observe(image, in_sight(CAMERA, len(vertices)))
     made.hide(hands)

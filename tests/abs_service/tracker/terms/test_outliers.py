@@ -5,8 +5,8 @@ import pytest
 
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.terms.base import Bounds
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
+from calib.noise.images.color import GaussianColor
 from calib.rig import Sensor
 from tests.abs_service.tracker.scenes import CAMERA
 

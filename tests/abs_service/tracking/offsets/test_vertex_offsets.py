@@ -141,12 +141,12 @@ def test_folded_vertices_learn_nothing_from_their_pixels():
     offsets = LearntOffsets(model, SENSOR, NOISE, 0.0)
     offsets.update(None, model.surface, 0)
     model.offset = offset  # still folded
-    before = offsets._precision.copy()
+    before = offsets.variance
     vertices, normals = (part[0].T.astype(float) for part in (model.surface.vertices, model.surface.normals))
     bad = folded(vertices, normals, model.mesh.faces)
     assert bad.any()
     offsets.update(image(1.0), model.surface, FRAME_NS)
-    np.testing.assert_array_equal(offsets._precision > before, ~bad)
+    np.testing.assert_array_equal(offsets.variance < 0.5 * before, ~bad)
 
 
 def test_models_without_offsets_have_fixed_ones():

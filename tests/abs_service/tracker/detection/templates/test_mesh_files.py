@@ -13,7 +13,7 @@ from abs_service.tracker.detection.initial_detection import DetectionError, Init
 from abs_service.tracker.detection.templates import mesh
 from abs_service.tracker.models import nurbs, rigid
 from calib import pose
-from tests.abs_service.tracker.templates.scenes import CAMERA, SIGMA_M, Box, Ellipsoid, Scene
+from tests.abs_service.tracker.detection.templates.scenes import CAMERA, SIGMA_M, Box, Ellipsoid, Scene
 
 AT = Scene(Box(), pose.from_rotation_vector([0.5, 0.6, 0.3], [0.02, 0.01, 0.7]))
 FLAT = Scene(Box((0.15, 0.1, 0.0)), pose.from_rotation_vector([0.1, 0.2, 0.1], [0.0, 0.0, 0.7]))

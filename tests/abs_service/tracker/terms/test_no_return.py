@@ -13,8 +13,8 @@ from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.visibility import classify
 from calib.camera import Camera
 from calib.no_return import NEVER, NoReturn
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
+from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
 from tests.abs_service.tracker.scenes import as_surface, depth_image, plane_distance, sheet, sparse
 
@@ -70,13 +70,14 @@ def test_dense_synthesis_weighs_missing_returns_too():
     rig = Rig("r", {"tof": Sensor("tof", CAMERA, GaussianColor())})
     lost = turned()
     lost[40:80:4, 60:100:4] = np.nan
-    costs = []
+    costs, synthesizer = [], dense.Settings().build(rig, MESH)
     for law in (NoReturn(0.02), NoReturn(0.2)):
         bounds = Bounds(INLIER, UNIFORM, OUTLIER, law)
-        seen = DepthTerm("tof", dense.Settings().build(rig, MESH), len(MESH.vertices), Constant(SIGMA), bounds)
+        seen = DepthTerm("tof", synthesizer, len(MESH.vertices), Constant(SIGMA), bounds)
         seen.observe(depth_image(lost), SURFACE)
         costs.append(seen.cost(SURFACE)[0])
-    inside = np.isfinite(seen._view.render(SURFACE)) & np.isnan(lost)
+    expected = synthesizer.view("tof", np.zeros((len(MESH.vertices), 0), np.float32)).render(SURFACE)
+    inside = np.isfinite(expected) & np.isnan(lost)
     assert costs[0] - costs[1] == pytest.approx(inside.sum() * np.log((0.98 / 0.02) / (0.8 / 0.2)), rel=0.02)
 
 

@@ -7,7 +7,7 @@ from trimesh.visual import ColorVisuals
 
 import abs_service as a
 from calib import pose
-from tests.abs_service.tracker.templates.scenes import CAMERA, NOISE, SIGMA_M, Box, Ellipsoid, Scene, print_of
+from tests.abs_service.tracker.detection.templates.scenes import CAMERA, NOISE, SIGMA_M, Box, Ellipsoid, Scene, print_of
 
 SEEDS = (1, 2, 3)
 FRAMES = 8

@@ -17,7 +17,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import MESH, STATE
 from tests.abs_service.wire.golden.freeze import BINARY
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 
 #: Between two publications [s]. They go on until the reader has seen enough: nobody knows when it has subscribed.

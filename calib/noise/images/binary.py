@@ -45,12 +45,6 @@ class LightBarrier:
 Settings = LightBarrier
 
 
-def log_probability(model: LightBarrier, interrupted: ArrayLike, crossing: ArrayLike) -> NDArray[np.float64]:
-    """Log-probability of readings (boolean), for beams that the object crosses or leaves free (boolean)."""
-    costs = np.array([model.cost(False), model.cost(True)])
-    return -costs[np.asarray(interrupted, int), np.asarray(crossing, int)]
-
-
 def sample(model: LightBarrier, generator: np.random.Generator, crossing: ArrayLike) -> NDArray[np.bool_]:
     """Random reading for every beam that the object crosses or leaves free; True if interrupted."""
     crosses = np.asarray(crossing, np.bool_)

@@ -9,11 +9,11 @@ from abs_service.tracker.mesh import Mesh
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.noise.bayer import GaussianBayer
-from calib.noise.color import GaussianColor
 from calib.noise.constant import Constant
-from calib.noise.grey import GaussianGrey
-from calib.noise.intensity import GaussianIntensity
+from calib.noise.images.bayer import GaussianBayer
+from calib.noise.images.color import GaussianColor
+from calib.noise.images.grey import GaussianGrey
+from calib.noise.images.intensity import GaussianIntensity
 from calib.rig import Noise, Rig, Sensor
 from tests.abs_service.tracker.scenes import depth_image, flat, sheet
 

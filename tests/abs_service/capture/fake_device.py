@@ -1,0 +1,34 @@
+"""A device that does what a test says."""
+
+import threading
+
+from calib import pose
+from calib.camera import Camera
+from drivers.contract.capabilities import Capabilities, StreamInfo
+from drivers.contract.controls import Controls
+from drivers.contract.device import DeviceInfo, DeviceState
+from drivers.contract.frame import Kind
+
+CAMERA = Camera(4, 3, 5.0, 5.0, 1.5, 1.0, T_rs=pose.from_rotation_vector([0.1, 0.2, 0.3], [0.05, 0, 0.01]))
+
+
+class FakeDevice:
+    """Does what it is told."""
+
+    capabilities = Capabilities((StreamInfo("head", "image", Kind.COLOR, "mono8", 4, 3, 30.0),))
+    controls = Controls()
+    gauges: dict[str, float] = {}  # noqa: RUF012
+    state = DeviceState.CLOSED
+
+    def __init__(self, heads=("head", "other"), start=lambda sink: None, serial="1"):
+        self.info = DeviceInfo(f"fake://{serial}", "fake", serial)
+        self.cameras = dict.fromkeys(heads, CAMERA)
+        self.counters = {"frames": 1}
+        self.start = start
+        self.closed = threading.Event()
+
+    def stop(self):
+        pass
+
+    def close(self):
+        self.closed.set()
