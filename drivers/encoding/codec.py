@@ -17,6 +17,7 @@ from google.protobuf.message import DecodeError, Message
 
 from drivers.contract.device import Truth
 from drivers.contract.frame import ENCODINGS, Frame, FrameError, Geometry, Kind, Reference
+from drivers.encoding import raw_image
 
 IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name
 INFO_SCHEMA = FrameInfo.DESCRIPTOR.full_name
@@ -56,10 +57,9 @@ def encode_image(frame: Frame, wall_ns: int) -> bytes:
         height=height,
         encoding=frame.encoding,
         step=width * _bytes_per_pixel(frame.encoding),
-        data=frame.data.tobytes(),
     )
     image.timestamp.FromNanoseconds(wall_ns)
-    return image.SerializeToString()
+    return raw_image.serialize(image, frame.data)
 
 
 def encode_info(frame: Frame, header: Header) -> bytes:
@@ -103,12 +103,12 @@ def encode_info(frame: Frame, header: Header) -> bytes:
 
 
 def decode(image: bytes, info: bytes) -> Frame:
-    """The frame of a serialized foxglove.RawImage and its absmsg.v1.FrameInfo; pixels are not copied.
+    """The frame of a serialized foxglove.RawImage and its absmsg.v1.FrameInfo; its pixels are a view of those bytes.
 
     Raises:
         CodecError: malformed or inconsistent messages.
     """
-    picture, about = _parse(RawImage, image), _parse(FrameInfo, info)
+    (picture, pixels), about = _parse_image(image), _parse(FrameInfo, info)
     name = f"{about.sensor}/{about.stream}"
     if not about.sensor or not about.stream:
         raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
@@ -118,7 +118,7 @@ def decode(image: bytes, info: bytes) -> Frame:
             sensor=about.sensor,
             stream=about.stream,
             kind=_kind(name, about.kind),
-            data=_pixels(name, picture),
+            data=_pixels(name, picture, pixels),
             encoding=picture.encoding,
             t_host_ns=about.header.t_host_ns,
             t_arrival_ns=about.t_arrival_ns,
@@ -187,12 +187,19 @@ def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
         raise CodecError(f"{len(payload)} bytes are no {schema.DESCRIPTOR.full_name}: {error}") from error
 
 
+def _parse_image(payload: bytes) -> tuple[RawImage, memoryview]:
+    try:
+        return raw_image.parse(payload)
+    except DecodeError as error:
+        raise CodecError(f"{len(payload)} bytes are no {IMAGE_SCHEMA}: {error}") from error
+
+
 def _bytes_per_pixel(encoding: str) -> int:
     dtype, channels = ENCODINGS[encoding]
     return dtype.itemsize * channels
 
 
-def _pixels(name: str, image: RawImage) -> np.ndarray:
+def _pixels(name: str, image: RawImage, data: memoryview) -> np.ndarray:
     if image.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {image.encoding!r} is none of {sorted(ENCODINGS)}")
     dtype, channels = ENCODINGS[image.encoding]
@@ -201,13 +208,14 @@ def _pixels(name: str, image: RawImage) -> np.ndarray:
         raise CodecError(
             f"{name}: a row of {image.width} {image.encoding} pixels has {step} bytes, step is {image.step}"
         )
-    if len(image.data) != step * image.height or not image.data:
+    if len(data) != step * image.height or not data:
         raise CodecError(
             f"{name}: {image.width} × {image.height} {image.encoding} needs {step * image.height} bytes (more than 0), "
-            f"has {len(image.data)}"
+            f"has {len(data)}"
         )
     shape = (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
-    return np.frombuffer(image.data, dtype).reshape(shape)
+    # Where they begin is up to the sender; kernels take aligned numbers only.
+    return np.require(np.frombuffer(data, dtype), requirements="A").reshape(shape)
 
 
 def _kind(name: str, value: str) -> Kind:

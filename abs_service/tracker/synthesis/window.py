@@ -1,6 +1,6 @@
 """Window of a camera's image that can contain the object; only its pixels are prepared for a frame."""
 
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ Number = TypeVar("Number", bound=np.generic)
 
 #: Rows and columns of an image.
 Window = tuple[slice, slice]
+
+#: First row, end row (exclusive), first column and end column.
+Limits = tuple[int, int, int, int]
 
 WHOLE: Window = (slice(None), slice(None))
 
@@ -49,8 +52,8 @@ def corner(window: Window) -> tuple[int, int]:
     return window[0].start or 0, window[1].start or 0
 
 
-def limits(window: Window, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """First row, end row (exclusive), first column and end column of a window in an image of a shape."""
+def limits(window: Window, shape: tuple[int, ...]) -> Limits:
+    """Limits of a window in an image of a shape."""
     (top, bottom, _), (left, right, _) = (axis.indices(size) for axis, size in zip(window, shape))
     return top, bottom, left, right
 
@@ -91,17 +94,42 @@ class Bordered:
             self._image = np.empty((height + 2, width + 2, len(self._border)), np.float32)
             self._image[:] = self._border
             self.window = WHOLE
-        for part, value in ((self.window, self._beyond), (window, self._border)):
-            _fill(self._image, *limits(part, shape), value)
+        new = limits(window, shape)
+        for left_over in _without(limits(self.window, shape), new):
+            _fill(self._image, *left_over, self._beyond)
+        _fill(self._image, *new, self._border)
         self.window = window
         return self._image
 
 
-def placed(window: Window, values: NDArray[Number], height: int, width: int) -> NDArray[Number]:
-    """Image (height + 2, width + 2) with a border that contains a window's values; zeros elsewhere."""
-    image = np.zeros((height + 2, width + 2), values.dtype)
-    within(image, window)[:] = values
-    return image
+class Placed(Generic[Number]):
+    """An image with a border that holds a window's values, zeros elsewhere; its memory is reused between frames."""
+
+    def __init__(self, dtype: type[Number]):
+        self._image: NDArray[Number] = np.zeros((0, 0), dtype)
+        self._window = WHOLE
+
+    def put(self, window: Window, values: NDArray[Number], height: int, width: int) -> NDArray[Number]:
+        """The image (height + 2, width + 2) with other values; valid until the next call."""
+        if self._image.shape != (height + 2, width + 2):
+            self._image = np.zeros((height + 2, width + 2), self._image.dtype)
+        within(self._image, self._window)[:] = 0
+        within(self._image, window)[:] = values
+        self._window = window
+        return self._image
+
+
+def _without(old: Limits, new: Limits) -> list[Limits]:
+    """Rectangles that cover one without another."""
+    top, bottom, left, right = old
+    first, last = max(top, new[0]), min(bottom, new[1])
+    parts = [
+        (top, min(bottom, new[0]), left, right),
+        (max(top, new[1]), bottom, left, right),
+        (first, last, left, min(right, new[2])),
+        (first, last, max(left, new[3]), right),
+    ]
+    return [part for part in parts if part[0] < part[1] and part[2] < part[3]]
 
 
 @kernel

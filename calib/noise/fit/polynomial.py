@@ -106,6 +106,8 @@ def evaluate(
     """
     if place.size and not 0 <= place.min() <= place.max() < coefficients.shape[2]:
         raise IndexError(f"places {place.min()} to {place.max()} of {coefficients.shape[2]}")
+    if coefficients.size == 1:  # such as no mean offset: the same everywhere
+        return np.full(np.shape(x), coefficients.item(), np.float64)
     x, a = np.ascontiguousarray(x, np.float64), np.asarray(a, np.float64)
     outer = x.ndim - max(a.ndim, place.ndim)
     one = x.shape[outer:]

@@ -28,7 +28,7 @@ def write_rig(folder: Path, seed: int) -> Path:
     text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
     rig: dict[str, Any] = tomllib.loads(text)
     rig["name"] = NAME
-    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{_free_port()}"
+    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"
     rig["devices"]["sim"]["uri"] = URI.format(seed=seed)
     rig["record"] |= {"enabled": True, "directory": "takes"}
     path = folder / "rig.toml"
@@ -41,7 +41,8 @@ def endpoint_of(rig: Path) -> str:
     return str(tomllib.loads(rig.read_text(encoding="utf-8"))["bus"]["endpoint"])
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """A TCP port that nobody uses."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.synthesis.projection import Projection
+from abs_service.tracker.synthesis.rasterization.zbuffer import extent
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -15,21 +16,40 @@ from calib.jit import kernel
 class Raster:
     """Renders meshes with the same faces into one camera, forward distortion included.
 
-    Corners are projected exactly; between them a triangle is flat in the distorted image.
+    Corners are projected exactly; between them a triangle is flat in the distorted image. Only what lies around the
+    mesh is touched: a large image costs no more than a small one in which the mesh is as large.
     """
 
     def __init__(self, camera: Camera, faces: NDArray[np.int32]):
         self._projection = Projection(camera)
         self._faces = np.ascontiguousarray(faces, np.int32)
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
+        self._nearness = np.zeros(self._ray_length.shape, np.float32)
+        self._distance = np.full(self._ray_length.shape, np.float32(np.inf))
+        self._box = np.s_[0:0, 0:0]
 
     def render(self, vertices: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite off the mesh."""
+        """Radial distances (height, width) [m] of a mesh with vertices (3, n) [m]; infinite off the mesh.
+
+        The image is valid until the next one is rendered.
+        """
         place, inverse_z = self._projection.project(np.ascontiguousarray(vertices[None], np.float32))
-        nearness = np.zeros(self._ray_length.shape, np.float32)
-        _nearest(place[0], inverse_z[0], self._faces, nearness)
+        self._distance[self._box] = np.inf
+        self._nearness[self._box] = 0
+        self._box = self._around(place, inverse_z)
+        _nearest(place[0], inverse_z[0], self._faces, self._nearness)
         with np.errstate(divide="ignore"):
-            return self._ray_length / nearness
+            np.divide(self._ray_length[self._box], self._nearness[self._box], out=self._distance[self._box])
+        return self._distance
+
+    def _around(self, place: NDArray[np.float32], inverse_z: NDArray[np.float32]) -> tuple[slice, slice]:
+        """Rows and columns in which the projected vertices (1, n, 2) lie."""
+        low, high = np.full(2, np.inf), np.full(2, -np.inf)
+        extent(place, inverse_z, low, high)
+        size = np.array(self._ray_length.shape)
+        first = np.clip(np.ceil(low), 0, size).astype(int).tolist()
+        last = np.clip(np.floor(high) + 1, first, size).astype(int).tolist()
+        return np.s_[first[0] : last[0], first[1] : last[1]]
 
 
 @kernel
@@ -45,7 +65,7 @@ def _nearest(
         place: pixel coordinates (n, 2) of the vertices.
         inverse_z: their 1/z (n,), NaN where the camera cannot see them; linear in the image (exactly for a pinhole).
         faces: vertex indices (m, 3).
-        nearness: result, zeros at the start.
+        nearness: result, zeros at the start where the mesh may be.
     """
     height, width = nearness.shape
     for f in range(faces.shape[0]):

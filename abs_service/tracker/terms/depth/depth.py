@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
-from abs_service.tracker.synthesis.window import WHOLE, Bordered, Window, corner, placed, within
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, corner, within
 from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.depth_cost import (
@@ -65,6 +65,7 @@ class DepthTerm:
         beyond = np.array([0, 0, 0, 0, 0, 0, bounds.outlier - bounds.inlier, 0], np.float32)
         self._image = Bordered(np.array([0, 0, 0, 0, 0, 0, bounds.uniform, 0], np.float32), beyond)
         self._texture = np.zeros((0, 8), np.float32)
+        self._images = Placed(np.bool_), Placed(np.bool_), Placed(np.float32)
         self._obscured = np.zeros(0, np.bool_)
         self._doubtful = np.zeros(0, np.bool_)
         self._free_m = np.zeros((0, 0), np.float32)
@@ -89,11 +90,16 @@ class DepthTerm:
         seen = classify(distance, expected, self._view.camera.fx, empty, single)
         doubtful = self._outline.observe(distance, seen, expected, predicted, window)
         self._window, self._distance, self._foreground = window, distance, seen.foreground
-        self._obscured = placed(window, seen.foreground | seen.hole | seen.dropout, height, width).ravel()
-        self._doubtful = placed(window, doubtful, height, width).ravel()
-        self._free_m = placed(window, np.where(doubtful, np.float32(0), seen.free_m), height, width)
+        self._place(seen, doubtful, (height, width))
         self._explain_pixels(texture, seen, doubtful, predicted)
         self._texture = texture.reshape(-1, 8)
+
+    def _place(self, seen: Visibility, doubtful: NDArray[np.bool_], shape: tuple[int, int]) -> None:
+        """Puts what the window shows where samples find it: into images (height + 2, width + 2) of a shape."""
+        obscured, free_m = seen.foreground | seen.hole | seen.dropout, np.where(doubtful, np.float32(0), seen.free_m)
+        self._obscured = self._images[0].put(self._window, obscured, *shape).ravel()
+        self._doubtful = self._images[1].put(self._window, doubtful, *shape).ravel()
+        self._free_m = self._images[2].put(self._window, free_m, *shape)
 
     def _render(self, image: DepthImage, window: Window) -> NDArray[np.float32]:
         """The noise model over a window of an image (height + 2, width + 2, 8)."""

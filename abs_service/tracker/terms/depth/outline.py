@@ -194,7 +194,7 @@ class RimOutline:
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
-        pixels = np.nan_to_num(self._camera.project(points), nan=-1e6)
+        pixels = np.nan_to_num(project_with_slopes(self._camera, points)[0], nan=-1e6)
         place = np.floor(pixels - self._corner + 0.5)
         rows, columns = self._inwards.shape
         near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
@@ -221,7 +221,8 @@ class RimOutline:
     ) -> NDArray[np.bool_]:
         """True for outer vertices (m,) that lie behind the predicted surface (rows, columns) [m]."""
         points = predicted.vertices[0].T[self._rim.outer[which]].astype(np.float64)
-        place = np.floor(np.nan_to_num(self._camera.project(points), nan=-1.0) + 0.5).astype(np.intp)
+        pixels = np.nan_to_num(project_with_slopes(self._camera, points)[0], nan=-1.0)
+        place = np.floor(pixels + 0.5).astype(np.intp)
         column, row = (place - corner(window)[::-1]).T
         inside = (row >= 0) & (row < expected.shape[0]) & (column >= 0) & (column < expected.shape[1])
         hidden = np.zeros(len(which), np.bool_)

@@ -12,7 +12,7 @@ from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.priors.settings import Settings
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.window import WHOLE, Bordered, around, placed
+from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, around
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.depth import DepthTerm
 from abs_service.tracker.terms.depth.outline import RimOutline
@@ -183,11 +183,38 @@ def test_a_bordered_image_is_cleaned_where_the_last_window_was():
     assert image.begin((5, 6), WHOLE).shape == (7, 8, 2)
 
 
-def test_values_of_a_window_are_placed_in_the_image():
-    image = placed((slice(1, 3), slice(0, 2)), np.array([[1, 2], [3, 4]]), 3, 4)
-    expected = np.zeros((5, 6), int)
-    expected[2:4, 1:3] = [[1, 2], [3, 4]]
-    np.testing.assert_array_equal(image, expected)
+@st.composite
+def parts(draw: st.DrawFn, height: int = 6, width: int = 7) -> Window:
+    rows, columns = (sorted((draw(st.integers(0, size)), draw(st.integers(0, size)))) for size in (height, width))
+    return slice(*rows), slice(*columns)
+
+
+@given(st.lists(parts(), min_size=1, max_size=5))
+def test_windows_that_move_leave_nothing_behind(windows):
+    image, placed = Bordered(np.array([1.0], np.float32), np.array([3.0], np.float32)), Placed(np.int64)
+    for number, window in enumerate(windows, 1):
+        seen = image.begin((6, 7), window)
+        expected = np.full((6, 7), 3.0)
+        expected[window] = 1
+        np.testing.assert_array_equal(seen[1:-1, 1:-1, 0], expected)
+        assert (seen[0] == 1).all()
+        seen[1:-1, 1:-1][window] = 9
+        values = np.zeros((6, 7), np.int64)
+        values[window] = number
+        np.testing.assert_array_equal(placed.put(window, values[window], 6, 7), np.pad(values, 1))
+    assert placed.put(WHOLE, np.ones((2, 3), np.int64), 2, 3).sum() == 6
+
+
+@given(st.lists(st.tuples(*[st.floats(-0.5, 0.5)] * 2, st.floats(-0.3, 1.5)), min_size=2, max_size=4))
+def test_a_mesh_that_moves_leaves_no_picture_behind(shifts):
+    raster = Raster(WIDE, MESH.faces)
+    for shift in shifts:
+        vertices = (MESH.vertices + shift).T.astype(np.float32)
+        alone = Raster(WIDE, MESH.faces).render(vertices)
+        np.testing.assert_array_equal(raster.render(vertices), alone)
+        beside = np.isinf(alone)
+        assert not np.isnan(alone).any()
+        assert (alone[~beside] > 0).all()
 
 
 def test_the_motion_prior_reaches_as_far_as_its_deviation_allows():

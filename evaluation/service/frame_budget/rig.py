@@ -1,0 +1,99 @@
+"""A rig of today: its configuration, and a recording of it as its recorder makes one, from the simulated device."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import tomli_w
+from absmsg.v1.common_pb2 import Header
+
+from abs_service.bus import keys
+from abs_service.capture import sensor_metadata
+from calib.camera import Camera
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import Compression, McapFile
+from drivers.simulated.address import parse
+from evaluation.service.live.rig import free_port
+
+#: Name of the rig and of its tracker.
+NAME, TRACKER = "today", "sheet"
+#: Exposures per second.
+RATE_HZ = 30.0
+#: Largest size of an exposure: two depth images and one in colour [bytes].
+EXPOSURE_BYTES = 2 * 2 * 640 * 480 + 3 * 1280 * 720
+#: Beginning of the recorded time, host and wall clock [ns].
+_BEGIN_NS = 1_700_000_000_000_000_000
+
+#: Noise of the depth head: radial distances with amplitudes, and z without.
+NOISES: Mapping[str, Mapping[str, Any]] = {
+    "tof": {
+        "type": "gaussian_polynomial",
+        "sigma": [[1.0425e-2, -2.8187e-6, 3.5261e-10, -1.5195e-14], [5.0e-4, 0.0, 0.0, 0.0]],
+        "amplitudes": [400.0, 10000.0],
+    },
+    "structured_light": {"type": "structured_light", "noise": 1.425e-3, "step": 2.85e-3},
+}
+
+
+def address(head: str, seed: int) -> str:
+    """The simulated device: depth of 640 × 480 and colour of 1280 × 720 pixels."""
+    return f"simulated://sheet?seed={seed}&rate={RATE_HZ:g}&sensors={head},color&{head}=640x480&color=1280x720"
+
+
+def configuration(head: str, uri: str) -> str:
+    """TOML of the demo's tracker with 600 vertices and 6 × 6 control points, on a depth head and a colour camera."""
+    rig: dict[str, Any] = tomllib.loads(
+        resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    )
+    rig["name"] = NAME
+    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"
+    rig["devices"] = {"camera": {"uri": uri}}
+    rig["sensors"] = {
+        head: {"device": "camera", "noise": NOISES[head]},
+        "color": {"device": "camera", "noise": rig["sensors"]["color"]["noise"]},
+    }
+    rig["synchronisation"]["reference"] = f"{head}/depth"
+    tracker = rig["trackers"][TRACKER]
+    tracker["sensors"] = [head, "color"]
+    tracker["model"]["control_points"] = [6, 6]
+    tracker["mesh"]["vertices"] = 600
+    rig["record"] |= {"enabled": True, "directory": "takes"}
+    return tomli_w.dumps(rig)
+
+
+def replayed(take: Path, delay_s: float) -> str:
+    """Address of a recording as a live device."""
+    return f"replay://{quote(str(take))}?delay={delay_s:g}"
+
+
+def write_take(path: Path, head: str, seed: int, exposures: int, progress: Callable[[str], None]) -> Path:
+    """Records exposures of the simulated device, compressed as the recorder does by default."""
+    simulation = parse(address(head, seed)).build()
+    with path.open("wb") as stream:
+        file = McapFile(stream, Compression.LZ4)
+        file.attach("rig.toml", "text/toml", configuration(head, address(head, seed)).encode(), _BEGIN_NS)
+        for name, one in simulation.heads.items():
+            _write_camera(file, name, one.camera)
+        for k in range(exposures):
+            if k % 30 == 0:
+                progress(f"exposure {k} of {exposures}")
+            for frame in simulation.frames(k):
+                _write_frame(file, frame)
+        file.finish()
+    return path
+
+
+def _write_camera(file: McapFile, name: str, camera: Camera) -> None:
+    model = sensor_metadata.sensor_model(Header(rig=NAME), name, camera, {})
+    file.write(f"/{keys.model(name)}", model.DESCRIPTOR.full_name, model.SerializeToString(), _BEGIN_NS, 0)
+
+
+def _write_frame(file: McapFile, frame: Frame) -> None:
+    topic, wall_ns = keys.image(frame.sensor, frame.stream), _BEGIN_NS + frame.t_host_ns
+    info = codec.encode_info(frame, Header(rig=NAME, seq=frame.seq))
+    file.write(f"/{topic}", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+    file.write(f"/{keys.info(topic)}", codec.INFO_SCHEMA, info, wall_ns, frame.seq)
