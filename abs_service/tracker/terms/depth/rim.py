@@ -9,6 +9,7 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Rim:
     """The outermost vertices of a mesh.

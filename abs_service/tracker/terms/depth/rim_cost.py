@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import composed, kernel, prange
-from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.forward import brown_conrady_coefficients as coefficients
-from calib.lenses.forward import distort, distort_fisheye, fisheye_coefficients, without_distortion
+from calib.lenses.forward import distort, lens_parts
 from calib.lenses.lens import LensModel
 
 #: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
@@ -17,9 +16,7 @@ FARTHEST = 8.0
 
 def rim_cost(lens: LensModel) -> Callable[..., None]:
     """Kernel for a lens model; all kernels take the same arguments."""
-    if isinstance(lens, KannalaBrandt):
-        return _rim_cost_fisheye
-    return _rim_cost_pinhole if lens.is_pinhole else _rim_cost
+    return composed(_rim_cost, **lens_parts(lens))
 
 
 @kernel
@@ -80,10 +77,3 @@ def _rim_cost(
         out[k] = 0.5 * total
     if height < 2 or width < 2:
         out[:] = 0.5 * most * outer.size
-
-
-#: `_rim_cost` without distortion, and with the four coefficients of a fisheye.
-_rim_cost_pinhole: Callable[..., None] = composed(_rim_cost, distort=without_distortion)
-_rim_cost_fisheye: Callable[..., None] = composed(
-    _rim_cost, distort=distort_fisheye, coefficients=fisheye_coefficients
-)
