@@ -1,6 +1,7 @@
 """Forward distortion in single precision: kernels for single points and for images of points."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,30 @@ from calib.jit import composed, kernel
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import LensModel
 
-#: Below this radius, in normalised coordinates, fisheye distortion vanishes in single precision.
-_ON_AXIS = 1e-4
+#: Smallest squared radius, in normalised coordinates, by which is divided; below it, a fisheye bends nothing.
+_ON_AXIS = 1e-12
+
+
+@kernel
+def angle_per_radius(square: np.float32) -> np.float32:
+    """Angle from the axis divided by its tangent r, arctan(r) / r, from r².
+
+    With c = cos θ = 1/√(1 + r²) that is c · θ / sin θ, and θ / sin θ is smooth in 1 − c from 0 to 1: its interpolation
+    of degree 9 at Chebyshev nodes errs by 2e-8. With arctangents, synthesis would take more than twice as long.
+    """
+    c = np.float32(1) / np.sqrt(np.float32(1) + square)
+    x = np.float32(1) - c
+    turn = np.float32(0.011162824)
+    turn = turn * x + np.float32(-0.032591689)
+    turn = turn * x + np.float32(0.050975759)
+    turn = turn * x + np.float32(-0.033552998)
+    turn = turn * x + np.float32(0.030059176)
+    turn = turn * x + np.float32(0.020163490)
+    turn = turn * x + np.float32(0.057977802)
+    turn = turn * x + np.float32(0.133266572)
+    turn = turn * x + np.float32(0.333335381)
+    turn = turn * x + np.float32(0.999999990)
+    return c * turn
 
 
 @kernel
@@ -18,12 +41,10 @@ def distort_fisheye(
     x: np.float32, y: np.float32, lens: NDArray[np.float32] | tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
     """Fisheye distortion of ideal normalised coordinates; four coefficients."""
-    one = np.float32(1)
-    radius = np.sqrt(x * x + y * y)
-    theta = np.arctan(radius)
-    t2 = theta * theta
-    bent = theta * (one + t2 * (lens[0] + t2 * (lens[1] + t2 * (lens[2] + t2 * lens[3]))))
-    scale = bent / radius if radius > np.float32(_ON_AXIS) else one
+    square = x * x + y * y
+    bent = angle_per_radius(square)
+    t2 = square * bent * bent
+    scale = bent * (np.float32(1) + t2 * (lens[0] + t2 * (lens[1] + t2 * (lens[2] + t2 * lens[3]))))
     return x * scale, y * scale
 
 
@@ -73,27 +94,36 @@ def undistort_step_fisheye(
     x: np.float32, y: np.float32, right: np.float32, down: np.float32, lens: tuple[np.float32, ...]
 ) -> tuple[np.float32, np.float32]:
     """Undistorted small step at (x, y): the step in ideal coordinates that the fisheye maps to (right, down)."""
-    one = np.float32(1)
-    radius = np.sqrt(x * x + y * y)
-    if not radius > np.float32(_ON_AXIS):
-        return right, down
-    theta = np.arctan(radius)
-    t2 = theta * theta
-    bent = theta * (one + t2 * (lens[0] + t2 * (lens[1] + t2 * (lens[2] + t2 * lens[3]))))
+    one, square = np.float32(1), x * x + y * y
+    bent = angle_per_radius(square)
+    t2 = square * bent * bent
+    scale = bent * (one + t2 * (lens[0] + t2 * (lens[1] + t2 * (lens[2] + t2 * lens[3]))))
     slope = one + t2 * (
         np.float32(3) * lens[0]
         + t2 * (np.float32(5) * lens[1] + t2 * (np.float32(7) * lens[2] + t2 * np.float32(9) * lens[3]))
     )
-    around = radius / bent
-    outward = ((one + radius * radius) / slope - around) * (x * right + y * down) / (radius * radius)
+    # 1 / scale around the axis, (1 + r²) / slope away from it; with one division for both.
+    divisor = max(square, np.float32(_ON_AXIS))
+    share = one / (slope * scale * divisor)
+    outward = ((one + square) * scale - slope) * (x * right + y * down) * share
+    around = slope * divisor * share
     return right * around + x * outward, down * around + y * outward
+
+
+def lens_parts(lens: LensModel) -> dict[str, Callable[..., Any]]:
+    """What `composed` replaces in a kernel for Brown–Conrady lenses, by the kernel's names, for another lens."""
+    if isinstance(lens, KannalaBrandt):
+        return {
+            "distort": distort_fisheye,
+            "coefficients": fisheye_coefficients,
+            "undistort_step": undistort_step_fisheye,
+        }
+    return {"distort": without_distortion} if lens.is_pinhole else {}
 
 
 def projector(lens: LensModel) -> Callable[..., None]:
     """Kernel that maps ideal coordinates (h, w, 2) to pixels in place; its arguments end in matrix and coefficients."""
-    if isinstance(lens, KannalaBrandt):
-        return _to_pixels_fisheye
-    return _to_pixels_pinhole if lens.is_pinhole else _to_pixels
+    return composed(_to_pixels, **lens_parts(lens))
 
 
 #: Reads the coefficients of the lens; `composed` replaces it.
@@ -108,9 +138,3 @@ def _to_pixels(place: NDArray[np.float32], matrix: NDArray[np.float32], lens: ND
             x, y = distort(place[r, c, 0], place[r, c, 1], own_lens)
             place[r, c, 0] = fx * x + cx
             place[r, c, 1] = fy * y + cy
-
-
-_to_pixels_pinhole: Callable[..., None] = composed(_to_pixels, distort=without_distortion)
-_to_pixels_fisheye: Callable[..., None] = composed(
-    _to_pixels, distort=distort_fisheye, coefficients=fisheye_coefficients
-)

@@ -12,6 +12,7 @@ from tests.reference.likelihood import (
     lambert,
     meeting_point,
     picture_deviation,
+    rim_cost,
     stretch_cost,
 )
 from tests.reference.models import (
@@ -52,6 +53,7 @@ __all__ = [
     "picture_deviation",
     "project",
     "rational_basis",
+    "rim_cost",
     "seen_pixel",
     "stretch_cost",
     "surface",

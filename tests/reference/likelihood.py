@@ -7,7 +7,7 @@ from calib.noise.base import DepthNoise
 from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.grey import GaussianGrey
 from calib.noise.images.intensity import GaussianIntensity
-from tests.reference.cameras import distance_at_center, seen_pixel
+from tests.reference.cameras import distance_at_center, project, seen_pixel
 
 #: Noise of one number per pixel.
 ChannelNoise = GaussianGrey | GaussianBayer | GaussianIntensity
@@ -121,4 +121,28 @@ def stretch_cost(rest: np.ndarray, vertices: np.ndarray, edges: np.ndarray, devi
     for i, j in edges:
         before, now = np.linalg.norm(rest[i] - rest[j]), np.linalg.norm(vertices[i] - vertices[j])
         total += 0.5 * ((now / before - 1) / deviation) ** 2
+    return float(total)
+
+
+def rim_cost(  # one argument per symbol
+    camera: Camera,
+    vertices: np.ndarray,
+    outer: np.ndarray,
+    inner: np.ndarray,
+    beyond: np.ndarray,
+    corner: np.ndarray,
+    inwards: np.ndarray,
+    deviation: float,
+    farthest: float,
+) -> float:
+    """½ Σ min(d/σ, farthest)² of the rim, extrapolated from the inner vertices; d is unknown outside the image part."""
+    total = 0.0
+    for end, inside, share in zip(vertices[outer], vertices[inner], beyond):
+        u, v = project(camera, end + share * (end - inside)) - corner
+        square = farthest**2
+        if 0 <= u < inwards.shape[1] - 1 and 0 <= v < inwards.shape[0] - 1:
+            (column, f), (row, g) = (int(u), u % 1), (int(v), v % 1)
+            d = np.array([1 - g, g]) @ inwards[row : row + 2, column : column + 2].astype(float) @ np.array([1 - f, f])
+            square = np.fmin((d / deviation) ** 2, square)
+        total += 0.5 * square
     return float(total)

@@ -1,5 +1,6 @@
 """First-order expansion of the attributes around the vertices, evaluated at pixel centres."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -7,11 +8,11 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import Surface
-from abs_service.tracker.synthesis.centers import at_centers, at_centers_fisheye
+from abs_service.tracker.synthesis.centers import at_centers
 from abs_service.tracker.synthesis.perspective import metres_per_pixel
-from abs_service.tracker.synthesis.projection import optics
+from abs_service.tracker.synthesis.sampling import sampler, stepping_sampler
 from calib.camera import Camera
-from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import LensModel
 from calib.noise.base import ImageNoise
 from calib.rig import Rig
 
@@ -51,26 +52,31 @@ def half_pixel(rig: Rig, mesh: Mesh) -> float:
 class AttributeGradients(Protocol):
     """Gradients of the attributes at the vertices in one camera's image."""
 
+    def sampler(self, lens: LensModel) -> Callable[..., None]:
+        """Kernel that synthesises what `at_centers` needs, see `sampling`."""
+        ...
+
+    def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
+        """Memory for the steps that this kernel writes."""
+        ...
+
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Derivatives to the right and down [1/px] (n, channels, 2), for values (n, channels); NaN where unknown."""
+        """Derivatives to the right and down [1/px] (n, channels, 2), for values (channels, n); NaN where unknown."""
         ...
 
     def look(self, predicted: Surface) -> None:
         """Updates the gradients for the predicted surface, a population of one, of this frame."""
         ...
 
-    def at_centers(
-        self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
-    ) -> NDArray[np.float32]:
-        """Attributes of a population at the centres of the pixels (population, n) into which its vertices project.
+    def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Attributes of a population at the centres of the pixels into which its vertices project.
 
         Args:
-            values: attributes of the vertices (n, channels).
-            surface: the population.
-            pixel: as in `Synthesis`.
+            values: attributes of the vertices (channels, n).
+            steps: as the kernel has written them.
 
         Returns:
-            (population or 1, n, channels).
+            (population or 1, channels, n).
         """
         ...
 
@@ -78,17 +84,23 @@ class AttributeGradients(Protocol):
 class Constant:
     """Attributes that are constant around a vertex, where the gradients are unknown."""
 
+    def sampler(self, lens: LensModel) -> Callable[..., None]:
+        """The kernel without steps."""
+        return sampler(lens)
+
+    def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
+        """None."""
+        return np.empty((2, 0, 0), np.float32)
+
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """NaN (n, channels, 2): an unknown gradient is not a gradient of zero."""
-        return np.full((*values.shape, 2), np.nan, np.float32)
+        return np.full((*values.T.shape, 2), np.nan, np.float32)
 
     def look(self, predicted: Surface) -> None:
         """No effect: the values do not depend on the pose of the surface."""
 
-    def at_centers(
-        self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
-    ) -> NDArray[np.float32]:
-        """The values themselves (1, n, channels)."""
+    def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
+        """The values themselves (1, channels, n)."""
         return values[None]
 
 
@@ -108,11 +120,18 @@ class FirstOrder:
         change = np.stack([steps[0] - steps[1], steps[2] - steps[3]], axis=-1)
         self._per_metre = np.nan_to_num(change / (2 * step_m))
         self._per_pixel = np.zeros(change.shape, np.float32)
+        self._planes = np.zeros((*change.shape[1:], len(change)), np.float32)
         self._camera = camera
         self._edges = mesh.edges
         self._lengths = _along(mesh, self._edges)
-        self._optics = *optics(camera), camera.width + 2
-        self._is_fisheye = isinstance(camera.lens, KannalaBrandt)
+
+    def sampler(self, lens: LensModel) -> Callable[..., None]:
+        """The kernel with steps."""
+        return stepping_sampler(lens)
+
+    def steps(self, population: int, vertices: int) -> NDArray[np.float32]:
+        """Memory (2, population, n)."""
+        return np.empty((2, population, vertices), np.float32)
 
     def per_pixel(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Gradients of the last call of `look`; 0 at vertices whose surroundings were not visible."""
@@ -125,14 +144,12 @@ class FirstOrder:
         """
         flat = metres_per_pixel(self._camera, predicted.vertices[0].T, self._edges, self._lengths)
         self._per_pixel = np.ascontiguousarray(self._per_metre @ flat, np.float32)
+        self._planes = np.ascontiguousarray(self._per_pixel.transpose(1, 2, 0))
 
-    def at_centers(
-        self, values: NDArray[np.float32], surface: Surface, pixel: NDArray[np.int32]
-    ) -> NDArray[np.float32]:
-        """Value + gradient · (centre of the pixel − projection of the vertex) (population, n, channels)."""
-        result = np.empty((*pixel.shape, values.shape[1]), np.float32)
-        to_centers = at_centers_fisheye if self._is_fisheye else at_centers
-        to_centers(surface.vertices, pixel, *self._optics, values, self._per_pixel, result)
+    def at_centers(self, values: NDArray[np.float32], steps: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Value + gradient · (centre of the pixel − projection of the vertex) (population, channels, n)."""
+        result = np.empty((steps.shape[1], *values.shape), np.float32)
+        at_centers(steps, values, self._planes, result)
         return result
 
 

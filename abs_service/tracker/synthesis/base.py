@@ -23,7 +23,7 @@ class Synthesis:
             there is no sample, which contributes zero cost.
         distance: radial distance from the camera centre (population, m) [m], eq. 11, to the intersection of the line of
             sight through the pixel's centre (which was measured) with the tangent plane; in the border, to the sample.
-        attributes: attributes of the surface there, such as colour, (population or 1, m, channels).
+        attributes: attributes of the surface there, such as colour, (population or 1, channels, m).
     """
 
     pixel: NDArray[np.int32]

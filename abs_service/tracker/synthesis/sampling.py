@@ -6,16 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.jit import composed, kernel, prange
-from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.forward import brown_conrady_coefficients as coefficients
-from calib.lenses.forward import (
-    distort,
-    distort_fisheye,
-    fisheye_coefficients,
-    undistort_step,
-    undistort_step_fisheye,
-    without_distortion,
-)
+from calib.lenses.forward import distort, lens_parts, undistort_step
 from calib.lenses.lens import LensModel
 
 #: Smallest cosine of incidence at which the distance is extrapolated along the tangent plane to the pixel's centre.
@@ -23,19 +15,24 @@ LEAST_COSINE = 0.2
 
 
 def sampler(lens: LensModel) -> Callable[..., None]:
-    """Kernel for a lens model; all kernels take the same arguments."""
-    return (_sample_pinhole, _sample, _sample_fisheye)[lens_kind(lens)]
+    """Kernel for a lens model; all kernels take the same arguments, and this one writes no steps."""
+    return composed(_sample, **lens_parts(lens))
 
 
-#: Kernel that a lens requires.
-PINHOLE, DISTORTED, FISHEYE = range(3)
+def stepping_sampler(lens: LensModel) -> Callable[..., None]:
+    """The kernel that also writes the steps from the vertices to the centres of their pixels."""
+    return composed(_sample, write_step=_write_step, **lens_parts(lens))
 
 
-def lens_kind(lens: LensModel) -> int:
-    """`PINHOLE`, `DISTORTED` or `FISHEYE`."""
-    if isinstance(lens, KannalaBrandt):
-        return FISHEYE
-    return PINHOLE if lens.is_pinhole else DISTORTED
+@kernel
+def write_step(steps: NDArray[np.float32], k: int, v: int, right: np.float32, down: np.float32) -> None:
+    """Writes nothing, for depth; `composed` replaces it for pictures."""
+
+
+@kernel
+def _write_step(steps: NDArray[np.float32], k: int, v: int, right: np.float32, down: np.float32) -> None:
+    """Writes the step of vertex v of candidate k."""
+    steps[0, k, v], steps[1, k, v] = right, down
 
 
 @kernel
@@ -51,10 +48,12 @@ def _sample(
     width: int,
     pixel: NDArray[np.int32],
     distance: NDArray[np.float32],
+    steps: NDArray[np.float32],
 ) -> None:
     """Eqs. 10, 11 and 20 for a population; as in `SparseView` and `Synthesis`, pose (3, 4) = T_sr, limit of r².
 
     A pixel's line of sight d, which differs from the vertex's by Δ, meets the tangent plane at z (1 − n · Δ / (n · d)).
+    The steps (2, population, n) from a vertex to the centre of its pixel, right and down [px], are 0 where it has none.
     """
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
@@ -82,17 +81,11 @@ def _sample(
             seen = facing and z > np.float32(1e-6) and r2 < farthest and inside
             place = (np.int32(row) + 1) * stride + np.int32(column) + 1 if seen else 0
             pixel[k, v] = -1 if hidden[v] else place
-            right = (np.float32(np.int32(column)) + half - column) * per_fx if seen else zero
-            down = (np.float32(np.int32(row)) + half - row) * per_fy if seen else zero
-            right, down = undistort_step(u, w, right, down, own_lens)
+            right = np.float32(np.int32(column)) + half - column if seen else zero
+            down = np.float32(np.int32(row)) + half - row if seen else zero
+            write_step(steps, k, v, right, down)
+            right, down = undistort_step(u, w, right * per_fx, down * per_fy, own_lens)
             u, w = u + right, w + down
             length = np.sqrt(u * u + w * w + one)
             along = min(nx * u + ny * w + nz, flattest * length)
             distance[k, v] = abs(z) * length * (one - (nx * right + ny * down) / along)
-
-
-#: `_sample` without distortion, and with the four coefficients of a fisheye, which distorts small steps noticeably.
-_sample_pinhole: Callable[..., None] = composed(_sample, distort=without_distortion)
-_sample_fisheye: Callable[..., None] = composed(
-    _sample, distort=distort_fisheye, coefficients=fisheye_coefficients, undistort_step=undistort_step_fisheye
-)

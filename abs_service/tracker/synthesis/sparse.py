@@ -18,7 +18,6 @@ from abs_service.tracker.synthesis.attribute_gradients import (
 from abs_service.tracker.synthesis.base import Synthesis, View
 from abs_service.tracker.synthesis.projection import Projection, optics
 from abs_service.tracker.synthesis.rasterization.raster import Raster
-from abs_service.tracker.synthesis.sampling import sampler
 from abs_service.tracker.synthesis.window import Window, around
 from calib.camera import Camera
 from calib.rig import Rig
@@ -94,12 +93,12 @@ class SparseView:
     ):
         self.camera = camera
         self._raster = Raster(camera, faces)
-        self._attributes = np.ascontiguousarray(attributes, np.float32)
+        self._attributes = np.ascontiguousarray(attributes.T, np.float32)
         self._gradients = gradients
         self._hidden = np.zeros(len(attributes), np.bool_)
         self._rendered: tuple[Surface | None, NDArray[np.float32]] = (None, np.zeros((0, 0), np.float32))
         self._optics = *optics(camera), camera.field_radius**2, camera.height, camera.width
-        self._sample = sampler(camera.lens)
+        self._sample = gradients.sampler(camera.lens)
 
     def look(self, predicted: Surface) -> None:
         """Marks the vertices that face away or are self-occluded in the predicted mesh."""
@@ -119,8 +118,9 @@ class SparseView:
         population, _, n = surface.vertices.shape
         pixel = np.empty((population, n), np.int32)
         distance = np.empty((population, n), np.float32)
-        self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance)
-        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, surface, pixel))
+        steps = self._gradients.steps(population, n)
+        self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
+        return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients for the predicted surface, see `look`."""

@@ -142,7 +142,7 @@ class _SharedView:
     def __init__(self, projection: _Projection, attributes: NDArray[np.float32]):
         self.camera = projection.view.camera
         self._projection = projection
-        self._attributes = np.ascontiguousarray(attributes, np.float32)[None]
+        self._attributes = np.ascontiguousarray(attributes.T, np.float32)[None]
 
     def look(self, predicted: Surface) -> None:
         """Determines the occluded vertices of this frame, the same for all sensors."""
@@ -155,7 +155,7 @@ class _SharedView:
 
     def slopes(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
-        return np.full((*self._attributes.shape[1:], 2), np.nan, np.float32)
+        return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
 
     def spread(self, surface: Surface, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """The values themselves: the samples are the vertices."""

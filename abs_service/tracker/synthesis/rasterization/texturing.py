@@ -39,9 +39,10 @@ def paint(values: NDArray[np.float32], detail: int, samples: Samples) -> NDArray
         samples: of a population.
 
     Returns:
-        (population, m, channels), linear within the sub-triangles between the lattice points.
+        (population, channels, m), linear within the sub-triangles between the lattice points.
     """
-    result = np.empty((*samples.pixel.shape, values.shape[1]), np.float32)
+    population, m = samples.pixel.shape
+    result = np.empty((population, values.shape[1], m), np.float32)
     _paint(values, detail, samples.face, samples.weights, result)
     return result
 
@@ -90,4 +91,4 @@ def _paint(
             at_first = one - at_second - at_third
             for channel in range(values.shape[1]):
                 total = at_first * values[first, channel] + at_second * values[second, channel]
-                result[k, s, channel] = total + at_third * values[third, channel]
+                result[k, channel, s] = total + at_third * values[third, channel]

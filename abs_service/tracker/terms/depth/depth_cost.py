@@ -13,7 +13,7 @@ from calib.noise.base import WINDOW_M
 FREE_SCALE_M = 0.01
 
 #: Texels are gathered so many at a time, and then compared all at once.
-_TILE = 32
+_TILE = 64
 
 
 def missing_cost(law: NoReturn, predicted: Surface, center: NDArray[np.float64], most: float) -> NDArray[np.float32]:

@@ -16,8 +16,9 @@ from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import FARTHEST, Rim, chain, locate, outline_cost
+from abs_service.tracker.terms.depth.rim import Rim, chain, locate
 from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
+from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import Visibility
 from abs_service.tracker.terms.linearization import Linearization
 from calib.camera import Camera
@@ -122,6 +123,7 @@ class RimOutline:
         self.classes = np.full(len(rim.outer), RimClass.FREE, np.uint8)
         self._camera = camera
         self._projection = Projection(camera)
+        self._rim_cost = rim_cost(camera.lens)
         self._rim = rim
         self._deviation = deviation
         self._inwards = np.zeros((0, 0), np.float32)
@@ -157,7 +159,8 @@ class RimOutline:
     def cost(self, surface: Surface) -> NDArray[np.float64]:
         """Cost (population,) of every deformed mesh."""
         out = np.empty(len(surface.vertices))
-        outline_cost(surface.vertices, self._deviation, *self._arguments, out)
+        _, *optics = self._projection.arguments
+        self._rim_cost(surface.vertices, self._deviation, *self._ends, *optics, self._corner, self._inwards, out)
         return out
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:

@@ -9,9 +9,6 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.synthesis.projection import project
 from calib.jit import kernel
 
-#: Bound of the normalised distance from the outline: beyond it, the outline may belong to something else.
-FARTHEST = 8.0
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rim:
@@ -133,39 +130,3 @@ def locate(
         for i in range(2):
             places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
     look_up(inwards, places[0], values, slopes)
-
-
-@kernel
-def outline_cost(
-    vertices: NDArray[np.float32],
-    deviation: float,
-    outer: NDArray[np.intp],
-    inner: NDArray[np.intp],
-    beyond: NDArray[np.float32],
-    is_fisheye: bool,
-    pose: NDArray[np.float32],
-    matrix: NDArray[np.float32],
-    lens: NDArray[np.float32],
-    limit: float,
-    corner: NDArray[np.float32],
-    inwards: NDArray[np.float32],
-    out: NDArray[np.float64],
-) -> None:
-    """Half the sum of squared, bounded distances of the rim from the outline in units of σ, for a population.
-
-    Args:
-        vertices: (population, 3, n) [m].
-        deviation: σ [px].
-        outer, inner, beyond, is_fisheye, pose, matrix, lens, limit, corner, inwards: as in `locate`.
-        out: costs (population,) [nats].
-    """
-    k = outer.size
-    camera = is_fisheye, pose, matrix, lens, limit
-    points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
-    for member in range(vertices.shape[0]):
-        own = vertices[member : member + 1]
-        locate(own, outer, inner, beyond, *camera, corner, inwards, points, values, slopes)
-        total = 0.0
-        for v in range(k):
-            total += min((values[v] / deviation) ** 2, FARTHEST**2)
-        out[member] = 0.5 * total

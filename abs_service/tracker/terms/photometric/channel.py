@@ -125,7 +125,7 @@ class ChannelTerm:
         """Agreement of the sensor with a population of one."""
         residual = self._residuals(surface)[0]
         seen = self._view.synthesize(surface)
-        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=1)
+        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, VALUE])
         mean = -float(self.cost(surface)[0]) / len(residual)
         return summarize(
@@ -145,8 +145,8 @@ class ChannelTerm:
         seen = self._view.synthesize(surface)
         channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
         own = self._view.slopes(surface)[np.arange(len(channel)), channel]
-        slopes = self._illumination.shine(replace(seen, attributes=own[None]), surface, self._view).attributes[0]
-        slopes, unknown = slopes.astype(np.float64), np.isnan(own).any(axis=1)
+        shining = self._illumination.shine(replace(seen, attributes=own.T[None]), surface, self._view)
+        slopes, unknown = shining.attributes[0].T.astype(np.float64), np.isnan(own).any(axis=1)
         samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
         slopes[unknown] = channel_slopes(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples)
         return slopes
@@ -160,6 +160,6 @@ class ChannelTerm:
         # One widening may stand for all samples, or for all channels.
         of = each % len(widening.factor), channel % widening.factor.shape[1]
         inverse = texels[:, INVERSE] / widening.factor[of]
-        residual = (texels[:, VALUE] - seen.attributes[0][each, channel]) * inverse
+        residual = (texels[:, VALUE] - seen.attributes[0][channel, each]) * inverse
         measured = (seen.pixel[0] > 0) & np.isfinite(residual)
         return np.where(measured, residual, np.inf), inverse, texels[:, NORMALIZER] + widening.log[of]

@@ -82,7 +82,7 @@ def channel_cost(
             texel = texture[np.uintp(max(i, 0))]
             channel = np.uintp(np.int32(texel[1]))
             row, column = (v if samples > 1 else np.uintp(0)), (channel if channels > 1 else np.uintp(0))
-            e = (texel[0] - expected[v, channel]) * texel[2] / factor[row, column]
+            e = (texel[0] - expected[channel, v]) * texel[2] / factor[row, column]
             normalizer = texel[3] + log_factor[row, column]
             explained = min(half * e * e + normalizer, most)
             cost = half + normalizer if abs(e) > farthest else explained

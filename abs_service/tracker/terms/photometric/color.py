@@ -106,7 +106,7 @@ class ColorTerm:
         """Agreement of the sensor with a population of one."""
         residual, measured = self._residuals(surface)
         seen = self._view.synthesize(surface)
-        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=1)
+        pixel, known = seen.pixel[0], np.isfinite(seen.attributes[0]).all(axis=0)
         hidden = ((pixel < 0) & facing(self._view, surface)) | np.isinf(self._texture[pixel, 0])
         mean = -float(self.cost(surface)[0]) / len(residual)
         size = np.sqrt(np.mean(residual**2, axis=1))
@@ -119,7 +119,7 @@ class ColorTerm:
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""
         seen = self._view.synthesize(surface)
-        colors = seen.attributes[0].astype(np.float64)
+        colors = seen.attributes[0].T.astype(np.float64)
         residual = (self._texture[seen.pixel[0]] - colors) * self._inverse
         measured = (seen.pixel[0] > 0) & np.all(np.isfinite(residual), axis=1)
         return np.where(np.reshape(measured, (-1, 1)), residual, np.inf), np.asarray(measured)
@@ -148,11 +148,11 @@ def _color_cost(
         total, pixels, expected = 0.0, pixel[k], colors[np.intp(k) % colors.shape[0]]
         for v in range(np.uintp(pixels.size)):
             i = pixels[v]
-            measured, color = texture[np.uintp(max(i, 0))], expected[v]
+            measured = texture[np.uintp(max(i, 0))]
             row = np.uintp(0) if shared else v
-            red = (measured[0] - color[0]) * inverse[row, 0]
-            green = (measured[1] - color[1]) * inverse[row, 1]
-            blue = (measured[2] - color[2]) * inverse[row, 2]
+            red = (measured[0] - expected[0, v]) * inverse[row, 0]
+            green = (measured[1] - expected[1, v]) * inverse[row, 1]
+            blue = (measured[2] - expected[2, v]) * inverse[row, 2]
             square = red * red + green * green + blue * blue
             explained = min(normalizer[row] + half * square, most)
             cost = average + normalizer[row] if square > farthest else explained

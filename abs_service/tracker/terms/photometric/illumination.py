@@ -40,7 +40,7 @@ class Active:
     def shine(self, seen: Synthesis, surface: Surface, view: View) -> Synthesis:
         """The synthesis with reflectivities as bright as they look on each member of the population."""
         shade = lambert(surface, self._center)
-        return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[..., None])
+        return replace(seen, attributes=seen.attributes * view.carry(surface, shade)[:, None])
 
 
 def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -68,7 +68,7 @@ def test_a_linear_texture_is_synthesised_exactly_at_the_centres_of_pixels(turn, 
     points = CAMERA.center + rays * ((origin - CAMERA.center) @ normal / (rays @ normal))[:, None]
     expected = (points - motion[:3, 3]) @ motion[:3, :3] @ LINEAR.T
     level = canvas_values(mesh)[: len(mesh.vertices)][visible]
-    error = np.abs(seen.attributes[0][visible] - expected)
+    error = np.abs(seen.attributes[0].T[visible] - expected)
     assert visible.any()
     # Remaining error: perspective and lens are not linear over an edge of 25 mm. A pixel changes the texture by 2.7.
     assert error.max() < 0.15
@@ -87,7 +87,7 @@ def test_the_kernels_are_their_equation(seed, camera):
     seen = view.synthesize(surface)
     per_pixel, at_vertices = view.slopes(surface), canvas_values(mesh)
     for k, attributes in enumerate(seen.attributes):
-        for v, found in enumerate(attributes):
+        for v, found in enumerate(attributes.T):
             expected = at_vertices[v].astype(float)
             if seen.pixel[k, v] > 0:
                 row, column = divmod(int(seen.pixel[k, v]), camera.width + 2)
@@ -104,7 +104,7 @@ def test_what_is_unknown_beside_a_vertex_leaves_it_level_and_an_edge_on_view_doe
     half_turn = pose.from_rotation_vector([0, np.pi / 2 - 0.01, 0], [0.0, 0, 0])
     around = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
     gradients.look(moved(mesh, around @ half_turn @ np.linalg.inv(around)))
-    per_pixel = gradients.per_pixel(values[:n])
+    per_pixel = gradients.per_pixel(values[:n].T)
     assert np.isfinite(per_pixel).all()
     assert np.abs(per_pixel).max() < 20 * np.abs(LINEAR).max() / CAMERA.fx
 
@@ -126,5 +126,5 @@ def test_attributes_of_the_vertices_alone_are_level():
     rig = Rig("r", {"color": Sensor("color", CAMERA, GaussianColor())})
     surface = as_surface((mesh.vertices + 1e-3, mesh.normals), (mesh.vertices, mesh.normals))
     np.testing.assert_array_equal(
-        Sparse(rig, mesh).view("color", mesh.colors).synthesize(surface).attributes[0], mesh.colors
+        Sparse(rig, mesh).view("color", mesh.colors).synthesize(surface).attributes[0].T, mesh.colors
     )

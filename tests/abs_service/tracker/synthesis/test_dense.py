@@ -139,7 +139,7 @@ def test_a_population_is_its_members_one_by_one():
         assert np.array_equal(together.pixel[k, :count], alone.pixel[0])
         assert np.all(together.pixel[k, count:] == -1)
         np.testing.assert_allclose(together.distance[k, :count], alone.distance[0])
-        np.testing.assert_allclose(together.attributes[k, :count], alone.attributes[0])
+        np.testing.assert_allclose(together.attributes[k, :, :count], alone.attributes[0])
     assert np.all(together.pixel[2] == -1)  # behind the camera
 
 
@@ -198,7 +198,7 @@ def test_the_appearance_is_that_of_the_material_point():
     """The colours are the coordinates of a point on the sheet at rest, for any pose of the sheet."""
     theta = [0.2, -0.3, 0.1, 0.01, 0, 0.02]
     dense, surface = view(CAMERA), moved(theta)
-    colors = dense.synthesize(surface).attributes[0] / 100
+    colors = dense.synthesize(surface).attributes[0].T / 100
     rest = np.ascontiguousarray(MESH.vertices)
     np.testing.assert_allclose(colors, dense.spread(surface, rest), atol=1e-4)
 
@@ -223,7 +223,7 @@ def test_the_lattice_is_linear_between_its_points(seed, detail):
         assert len(small) == detail**2
         shares = np.array([np.linalg.lstsq(np.vstack([fine.vertices[f].T, np.ones(3)]), [*point, 1])[0] for f in small])
         best = shares.min(axis=1).argmax()  # the sub-triangle that contains the point
-        np.testing.assert_allclose(painted[0, s], shares[best] @ values[small[best]], atol=2e-3)
+        np.testing.assert_allclose(painted[0, :, s], shares[best] @ values[small[best]], atol=2e-3)
 
 
 def test_the_lattice_lies_on_the_mesh_and_faces_the_same_way():

@@ -14,15 +14,20 @@ from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
+from abs_service.tracker.synthesis.projection import optics
 from abs_service.tracker.terms.base import Bounds
 from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import Rim, look_up
 from abs_service.tracker.terms.depth.rim_classes import RimClass
+from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import classify
 from calib.camera import Camera
+from calib.lenses.fisheye import KannalaBrandt
+from calib.lenses.lens import Lens
 from calib.noise.constant import Constant
 from calib.rig import Sensor
+from tests import reference
 from tests.abs_service.tracker.scenes import as_surface, depth_image, flat, sheet, sparse
 
 #: Sees a sheet of 0.3 × 0.2 m at z = 1 m with room around it, its rim between pixels.
@@ -80,6 +85,38 @@ def test_look_up_is_bilinear_interpolation(seed: int):
         look_up(image, places + step, there, ignored)
         same = known & np.all(np.floor(places) == np.floor(places + step), axis=1)
         np.testing.assert_allclose((there - values)[same] / 1e-4, slopes[same, axis], atol=1e-4)
+
+
+@pytest.mark.parametrize("lens", [Lens(), Lens(np.array([-0.2, 0.05])), KannalaBrandt(np.array([0.05, -0.01]))])
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_cost_of_the_rim_is_that_of_its_bounded_distances(lens: Lens, seed: int):
+    """Everywhere in and beside the image, at unknown distances, and behind the camera."""
+    generator, camera = np.random.default_rng(seed), replace(CAMERA, lens=lens)
+    vertices = generator.uniform((-0.3, -0.25, 0.8), (0.3, 0.25, 1.2), (2, 60, 3)).astype(np.float32)
+    vertices[:, ::9, 2] -= 2
+    outer, inner = np.arange(0, 60, 2), np.arange(1, 60, 2)
+    beyond = generator.uniform(0, 0.1, 30).astype(np.float32)
+    inwards = generator.normal(0, 2, (70, 90)).astype(np.float32)
+    inwards[generator.random(inwards.shape) < 0.05] = np.nan
+    corner = np.array([17, 9], np.float32)
+    ends = vertices[:, outer] + beyond[:, None] * (vertices[:, outer] - vertices[:, inner])
+    places = np.array([[reference.project(camera, point) for point in member] for member in ends.astype(float)])
+    undecided = np.any(np.abs(places - np.round(places)) < 1e-3, axis=(0, 2))  # single precision may decide otherwise
+    rim = outer[~undecided], inner[~undecided], beyond[~undecided]
+    expected = [
+        reference.rim_cost(camera, member.astype(float), *rim, corner, inwards, 0.5, FARTHEST) for member in vertices
+    ]
+    costs, population = np.empty(2), np.ascontiguousarray(vertices.transpose(0, 2, 1))
+    rim_cost(lens)(population, 0.5, *rim, *optics(camera), camera.field_radius**2, corner, inwards, costs)
+    np.testing.assert_allclose(costs, expected, rtol=1e-4)
+
+
+def test_a_rim_beside_an_image_part_of_one_row_is_far_away():
+    rim, costs = (np.array([0]), np.array([1]), np.zeros(1, np.float32)), np.empty(3)
+    camera = *optics(CAMERA), CAMERA.field_radius**2
+    rim_cost(CAMERA.lens)(np.ones((3, 3, 2), np.float32), 0.5, *rim, *camera, np.zeros(2), np.zeros((1, 5)), costs)
+    assert costs.tolist() == [0.5 * FARTHEST**2] * 3
 
 
 def test_the_outline_is_zero_and_distances_grow_inwards():
