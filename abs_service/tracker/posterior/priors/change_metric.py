@@ -28,46 +28,30 @@ class ChangeMetric:
     def __init__(self, scales: NDArray[np.float64], roughness: NDArray[np.float64]):
         rows = np.concatenate([np.diag(1 / scales), roughness])
         self.matrix = rows.T @ rows
-        self.root = np.asarray(np.linalg.cholesky(self.matrix).T, np.float64)
+        self._lower = np.asarray(np.linalg.cholesky(self.matrix), np.float64)
+        self.root = self._lower.T
         self.inverse = np.asarray(np.linalg.inv(self.matrix), np.float64)
-        row, self._columns = np.nonzero(rows)
-        self._values = rows[row, self._columns]
-        self._starts = np.searchsorted(row, np.arange(len(rows) + 1))
 
     def squares(self, thetas: NDArray[np.float64], center: NDArray[np.float64]) -> NDArray[np.float64]:
         """Squared lengths (population,) [m²] of the changes from center (dim,) to thetas (population, dim)."""
         out = np.empty(len(thetas))
-        _squares(thetas, center, self._starts, self._columns, self._values, out)
+        _squares(thetas, center, self._lower, out)
         return out
 
 
 @kernel
 def _squares(
-    thetas: NDArray[np.float64],
-    center: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    values: NDArray[np.float64],
-    out: NDArray[np.float64],
+    thetas: NDArray[np.float64], center: NDArray[np.float64], lower: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """`_square` for every candidate of a population."""
+    """Squared lengths (population,) of lowerᵀ (Θ − center), with a lower triangular matrix (dim, dim)."""
+    length = np.empty(center.size)
     for k in range(thetas.shape[0]):
-        out[k] = _square(thetas[k], center, starts, columns, values)
-
-
-@kernel
-def _square(
-    theta: NDArray[np.float64],
-    center: NDArray[np.float64],
-    starts: NDArray[np.int64],
-    columns: NDArray[np.int64],
-    values: NDArray[np.float64],
-) -> float:
-    """Squared length of a sparse matrix times Θ − center; its row r has `values` from starts[r] to starts[r + 1]."""
-    total = 0.0
-    for r in range(starts.size - 1):
-        length = 0.0
-        for e in range(starts[r], starts[r + 1]):
-            length += values[e] * (theta[columns[e]] - center[columns[e]])
-        total += length * length
-    return total
+        length[:] = 0.0
+        for d in range(center.size):
+            change = thetas[k, d] - center[d]
+            for e in range(d + 1):  # along a row of memory, one lane for each element
+                length[e] += change * lower[d, e]
+        total = 0.0
+        for e in range(center.size):
+            total += length[e] * length[e]
+        out[k] = total
