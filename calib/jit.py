@@ -11,7 +11,15 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., object])
 
 #: Sums may be reordered for vectorisation; NaN semantics are kept, because NaN marks missing returns.
-_FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
+_FASTMATH = "reassoc", "contract", "arcp", "nsz"
+
+#: Nothing calls a kernel from C.
+_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+#: A kernel that another calls becomes part of its code. A called function would have a copy in every object file, each
+#: optimised by itself, and the linker takes the one that is loaded first: a process that compiles would round
+#: differently from those that load from the cache.
+_CALLED = {"forceinline": True, "no_cpython_wrapper": True}
 
 #: Parallel loop over a population. A kernel divides its iterations among as many threads as the environment sets;
 #: kernels called by another kernel run serially. Serial and parallel code are compiled separately, so that sums may
@@ -60,7 +68,7 @@ class _Kernel:
     def _compiled(self) -> Callable[..., Any]:
         """Numba's dispatcher."""
         if "prange" not in self.function.__code__.co_names or int(os.environ.get(THREADS, "1")) == 1:
-            return self.undivided
+            return self._compile("", {})
         from numba import config, prange  # noqa: PLC0415
 
         # OpenMP is the threading layer that is safe to enter from several threads; its idle workers spin briefly.
@@ -68,19 +76,19 @@ class _Kernel:
         return self._compile("_divided", {"prange": prange}, parallel=True)
 
     @functools.cached_property
-    def undivided(self) -> Callable[..., Any]:
-        """Single-threaded variant, which other kernels may call."""
-        return self._compile("", {})
+    def inlined(self) -> Callable[..., Any]:
+        """Single-threaded variant, which becomes part of the kernels that call it."""
+        return self._compile("_inlined", {}, **_CALLED)
 
-    def _compile(self, suffix: str, replaced: dict[str, Any], *, parallel: bool = False) -> Callable[..., Any]:
+    def _compile(self, suffix: str, replaced: dict[str, Any], **options: bool) -> Callable[..., Any]:
         from numba import njit  # noqa: PLC0415
 
-        called = {name: value.undivided for name, value in self._globals.items() if isinstance(value, _Kernel)}
+        called = {name: value.inlined for name, value in self._globals.items() if isinstance(value, _Kernel)}
         scope = self.function.__globals__ | self._globals | called | replaced
         copy = FunctionType(self.function.__code__, scope, self.function.__name__)
         copy.__module__ = self.function.__module__
         copy.__qualname__ = f"{self.function.__qualname__}_{self.digest}{suffix}"
-        return njit(cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH, parallel=parallel)(copy)
+        return njit(fastmath=set(_FASTMATH), **_OPTIONS, **options)(copy)
 
     @functools.cached_property
     def digest(self) -> str:
@@ -90,7 +98,13 @@ class _Kernel:
         """
         used = ((name, value.digest if isinstance(value, _Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
-        made_of = self.function.__module__, _readable(self.function), values  # cached code imports its modules by name
+        built = _FASTMATH, _OPTIONS, _CALLED
+        made_of = (
+            self.function.__module__,
+            _readable(self.function),
+            values,
+            built,
+        )  # cached code imports its modules by name
         return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 
     @functools.cached_property
