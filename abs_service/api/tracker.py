@@ -22,7 +22,7 @@ from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.session import streams as streams_of
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
 from drivers.contract.frame import FrameSet

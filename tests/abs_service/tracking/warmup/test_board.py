@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from abs_service import config, wiring
-from abs_service.tracking import warmup
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup import board as warmup
+from abs_service.tracking.warmup.board import warm_up
 from calib.noise.pixel_polynomial import PixelPolynomial
 
 #: Tracks real frames after the warm-up and tells which kernels had how many forms before and afterwards.
@@ -21,7 +21,7 @@ from abs_service import config, wiring
 from abs_service.config import plugins
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from drivers.simulated import address
 
 settings = config.load_default()
