@@ -196,7 +196,7 @@ class Tracker:
         self._session.reinitialize()
 
     def warm_up(self) -> None:
-        """Compiles the kernels: up to a minute once per installation, then about a second per process."""
+        """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
         warm_up(wiring.noises(self._settings, self._name), self._plan)
 
     def _track(self, frames: FrameSet) -> Estimate:

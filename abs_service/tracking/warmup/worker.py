@@ -4,20 +4,17 @@ import os
 import pickle
 import signal
 import sys
+from contextlib import suppress
 
 
 def main() -> None:
     """Compiles; answers each request with an error, or with nothing."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, whose end closes the input
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
+    answers = os.dup(sys.stdout.fileno())
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    while True:
-        try:
-            request = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        pickle.dump(_compile(request), answers)
-        answers.flush()
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            os.write(answers, pickle.dumps(_compile(pickle.load(sys.stdin.buffer))))
 
 
 def _compile(request: bytes) -> str:

@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -30,15 +31,20 @@ def half(x):
     return np.float32(0.5) * x
 
 halved = composed(apply, double=half)
+
+@kernel
+def divide(values, out):
+    out[:] = 1 / (values.size - 2)
+    return values.size
 """
 
-#: Prints, for three kernels, results within and afterwards, and from where their code came.
+#: Prints results of kernels within and afterwards, and from where their code came.
 PROGRAM = """
 import json
 import numpy as np
 from abs_service.tracking.warmup.ahead import compiled_ahead
 from calib.jit import kernel
-from kernels import apply, halved
+from kernels import apply, divide, halved
 
 @kernel
 def local(values, out):
@@ -49,7 +55,7 @@ reports = []
 values, results = np.array([1.5, 2.0], np.float32), []
 
 def call():
-    for one in (apply, halved, local):
+    for one in (apply, halved, local, divide):
         out = np.empty(2, np.float32)
         returned = one(values, out)
         results.append([type(returned).__name__, returned, out.tolist()])
@@ -77,9 +83,10 @@ def test_kernels_of_modules_are_compiled_elsewhere_and_others_here(tmp_path: Pat
 
     first, second = run(), run()
     each = [["float", 3.0, [3.0, 4.0]], ["float", 0.75, [0.75, 1.0]], ["int", 2, [4.5, 6.0]]]
+    each.append(["int", 2, 2 * [inf]])  # which Python refuses to compute
     assert first["results"] == second["results"] == 3 * each
-    assert first["total"] == 3
-    assert first["reports"][0].startswith("0 of 3")
+    assert first["total"] == 4
+    assert first["reports"][0].startswith("0 of 4")
     assert first["misses"] == [0, 0, 1]  # a program's own kernels are in no module that another process could import
     assert second["total"] == 0
     assert second["misses"] == [0, 0, 0]
