@@ -35,7 +35,7 @@ simulation = address.parse(table.get("uri", settings.devices["sim"].uri) + table
 exposures = [simulation.expose(k)[0] for k in range(3)]
 
 def forms():
-    return {f.py_func.__module__ + "." + f.py_func.__name__: len(f.signatures) for f in gc.get_objects()
+    return {f.py_func.__module__ + "." + f.py_func.__qualname__: len(f.signatures) for f in gc.get_objects()
              if isinstance(f, Dispatcher) and f.py_func.__module__.startswith("abs_service")}
 
 before = forms()
