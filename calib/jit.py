@@ -3,15 +3,24 @@
 import functools
 import hashlib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from inspect import ismodule
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any, ClassVar, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 #: Sums may be reordered for vectorisation; NaN semantics are kept, because NaN marks missing returns.
-_FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
+_FASTMATH = "reassoc", "contract", "arcp", "nsz"
+
+#: Nothing calls a kernel from C.
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+#: A kernel that another calls becomes part of its code. A called function would have a copy in every object file, each
+#: optimised by itself, and the linker takes the one that is loaded first: a process that compiles would round
+#: differently from those that load from the cache. By itself it is never loaded, so it needs no place in the cache.
+_CALLED: dict[str, Any] = {"forceinline": True, "no_cpython_wrapper": True, "cache": False}
 
 #: Parallel loop over a population. A kernel divides its iterations among as many threads as the environment sets;
 #: kernels called by another kernel run serially. Serial and parallel code are compiled separately, so that sums may
@@ -29,7 +38,7 @@ def kernel(function: Function) -> Function:
     Kernels take contiguous arrays and scalars; divisions follow IEEE rules and do not raise. Numba is imported at the
     first call, because the import takes a second.
     """
-    return cast(Function, _Kernel(function, {}))
+    return cast(Function, Kernel(function, {}))
 
 
 @functools.cache
@@ -42,11 +51,17 @@ def composed(template: Function, **parts: Callable[..., Any] | int) -> Function:
         template: a kernel.
         parts: kernels or constants, keyed by the names of the template's globals.
     """
-    return cast(Function, _Kernel(cast(_Kernel, template).function, parts))
+    return cast(Function, Kernel(cast(Kernel, template).function, parts))
 
 
-class _Kernel:
-    """A function that is compiled at its first call."""
+class Kernel:
+    """A function that is compiled at its first call.
+
+    Attributes:
+        stand_in: makes what takes the calls of kernels that have not been called yet; None for Numba's dispatcher.
+    """
+
+    stand_in: "ClassVar[Callable[[Kernel], Callable[..., Any]] | None]" = None
 
     def __init__(self, function: Callable[..., Any], parts: Mapping[str, Any]):
         functools.update_wrapper(self, function)
@@ -54,33 +69,68 @@ class _Kernel:
         self._parts = parts
 
     def __call__(self, *arguments: Any) -> Any:
+        """Runs the compiled function."""
         return self._compiled(*arguments)
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[object, ...]]:
+        return _found, (self.function.__module__, self.function.__qualname__, dict(self._parts))
 
     @functools.cached_property
     def _compiled(self) -> Callable[..., Any]:
+        if Kernel.stand_in is None or isinstance(self.dispatcher, FunctionType):  # Numba may be switched off
+            return self.dispatcher
+        return Kernel.stand_in(self)
+
+    def forget(self) -> None:
+        """Makes the next call the first one again."""
+        self.__dict__.pop("_compiled", None)
+
+    @functools.cached_property
+    def dispatcher(self) -> Any:
         """Numba's dispatcher."""
         if "prange" not in self.function.__code__.co_names or int(os.environ.get(THREADS, "1")) == 1:
-            return self.undivided
+            return self._compile("", {})
         from numba import config, prange  # noqa: PLC0415
 
         # OpenMP is the threading layer that is safe to enter from several threads; its idle workers spin briefly.
         config.THREADING_LAYER = "omp"  # pyright: ignore[reportAttributeAccessIssue]
         return self._compile("_divided", {"prange": prange}, parallel=True)
 
-    @functools.cached_property
-    def undivided(self) -> Callable[..., Any]:
-        """Single-threaded variant, which other kernels may call."""
-        return self._compile("", {})
+    def types(self, arguments: Sequence[Any]) -> tuple[Any, ...]:
+        """Numba's types of arguments."""
+        return tuple(map(self.dispatcher.typeof_pyval, arguments))
 
-    def _compile(self, suffix: str, replaced: dict[str, Any], *, parallel: bool = False) -> Callable[..., Any]:
+    def load(self, types: tuple[Any, ...]) -> bool:
+        """True if there is compiled code for arguments of these types; loads it if it is in the cache."""
+        if types not in self.dispatcher.overloads:
+            found = self.dispatcher._cache.load_overload(types, self.dispatcher.targetctx)  # noqa: SLF001
+            if found is None:
+                return False
+            self.dispatcher.add_overload(found)
+        return True
+
+    @functools.cached_property
+    def plain(self) -> Callable[..., Any]:
+        """The function as Python runs it, with the plain functions of the kernels that it calls."""
+        called = {name: value.plain for name, value in self._globals.items() if isinstance(value, Kernel)}
+        scope = self.function.__globals__ | self._globals | called
+        return FunctionType(self.function.__code__, scope, self.function.__name__)
+
+    @functools.cached_property
+    def inlined(self) -> Callable[..., Any]:
+        """Single-threaded variant, which becomes part of the kernels that call it."""
+        return self._compile("_inlined", {}, **_CALLED)
+
+    def _compile(self, suffix: str, replaced: dict[str, Any], **options: Any) -> Any:
         from numba import njit  # noqa: PLC0415
 
-        called = {name: value.undivided for name, value in self._globals.items() if isinstance(value, _Kernel)}
+        called = {name: value.inlined for name, value in self._globals.items() if isinstance(value, Kernel)}
         scope = self.function.__globals__ | self._globals | called | replaced
         copy = FunctionType(self.function.__code__, scope, self.function.__name__)
         copy.__module__ = self.function.__module__
         copy.__qualname__ = f"{self.function.__qualname__}_{self.digest}{suffix}"
-        return njit(cache=True, nogil=True, error_model="numpy", fastmath=_FASTMATH, parallel=parallel)(copy)
+        settings: dict[str, Any] = _OPTIONS | {"fastmath": set(_FASTMATH)} | options
+        return njit(**settings)(copy)
 
     @functools.cached_property
     def digest(self) -> str:
@@ -88,9 +138,15 @@ class _Kernel:
 
         Numba's own key covers only the file that contains the function.
         """
-        used = ((name, value.digest if isinstance(value, _Kernel) else value) for name, value in self._globals.items())
+        used = ((name, value.digest if isinstance(value, Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
-        made_of = self.function.__module__, _readable(self.function), values  # cached code imports its modules by name
+        built = _FASTMATH, _OPTIONS, _CALLED
+        made_of = (
+            self.function.__module__,
+            _readable(self.function),
+            values,
+            built,
+        )  # cached code imports its modules by name
         return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 
     @functools.cached_property
@@ -99,6 +155,12 @@ class _Kernel:
         used = set(self.function.__code__.co_names)
         known = self.function.__globals__ | dict(self._parts)
         return {name: value for name, value in known.items() if name in used}
+
+
+def _found(module: str, name: str, parts: Mapping[str, Any]) -> Callable[..., Any]:
+    """The kernel of a module, or a composition with it; how another process finds a kernel."""
+    found = functools.reduce(getattr, name.split("."), import_module(module))
+    return composed(cast(Callable[..., Any], found), **parts) if parts else cast(Callable[..., Any], found)
 
 
 def _readable(function: Callable[..., Any]) -> tuple[object, ...]:

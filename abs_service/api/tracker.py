@@ -22,7 +22,7 @@ from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.session import streams as streams_of
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
 from drivers.contract.frame import FrameSet
@@ -196,7 +196,7 @@ class Tracker:
         self._session.reinitialize()
 
     def warm_up(self) -> None:
-        """Compiles the kernels: up to a minute once per installation, then about a second per process."""
+        """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
         warm_up(wiring.noises(self._settings, self._name), self._plan)
 
     def _track(self, frames: FrameSet) -> Estimate:

@@ -26,7 +26,7 @@ from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, 
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.rig import Noise, Rig
 from drivers.encoding.sensor_model import decode_camera
@@ -120,5 +120,6 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
 
 def _prepare(noises: Mapping[str, Noise], plan: Plan, health: Health) -> None:
     health.label("phase", "preparing")
-    warm_up(noises, plan)
+    warm_up(noises, plan, lambda progress: health.label("kernels", str(progress)))
+    health.label("kernels", "")
     health.label("phase", "waiting")

@@ -79,6 +79,11 @@ class RigState:
         """True if a tracker is compiling its kernels, or loading them from the cache."""
         return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
 
+    def compiled(self) -> str:
+        """How many kernels are compiled, by tracker; "" if none has to be."""
+        labels = {name: self.health(f"track/{name}").labels.get("kernels", "") for name in self.trackers}
+        return "; ".join(f"{name} {label}" for name, label in labels.items() if label)
+
     def missing_topologies(self) -> list[str]:
         """Trackers whose topology was lost and has to be queried."""
         return [name for name, tracker in self.trackers.items() if tracker.lacks_topology]

@@ -103,7 +103,8 @@ class RigView:
     def activity(self) -> str:
         """Current stage of the start; "" once there are estimates, or if nothing is tracked."""
         if self.live.preparing():
-            return "Preparing kernels; the first start compiles them, which takes up to a minute …"
+            compiled = self.live.compiled()
+            return f"Compiling kernels for this rig: {compiled} …" if compiled else "Loading kernels …"
         if "capture" not in self.live.received:
             return "Starting the processes …"
         if any(tracker.last is None for tracker in self.live.trackers.values()):

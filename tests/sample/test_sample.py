@@ -28,6 +28,15 @@ def test_it_is_small_and_complete_and_tells_nothing_about_who_made_it():
 
 
 @pytest.mark.slow
+def test_a_process_that_compiles_the_kernels_finds_the_same_theta_as_one_that_loads_them(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    said = [abs_service("replay", SAMPLE, "--json", "--out", tmp_path / name) for name in ("cold.mcap", "warm.mcap")]
+    cold, warm = ([json.loads(line)["theta"] for line in done.stdout.splitlines()] for done in said)
+    assert len(cold) == len(EXPOSURES)
+    assert cold == warm
+
+
+@pytest.mark.slow
 def test_replay_finds_the_same_deformation_as_when_it_was_made(tmp_path):
     done = abs_service("replay", SAMPLE, "--json", "--out", tmp_path / "again.mcap")
     assert done.returncode == 0, done.stderr

@@ -14,7 +14,7 @@ import trimesh
 from abs_service import cli, config, wiring
 from abs_service.config import plugins
 from abs_service.supervision.exit_codes import Exit
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from calib.noise.constant import Constant
 from calib.noise.per_pixel import PerPixel
 from calib.noise.pixel_polynomial import PixelPolynomial

@@ -166,7 +166,10 @@ def test_troubles_of_components_and_children_that_were_given_up_are_shown(live):
 
 def test_preparation_is_shown_with_a_spinner(live):
     take_health(live, Health(component="track/sheet", labels={"phase": "preparing"}))
-    assert "Preparing kernels; the first start compiles them" in drawn(view(live))
+    assert "Loading kernels" in drawn(view(live))
+    labels = {"phase": "preparing", "kernels": "12 of 31, about 9 s"}
+    take_health(live, Health(component="track/sheet", labels=labels))
+    assert "Compiling kernels for this rig: sheet 12 of 31, about 9 s" in drawn(view(live))
 
 
 def test_before_the_first_message_the_table_shows_the_stage_of_the_start():

@@ -10,7 +10,7 @@ from abs_service.tracker.models import rigid
 from abs_service.tracker.objectives import euclidean
 from abs_service.tracker.optimizers import cma, cma_es, hybrid
 from abs_service.tracking.session import TrackingSession, streams
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from drivers.contract.frame import Frame, Kind
 from drivers.simulated.sensors.view import View
 from tests.abs_service.tracking.driving import CONFIG, Step, default_plan, drive, mean_errors, rig_of, simulate

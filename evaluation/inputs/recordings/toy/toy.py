@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from abs_service import config, wiring
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from drivers.contract.frame import FrameSet, Kind
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder

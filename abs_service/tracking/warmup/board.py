@@ -1,6 +1,6 @@
-"""Compilation of all kernels before the first real frame; later processes load them from the cache."""
+"""Tracking of a synthetic board, so that all kernels are called before the first real frame."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.warmup.ahead import Progress, compiled_ahead, ignore
 from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
@@ -25,19 +26,29 @@ _FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
 _NOISE = GaussianPolynomial(((0.01,),))
 
 
-def warm_up(noises: Mapping[str, Noise], plan: Plan) -> None:
+def warm_up(noises: Mapping[str, Noise], plan: Plan, report: Callable[[Progress], None] = ignore) -> None:
     """Tracks and loses a synthetic flat board with every kind of lens and the parts of the plan.
+
+    Kernels that are not in the cache yet are compiled by several processes; see `compiled_ahead`.
 
     Args:
         noises: noise model of every sensor of the tracker, by name; determines the kind of image.
         plan: settings of the tracker.
+        report: told how many kernels are compiled.
     """
-    for camera in (_CAMERA, _DISTORTED, _FISHEYE):
-        rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
-        frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
-        tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
-        for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
-            tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
+    with compiled_ahead(report) as pool:
+        _track_board(noises, plan, _CAMERA)
+    again = (_CAMERA,) if pool.total else ()
+    for camera in (*again, _DISTORTED, _FISHEYE):
+        _track_board(noises, plan, camera)
+
+
+def _track_board(noises: Mapping[str, Noise], plan: Plan, camera: Camera) -> None:
+    rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
+    frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
+    tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
+    for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
+        tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
 def _sensor(name: str, camera: Camera, noise: Noise) -> Sensor:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from abs_service import config, wiring
-from abs_service.tracking import warmup
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup import board as warmup
+from abs_service.tracking.warmup.board import warm_up
 from calib.noise.pixel_polynomial import PixelPolynomial
 
 #: Tracks real frames after the warm-up and tells which kernels had how many forms before and afterwards.
@@ -21,7 +21,7 @@ from abs_service import config, wiring
 from abs_service.config import plugins
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.pairing.synchroniser import Synchroniser
-from abs_service.tracking.warmup import warm_up
+from abs_service.tracking.warmup.board import warm_up
 from drivers.simulated import address
 
 settings = config.load_default()
@@ -35,7 +35,7 @@ simulation = address.parse(table.get("uri", settings.devices["sim"].uri) + table
 exposures = [simulation.expose(k)[0] for k in range(3)]
 
 def forms():
-    return {f.py_func.__module__ + "." + f.py_func.__name__: len(f.signatures) for f in gc.get_objects()
+    return {f.py_func.__module__ + "." + f.py_func.__qualname__: len(f.signatures) for f in gc.get_objects()
              if isinstance(f, Dispatcher) and f.py_func.__module__.startswith("abs_service")}
 
 before = forms()

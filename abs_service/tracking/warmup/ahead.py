@@ -1,0 +1,106 @@
+"""Kernels are compiled by other processes while this one goes on with their plain Python form.
+
+Which kernels a program needs, and for which types, shows only when it runs, and it cannot run on without their results.
+Python computes these slowly, but at once, so that all kernels are known, and being compiled, within seconds.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from abs_service.tracking.warmup.pool import Pool
+from calib.jit import Kernel
+
+#: Processes beyond this number gain little: the longest kernel alone takes a tenth of the whole.
+MOST_WORKERS = 8
+#: Interval of the reports while the last kernels are waited for [s].
+PERIOD_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Number of kernels that are compiled, of those known to be needed, and the time since the first was [s]."""
+
+    done: int
+    total: int
+    elapsed_s: float
+
+    def __str__(self) -> str:
+        if not self.done:
+            return f"0 of {self.total}"
+        return f"{self.done} of {self.total}, about {self.elapsed_s / self.done * (self.total - self.done):.0f} s"
+
+
+def ignore(progress: Progress) -> None:
+    """For those who do not want to know."""
+
+
+@contextmanager
+def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool]:
+    """Within it, kernels that the cache lacks are run by Python while others compile them; its end waits for all.
+
+    Kernels that have been called before are as they were. What could not be compiled elsewhere, such as a kernel that
+    is not in a module, is compiled at its next call.
+
+    Args:
+        report: told how far it is, in the thread that waits.
+
+    Yields:
+        What compiles; its `total` says how many kernels were missing.
+    """
+    taken: list[Kernel] = []
+
+    def stand_in(kernel: Kernel) -> Callable[..., Any]:
+        taken.append(kernel)
+        return StandIn(kernel, pool)
+
+    workers = min(MOST_WORKERS, len(os.sched_getaffinity(0)))
+    with Pool(workers) as pool:
+        Kernel.stand_in = stand_in
+        try:
+            yield pool
+        finally:
+            Kernel.stand_in = None
+            for kernel in taken:
+                kernel.forget()
+        while not pool.wait(PERIOD_S):
+            report(Progress(pool.done, pool.total, pool.elapsed_s))
+
+
+class StandIn:
+    """Takes the calls of a kernel: the compiled one if it is in the cache, else the plain one.
+
+    Args:
+        kernel: the kernel.
+        pool: compiles it.
+    """
+
+    def __init__(self, kernel: Kernel, pool: Pool):
+        self._kernel = kernel
+        self._pool = pool
+        self._known: dict[tuple[Any, ...], Callable[..., Any]] = {}
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Runs the kernel in one of its forms."""
+        types = self._kernel.types(arguments)
+        if types not in self._known:
+            self._known[types] = self._choose(types)
+        return self._known[types](*arguments)
+
+    def _choose(self, types: tuple[Any, ...]) -> Callable[..., Any]:
+        if self._kernel.load(types):
+            return self._kernel.dispatcher
+        self._pool.submit(self._kernel, types)
+        return self._plain
+
+    def _plain(self, *arguments: Any) -> Any:
+        try:
+            with np.errstate(all="ignore"):
+                result = self._kernel.plain(*arguments)
+        except Exception:  # Python checks more than a kernel does; one that cannot do without machine code waits for it
+            return self._kernel.dispatcher(*arguments)
+        return result.item() if isinstance(result, np.generic) else result  # as Numba returns it
