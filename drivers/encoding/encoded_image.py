@@ -1,0 +1,190 @@
+"""Images in fewer bytes: `absmsg.v1.EncodedImage` without loss, `foxglove.CompressedImage` as JPEG.
+
+The input is untrusted: decoding yields a `foxglove.RawImage` or a `CodecError` that names the problem.
+"""
+
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+from typing import Any
+
+import cv2
+import numpy as np
+from absmsg.v1.encoded_image_pb2 import EncodedImage
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from google.protobuf.timestamp_pb2 import Timestamp
+from numpy.typing import NDArray
+
+from drivers.contract.frame import ENCODINGS
+from drivers.encoding import codec, pixel_filter
+from drivers.encoding.codec import CodecError
+from drivers.encoding.pixel_filter import Filter, PixelFilterError, Predictor
+
+ENCODED_SCHEMA = EncodedImage.DESCRIPTOR.full_name
+JPEG_SCHEMA = CompressedImage.DESCRIPTOR.full_name
+
+#: Full names of the messages that hold an image.
+SCHEMAS = frozenset({codec.IMAGE_SCHEMA, ENCODED_SCHEMA, JPEG_SCHEMA})
+
+#: Quality of JPEG images, of 100.
+QUALITY = 95
+
+#: A larger image is damaged [bytes].
+_LARGEST = 1 << 30
+
+#: From a serialized foxglove.RawImage to the full name of a message and that message.
+ImageEncoder = Callable[[bytes], tuple[str, bytes]]
+
+
+class ImageCodec(StrEnum):
+    """Form of images in a recording."""
+
+    RAW = "raw"
+    LOSSLESS = "lossless"
+    JPEG = "jpeg"
+
+
+def unchanged(image: bytes) -> tuple[str, bytes]:
+    """The image as it was published: an `ImageEncoder`."""
+    return codec.IMAGE_SCHEMA, image
+
+
+def encoder(depth: ImageCodec, color: ImageCodec) -> ImageEncoder:
+    """An encoder that chooses by pixel encoding.
+
+    Args:
+        depth: codec of images with one channel: distances, amplitudes, infra-red.
+        color: codec of colour images and of Bayer mosaics, of which JPEG makes lossless ones.
+    """
+    if depth == color == ImageCodec.RAW:
+        return unchanged
+
+    def encode(image: bytes) -> tuple[str, bytes]:
+        picture = codec.parse(RawImage, image)
+        chosen = color if picture.encoding in ("rgb8", "bgr8") or is_mosaic(picture.encoding) else depth
+        if chosen == ImageCodec.RAW:
+            return codec.IMAGE_SCHEMA, image
+        if chosen == ImageCodec.JPEG and picture.encoding in _JPEG_COLORS:
+            return JPEG_SCHEMA, _jpeg(picture).SerializeToString()
+        return ENCODED_SCHEMA, _lossless(picture).SerializeToString()
+
+    return encode
+
+
+def decode(schema: str, payload: bytes) -> RawImage:
+    """The image of a message of one of `SCHEMAS`.
+
+    Raises:
+        CodecError: malformed or inconsistent message.
+    """
+    if schema == ENCODED_SCHEMA:
+        return _of_lossless(codec.parse(EncodedImage, payload))
+    if schema == JPEG_SCHEMA:
+        return _of_jpeg(codec.parse(CompressedImage, payload))
+    return codec.parse(RawImage, payload)
+
+
+def is_mosaic(encoding: str) -> bool:
+    """True if pixels of this encoding are those of a Bayer mosaic."""
+    return encoding.startswith("bayer_")
+
+
+def _lossless(picture: RawImage) -> EncodedImage:
+    message = EncodedImage(
+        timestamp=_stamp(picture),
+        frame_id=picture.frame_id,
+        width=picture.width,
+        height=picture.height,
+        encoding=picture.encoding,
+        step=picture.step,
+    )
+    try:
+        pixels = codec.pixels(picture.frame_id, picture)
+    except CodecError:
+        # Other programs can publish what we do not understand; it is kept as it is.
+        message.codec, message.data = EncodedImage.CODEC_RAW, picture.data
+        return message
+    chosen, message.data = pixel_filter.encode(pixels, is_mosaic(picture.encoding))
+    message.codec = EncodedImage.CODEC_FILTERED_ZSTD
+    message.predictor = _PREDICTORS[chosen.predictor]
+    message.green_subtracted = chosen.green_subtracted
+    return message
+
+
+def _of_lossless(message: EncodedImage) -> RawImage:
+    return RawImage(
+        timestamp=_stamp(message),
+        frame_id=message.frame_id,
+        width=message.width,
+        height=message.height,
+        encoding=message.encoding,
+        step=message.step,
+        data=_data(message),
+    )
+
+
+def _data(message: EncodedImage) -> bytes:
+    """Pixels of a losslessly encoded image, as in its RawImage."""
+    name = message.frame_id
+    if message.codec == EncodedImage.CODEC_RAW:
+        return message.data
+    if message.codec != EncodedImage.CODEC_FILTERED_ZSTD:
+        raise CodecError(f"{name}: codec {message.codec} is none of {[1, 2]}; a newer version may read it")
+    if message.predictor not in _PREDICTORS.values():
+        raise CodecError(f"{name}: predictor {message.predictor} is none of {sorted(_PREDICTORS.values())}")
+    if message.encoding not in ENCODINGS:
+        raise CodecError(f"{name}: encoding {message.encoding!r} is none of {sorted(ENCODINGS)}")
+    dtype, channels = ENCODINGS[message.encoding]
+    shape = (message.height, message.width) if channels == 1 else (message.height, message.width, channels)
+    if not 0 < message.width * message.height * channels * dtype.itemsize <= _LARGEST:
+        raise CodecError(f"{name}: an image of {message.width} × {message.height} pixels is empty or too large")
+    chosen = Filter(Predictor(message.predictor), message.green_subtracted)
+    try:
+        return pixel_filter.decode(message.data, chosen, shape, dtype, is_mosaic(message.encoding)).tobytes()
+    except PixelFilterError as error:
+        raise CodecError(f"{name}: {error}") from error
+
+
+def _stamp(message: RawImage | EncodedImage | CompressedImage) -> Timestamp | None:
+    return message.timestamp if message.HasField("timestamp") else None
+
+
+def _jpeg(picture: RawImage) -> CompressedImage:
+    pixels = _JPEG_COLORS[picture.encoding](codec.pixels(picture.frame_id, picture))
+    data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    return CompressedImage(timestamp=_stamp(picture), frame_id=picture.frame_id, data=data, format="jpeg")
+
+
+def _of_jpeg(message: CompressedImage) -> RawImage:
+    """A colour image, whatever the order of the channels was."""
+    pixels = cv2.imdecode(np.frombuffer(message.data, "u1"), cv2.IMREAD_COLOR_RGB) if message.data else None
+    if pixels is None:
+        raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {message.format or 'compressed'} image")
+    height, width = pixels.shape[:2]
+    return RawImage(
+        timestamp=_stamp(message),
+        frame_id=message.frame_id,
+        width=width,
+        height=height,
+        encoding="rgb8",
+        step=3 * width,
+        data=pixels.tobytes(),
+    )
+
+
+def _of_rgb(pixels: NDArray[Any]) -> NDArray[Any]:
+    return cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR)
+
+
+#: OpenCV's order of the channels, from the encodings that JPEG can hold.
+_JPEG_COLORS: Mapping[str, Callable[[NDArray[Any]], NDArray[Any]]] = {
+    "rgb8": _of_rgb,
+    "bgr8": lambda pixels: pixels,
+}
+
+_PREDICTORS: Mapping[Predictor, EncodedImage.Predictor] = {
+    Predictor.NONE: EncodedImage.PREDICTOR_NONE,
+    Predictor.LEFT: EncodedImage.PREDICTOR_LEFT,
+    Predictor.ABOVE: EncodedImage.PREDICTOR_ABOVE,
+    Predictor.GRADIENT: EncodedImage.PREDICTOR_GRADIENT,
+}
