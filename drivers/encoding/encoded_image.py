@@ -61,14 +61,21 @@ def encoder(depth: ImageCodec, color: ImageCodec) -> ImageEncoder:
 
     def encode(image: bytes) -> tuple[str, bytes]:
         picture = codec.parse(RawImage, image)
-        chosen = color if picture.encoding in ("rgb8", "bgr8") or is_mosaic(picture.encoding) else depth
+        chosen = codec_of(picture.encoding, depth, color)
         if chosen == ImageCodec.RAW:
             return codec.IMAGE_SCHEMA, image
-        if chosen == ImageCodec.JPEG and picture.encoding in _JPEG_COLORS:
+        if chosen == ImageCodec.JPEG:
             return JPEG_SCHEMA, _jpeg(picture).SerializeToString()
         return ENCODED_SCHEMA, _lossless(picture).SerializeToString()
 
     return encode
+
+
+def codec_of(encoding: str, depth: ImageCodec, color: ImageCodec) -> ImageCodec:
+    """Codec of images of a pixel encoding; arguments as of `encoder`."""
+    if is_mosaic(encoding):
+        return ImageCodec.LOSSLESS if color == ImageCodec.JPEG else color
+    return color if encoding in _JPEG_COLORS else depth
 
 
 def decode(schema: str, payload: bytes) -> RawImage:

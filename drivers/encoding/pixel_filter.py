@@ -15,8 +15,11 @@ import numpy as np
 import zstandard
 from numpy.typing import NDArray
 
-#: Level 1 searches little for repetitions, which noise has none of, and codes every byte by its frequency.
-LEVEL = 1
+#: Bytes are coded by their frequency; repetitions are hardly searched for, because noise has none: a table of 2^8
+#: positions. Compared with level 1, noise-free images take a sixth less time and up to a tenth more bytes.
+_PARAMETERS = zstandard.ZstdCompressionParameters(
+    strategy=zstandard.STRATEGY_FAST, min_match=7, hash_log=8, window_log=19
+)
 #: A filter is chosen by one row band of this share of the image, and every fourth column.
 BAND, COLUMNS = 32, 4
 
@@ -63,7 +66,7 @@ def encode(pixels: NDArray[np.generic], mosaic: bool) -> tuple[Filter, bytes]:
     planes = _split(_as_integers(pixels), mosaic)
     chosen = _choose(planes)
     joined = b"".join(_to_bytes(plane) for plane in _filtered(planes, chosen))
-    return chosen, zstandard.ZstdCompressor(level=LEVEL).compress(joined)
+    return chosen, zstandard.ZstdCompressor(compression_params=_PARAMETERS).compress(joined)
 
 
 def decode(data: bytes, chosen: Filter, shape: tuple[int, ...], dtype: np.dtype, mosaic: bool) -> NDArray[np.generic]:
