@@ -47,7 +47,7 @@ def test_images_are_recorded_in_the_form_that_the_settings_say(tmp_path):
     assert rig.said.counters["refused"] == 1  # pixels that cannot be decoded do not end the recording
     (path,) = recordings(tmp_path)
     images = [m for m in read(path)[0] if m.channel.topic == f"/{DEPTH}"]
-    assert {m.schema.name for m in images} == {"absmsg.v1.EncodedImage"}
+    assert {m.schema and m.schema.name for m in images} == {"absmsg.v1.EncodedImage"}
     decoded = [encoded_image.decode("absmsg.v1.EncodedImage", m.message.data).SerializeToString() for m in images]
     assert decoded == [image for image, _ in published]
 

@@ -20,7 +20,7 @@ def decode_plainly(joined, chosen, shape, size, mosaic):
             difference = int.from_bytes(bytes(stored), "big")
             if size > 1:
                 difference = difference // 2 if difference % 2 == 0 else -(difference + 1) // 2
-            row, column = divmod(number, place.shape[1])
+            row, column = np.unravel_index(number, place.shape)
             place[row, column] = (difference + _predicted(place, row, column, chosen.predictor)) % 256**size
         begin += size * count
     if chosen.green_subtracted:
