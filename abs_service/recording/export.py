@@ -41,7 +41,7 @@ def _copy(reader: McapReader, file: McapFile) -> int:
     for schema, channel, message in reader.iter_messages(log_time_order=False):
         name, payload = schema.name if schema else "", message.data
         if name in encoded_image.SCHEMAS:
-            name, payload = codec.IMAGE_SCHEMA, encoded_image.decode(name, payload).SerializeToString()
+            name, payload = codec.IMAGE_SCHEMA, encoded_image.decode(name, payload)
         file.write(channel.topic, name, payload, message.log_time, message.sequence)
         count += 1
     file.finish()

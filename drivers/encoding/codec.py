@@ -108,12 +108,7 @@ def decode(image: bytes, info: bytes) -> Frame:
     Raises:
         CodecError: malformed or inconsistent messages.
     """
-    return decode_picture(parse(RawImage, image), info)
-
-
-def decode_picture(picture: RawImage, info: bytes) -> Frame:
-    """The frame of an image and its serialized absmsg.v1.FrameInfo; raises as `decode`."""
-    about = parse(FrameInfo, info)
+    picture, about = _parse(RawImage, image), _parse(FrameInfo, info)
     name = f"{about.sensor}/{about.stream}"
     if not about.sensor or not about.stream:
         raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
@@ -123,7 +118,7 @@ def decode_picture(picture: RawImage, info: bytes) -> Frame:
             sensor=about.sensor,
             stream=about.stream,
             kind=_kind(name, about.kind),
-            data=pixels(name, picture),
+            data=_pixels(name, picture),
             encoding=picture.encoding,
             t_host_ns=about.header.t_host_ns,
             t_arrival_ns=about.t_arrival_ns,
@@ -174,7 +169,7 @@ def decode_truth(payload: bytes) -> Truth:
     Raises:
         CodecError: malformed message, or a number of points that differs from the declared one.
     """
-    message = parse(SurfaceTruth, payload)
+    message = _parse(SurfaceTruth, payload)
     expected = message.rows * message.columns * 3 * 4
     if expected == 0 or len(message.points_f32) != expected:
         raise CodecError(
@@ -185,8 +180,7 @@ def decode_truth(payload: bytes) -> Truth:
     return Truth(message.seq, message.header.t_host_ns, points_r, message.surface)
 
 
-def parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
-    """A message from its bytes; raises CodecError if they are none."""
+def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
     try:
         return schema.FromString(payload)
     except DecodeError as error:
@@ -198,12 +192,7 @@ def _bytes_per_pixel(encoding: str) -> int:
     return dtype.itemsize * channels
 
 
-def pixels(name: str, image: RawImage) -> np.ndarray:
-    """Pixels of an image, (height, width) or (height, width, channels), not copied.
-
-    Raises:
-        CodecError: unknown encoding, or another number of bytes than width, height and encoding need.
-    """
+def _pixels(name: str, image: RawImage) -> np.ndarray:
     if image.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {image.encoding!r} is none of {sorted(ENCODINGS)}")
     dtype, channels = ENCODINGS[image.encoding]

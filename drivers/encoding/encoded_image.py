@@ -1,17 +1,19 @@
 """Images in fewer bytes: `absmsg.v1.EncodedImage` without loss, `foxglove.CompressedImage` as JPEG.
 
-The input is untrusted: decoding yields a `foxglove.RawImage` or a `CodecError` that names the problem.
+The input is untrusted: decoding yields bytes of a `foxglove.RawImage` or a `CodecError` that names the problem.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Any
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 from absmsg.v1.encoded_image_pb2 import EncodedImage
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
@@ -34,6 +36,8 @@ _LARGEST = 1 << 30
 
 #: From a serialized foxglove.RawImage to the full name of a message and that message.
 ImageEncoder = Callable[[bytes], tuple[str, bytes]]
+
+_AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
 
 class ImageCodec(StrEnum):
@@ -60,7 +64,7 @@ def encoder(depth: ImageCodec, color: ImageCodec) -> ImageEncoder:
         return unchanged
 
     def encode(image: bytes) -> tuple[str, bytes]:
-        picture = codec.parse(RawImage, image)
+        picture = _parse(RawImage, image)
         chosen = codec_of(picture.encoding, depth, color)
         if chosen == ImageCodec.RAW:
             return codec.IMAGE_SCHEMA, image
@@ -78,17 +82,24 @@ def codec_of(encoding: str, depth: ImageCodec, color: ImageCodec) -> ImageCodec:
     return color if encoding in _JPEG_COLORS else depth
 
 
-def decode(schema: str, payload: bytes) -> RawImage:
-    """The image of a message of one of `SCHEMAS`.
+def decode(schema: str, payload: bytes) -> bytes:
+    """The serialized foxglove.RawImage of a message of one of `SCHEMAS`.
 
     Raises:
         CodecError: malformed or inconsistent message.
     """
     if schema == ENCODED_SCHEMA:
-        return _of_lossless(codec.parse(EncodedImage, payload))
+        return _of_lossless(_parse(EncodedImage, payload)).SerializeToString()
     if schema == JPEG_SCHEMA:
-        return _of_jpeg(codec.parse(CompressedImage, payload))
-    return codec.parse(RawImage, payload)
+        return _of_jpeg(_parse(CompressedImage, payload)).SerializeToString()
+    return payload
+
+
+def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
+    try:
+        return schema.FromString(payload)
+    except DecodeError as error:
+        raise CodecError(f"{len(payload)} bytes are no {schema.DESCRIPTOR.full_name}: {error}") from error
 
 
 def is_mosaic(encoding: str) -> bool:
@@ -105,12 +116,11 @@ def _lossless(picture: RawImage) -> EncodedImage:
         encoding=picture.encoding,
         step=picture.step,
     )
-    try:
-        pixels = codec.pixels(picture.frame_id, picture)
-    except CodecError:
+    if not _is_consistent(picture):
         # Other programs can publish what we do not understand; it is kept as it is.
         message.codec, message.data = EncodedImage.CODEC_RAW, picture.data
         return message
+    pixels = np.frombuffer(picture.data, ENCODINGS[picture.encoding][0]).reshape(_shape(picture))
     chosen, message.data = pixel_filter.encode(pixels, is_mosaic(picture.encoding))
     message.codec = EncodedImage.CODEC_FILTERED_ZSTD
     message.predictor = _PREDICTORS[chosen.predictor]
@@ -141,9 +151,8 @@ def _data(message: EncodedImage) -> bytes:
         raise CodecError(f"{name}: predictor {message.predictor} is none of {sorted(_PREDICTORS.values())}")
     if message.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {message.encoding!r} is none of {sorted(ENCODINGS)}")
-    dtype, channels = ENCODINGS[message.encoding]
-    shape = (message.height, message.width) if channels == 1 else (message.height, message.width, channels)
-    if not 0 < message.width * message.height * channels * dtype.itemsize <= _LARGEST:
+    dtype, shape = ENCODINGS[message.encoding][0], _shape(message)
+    if not 0 < math.prod(shape) * dtype.itemsize <= _LARGEST:
         raise CodecError(f"{name}: an image of {message.width} × {message.height} pixels is empty or too large")
     chosen = Filter(Predictor(message.predictor), message.green_subtracted)
     try:
@@ -156,8 +165,27 @@ def _stamp(message: RawImage | EncodedImage | CompressedImage) -> Timestamp | No
     return message.timestamp if message.HasField("timestamp") else None
 
 
+def _shape(image: RawImage | EncodedImage) -> tuple[int, ...]:
+    """Shape of the pixels, by the image's encoding, which is one of `ENCODINGS`."""
+    channels = ENCODINGS[image.encoding][1]
+    return (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
+
+
+def _is_consistent(picture: RawImage) -> bool:
+    """True if the image holds as many bytes, in rows without padding, as its size and encoding say."""
+    if picture.encoding not in ENCODINGS or not picture.data:
+        return False
+    dtype, channels = ENCODINGS[picture.encoding]
+    step = picture.width * channels * dtype.itemsize
+    return picture.step == step and len(picture.data) == step * picture.height
+
+
 def _jpeg(picture: RawImage) -> CompressedImage:
-    pixels = _JPEG_COLORS[picture.encoding](codec.pixels(picture.frame_id, picture))
+    if not _is_consistent(picture):
+        raise CodecError(
+            f"{picture.frame_id}: {len(picture.data)} bytes are no {picture.width} × {picture.height} pixels"
+        )
+    pixels = _JPEG_COLORS[picture.encoding](np.frombuffer(picture.data, "u1").reshape(_shape(picture)))
     data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
     return CompressedImage(timestamp=_stamp(picture), frame_id=picture.frame_id, data=data, format="jpeg")
 

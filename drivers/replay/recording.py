@@ -76,9 +76,9 @@ class Recording:
                 if partner is None:
                     waiting[key] = topic.schema, message.data
                 elif topic.schema == codec.INFO_SCHEMA:
-                    yield codec.decode_picture(encoded_image.decode(*partner), message.data)
+                    yield codec.decode(encoded_image.decode(*partner), message.data)
                 else:
-                    yield codec.decode_picture(encoded_image.decode(topic.schema, message.data), partner[1])
+                    yield codec.decode(encoded_image.decode(topic.schema, message.data), partner[1])
             except CodecError as error:
                 raise RecordingError(f"{self.path}: {topic.name} at {message.log_time} ns: {error}") from error
         self.unpaired = len(waiting)

@@ -5,6 +5,7 @@ import threading
 
 import pytest
 from absmsg.v1 import frame_info_pb2
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
@@ -48,8 +49,8 @@ def test_images_are_recorded_in_the_form_that_the_settings_say(tmp_path):
     (path,) = recordings(tmp_path)
     images = [m for m in read(path)[0] if m.channel.topic == f"/{DEPTH}"]
     assert {m.schema and m.schema.name for m in images} == {"absmsg.v1.EncodedImage"}
-    decoded = [encoded_image.decode("absmsg.v1.EncodedImage", m.message.data).SerializeToString() for m in images]
-    assert decoded == [image for image, _ in published]
+    decoded = [encoded_image.decode("absmsg.v1.EncodedImage", m.message.data) for m in images]
+    assert list(map(RawImage.FromString, decoded)) == [RawImage.FromString(image) for image, _ in published]
 
 
 def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_every_file(tmp_path):

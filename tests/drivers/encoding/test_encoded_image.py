@@ -28,12 +28,16 @@ def published(encoding: str, height: int = 48, width: int = 64) -> bytes:
     ).SerializeToString()
 
 
+def decoded(schema: str, payload: bytes) -> RawImage:
+    return RawImage.FromString(encoded_image.decode(schema, payload))
+
+
 @given(frames(), st.integers(0, 2**62))
 def test_lossless_images_return_bit_for_bit(frame, wall_ns):
     image = codec.encode_image(frame, wall_ns)
     schema, payload = LOSSLESS(image)
     assert schema == encoded_image.ENCODED_SCHEMA
-    assert encoded_image.decode(schema, payload).SerializeToString() == image
+    assert decoded(schema, payload) == RawImage.FromString(image)
 
 
 def test_smooth_images_take_a_fraction():
@@ -66,7 +70,7 @@ def test_jpeg_keeps_colors_apart(encoding):
     image.timestamp.FromNanoseconds(5)
     schema, payload = JPEG(image.SerializeToString())
     assert CompressedImage.FromString(payload).format == "jpeg"
-    back = encoded_image.decode(schema, payload)
+    back = decoded(schema, payload)
     assert (back.encoding, back.frame_id, back.timestamp, back.step) == ("rgb8", "head", image.timestamp, 96)
     red_first = [200, 100, 20] if encoding == "rgb8" else [20, 100, 200]
     np.testing.assert_allclose(np.frombuffer(back.data, "u1").reshape(16, 32, 3)[8, 16], red_first, atol=3)
@@ -76,12 +80,15 @@ def test_what_other_programs_publish_is_kept():
     image = RawImage(frame_id="x", width=9, height=9, encoding="yuv422", step=1, data=b"abc").SerializeToString()
     schema, payload = LOSSLESS(image)
     assert EncodedImage.FromString(payload).codec == EncodedImage.CODEC_RAW
-    assert encoded_image.decode(schema, payload).SerializeToString() == image
+    assert decoded(schema, payload) == RawImage.FromString(image)
 
 
 def test_bytes_that_are_no_image_are_refused():
     with pytest.raises(CodecError, match=r"are no foxglove\.RawImage"):
         LOSSLESS(b"\xff\xff")
+    torn = RawImage(frame_id="x", width=9, height=9, encoding="rgb8", step=27, data=b"abc").SerializeToString()
+    with pytest.raises(CodecError, match="x: 3 bytes are no 9 × 9 pixels"):
+        JPEG(torn)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +125,7 @@ def test_corrupt_bytes_are_an_image_or_a_codec_error(data):
     for _ in range(data.draw(st.integers(1, 3))):
         message[data.draw(st.integers(0, len(message) - 1))] = data.draw(st.integers(0, 255))
     try:
-        picture = encoded_image.decode(encoded_image.ENCODED_SCHEMA, bytes(message))
+        picture = decoded(encoded_image.ENCODED_SCHEMA, bytes(message))
     except CodecError:
         return
     assert isinstance(picture, RawImage)
