@@ -1,7 +1,7 @@
 """Offline reader of recordings: a deterministic sequence of frames and truths, without a clock or drops."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from absmsg.v1.frame_info_pb2 import FrameInfo
@@ -58,8 +58,11 @@ class Recording:
         self.models = self._read_models()
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
 
-    def frames(self) -> Iterator[Frame | Truth]:
-        """All frames and truths in order of time.
+    def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
+        """Frames and truths in order of time; each is decoded when it is reached.
+
+        Args:
+            streams: (sensor, stream) of the frames, others are not decoded; all if none is named.
 
         Raises:
             RecordingError: a corrupt chunk, or a malformed frame or truth.
@@ -71,7 +74,10 @@ class Recording:
                 if topic.schema == codec.TRUTH_SCHEMA:
                     yield codec.decode_truth(message.data)
                     continue
-                key = (topic.name.rpartition("/")[0], message.log_time, message.sequence)
+                stream = topic.name.rpartition("/")[0]
+                if streams and tuple(stream[1:].split("/")) not in streams:
+                    continue
+                key = (stream, message.log_time, message.sequence)
                 partner = waiting.pop(key, None)
                 if partner is None:
                     waiting[key] = topic.schema, message.data
