@@ -101,7 +101,8 @@ class Recording:
         for stream in streams:
             if stream not in self.streams:
                 raise ArgumentError(f"{self.path} has no stream {stream!r}; it has {', '.join(self.streams)}")
-        return (_image(frame) for frame in self.frames() if not streams or f"{frame.sensor}/{frame.stream}" in streams)
+        wanted = {(sensor, name) for sensor, _, name in (stream.partition("/") for stream in streams)}
+        return (_image(item) for item in self._images.frames(wanted) if isinstance(item, Frame))
 
     def estimates(self, tracker: str = "") -> Iterator[Estimate]:
         """Estimates that were recorded, or that `abs-service replay` wrote, in the order of their times.

@@ -21,7 +21,7 @@ from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.commands.parts import harmless_devices, preview_option, rig_process
+from abs_service.commands.parts import data_rates, harmless_devices, preview_option, rig_process
 from abs_service.commands.parts.harmless_devices import HARMLESS, HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
 from abs_service.config import plugins
@@ -30,6 +30,7 @@ from abs_service.supervision.exit_codes import Exit, is_for_user
 from abs_service.tracker.measurements import measurement
 from calib.rig import Noise
 from drivers import opening
+from drivers.contract.capabilities import StreamInfo
 
 
 class CheckError(Exception):
@@ -73,7 +74,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         CheckError: something that it names does not exist or cannot be made.
     """
     problems: list[str] = []
-    streams: dict[str, list[str]] = {}
+    streams: dict[str, list[StreamInfo]] = {}
     for name in rig.devices:
         with _noting(f"devices.{name}.uri", problems):
             streams |= _streams(rig, name)
@@ -106,6 +107,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         "sensors": {name: _sensor(rig, name, streams) for name in rig.sensors},
         "trackers": {name: _tracker(rig, name) for name in rig.trackers},
         "publishes": [keys.key(rig.name, keys.state(name)) for name in rig.trackers],
+        "images": data_rates.describe({name: streams.get(name, []) for name in rig.sensors}, rig.record),
         "records": str(rig.record.directory) if rig.record.enabled else None,
     }
 
@@ -127,6 +129,7 @@ def text(found: dict[str, Any]) -> str:
         how = f"{tracker['objective']}, {tracker['optimizer']}, paced by {tracker['reference']}"
         lines.append(f"  tracker  {name}: {what}; {how}")
     lines += [f"  publishes {key} …" for key in found["publishes"]]
+    lines.append(f"  {data_rates.text(found['images'])}")
     lines += ["", f"  applications connect to {found['endpoint']}", f"  records to {found['records'] or 'nowhere'}"]
     return "\n".join(lines)
 
@@ -140,7 +143,7 @@ def _draw_previews(rig: config.ServiceConfig, path: Path) -> list[str]:
     return written
 
 
-def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
+def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[StreamInfo]]:
     """Streams of a device by sensor; none if it cannot be opened without touching hardware."""
     uri = rig.devices[name].uri
     scheme = uri.partition(":")[0]
@@ -150,13 +153,13 @@ def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[str]]:
         return {}
     device = opening.open_device(uri, time.monotonic_ns)
     device.close()
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[StreamInfo]] = {}
     for head, sensor in rig.heads(name).items():
         streams = [stream for stream in device.capabilities.streams if stream.sensor == head]
         if not streams:
             heads = {stream.sensor for stream in device.capabilities.streams}
             raise CheckError(f'sensor "{sensor}": no head "{head}", {allowed_instead(head, heads)}')
-        found[sensor] = [f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams]
+        found[sensor] = streams
     return found
 
 
@@ -174,11 +177,11 @@ def _check_controls(rig: config.ServiceConfig, name: str) -> None:
         infos[control].checked(value)
 
 
-def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]) -> None:
+def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[StreamInfo]]) -> None:
     """Refuses noise models of what a device is known not to deliver."""
     for name, noise in noises.items():
         head = name.partition("/")[0]
-        there = {stream.partition(" ")[0] for stream in streams.get(head, [])}
+        there = {info.stream for info in streams.get(head, [])}
         missing = [kind.value for kind in measurement(noise).frames if kind not in there]
         if there and missing:
             raise CheckError(
@@ -186,12 +189,14 @@ def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[str]]
             )
 
 
-def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[str]]) -> dict[str, Any]:
+def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[StreamInfo]]) -> dict[str, Any]:
     sensor = rig.sensors[name]
     noise, texture = (None if part is None else plugins.table(part)["type"] for part in (sensor.noise, sensor.texture))
     return {
         "device": sensor.device,
-        "streams": streams.get(name, []),
+        "streams": [
+            f"{one.stream} {one.width}×{one.height} {one.encoding} {one.rate_hz:g} Hz" for one in streams.get(name, [])
+        ],
         "camera": _camera(rig, name),
         "noise": noise,
         "texture": texture,

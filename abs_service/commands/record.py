@@ -22,6 +22,8 @@ from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
+from drivers.encoding import encoded_image
+from drivers.encoding.encoded_image import ImageCodec
 from drivers.encoding.mcap_file import Compression
 
 #: Time to drain the queue at the end [s].
@@ -82,6 +84,7 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
         directory=table.directory,
         name=rig.name,
         rig_toml=config.to_toml(rig),
+        encode_image=encoded_image.encoder(ImageCodec(table.depth_codec), ImageCodec(table.color_codec)),
         compression=Compression(table.compression),
         chunk_bytes=table.chunk_bytes,
         flush_s=table.flush_s,

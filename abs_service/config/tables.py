@@ -132,7 +132,10 @@ class RecordTable(Table):
     Attributes:
         enabled: `abs-service run` writes recordings.
         directory: folder of the recordings, created if it does not exist.
-        compression: compression of the chunks of the MCAP files.
+        depth_codec: form of images with one channel, such as distances and amplitudes; viewers show `raw` ones only.
+        color_codec: form of colour images and mosaics; viewers show `raw` and `jpeg`, which loses details
+            and is for colour images alone: mosaics are `lossless` then.
+        compression: compression of the chunks of the MCAP files, beyond that of the images.
         chunk_bytes: size of a chunk before compression [bytes].
         flush_s: longest time until a message is on disk, and so the most that a crash can lose [s].
         rotate_bytes: size of a file at which a new one begins [bytes].
@@ -143,6 +146,8 @@ class RecordTable(Table):
 
     enabled: bool = True
     directory: RelativePath = Path("recordings")
+    depth_codec: Literal["raw", "lossless"] = "raw"
+    color_codec: Literal["raw", "lossless", "jpeg"] = "raw"
     compression: Literal["none", "lz4", "zstd"] = "lz4"
     chunk_bytes: Annotated[int, Field(ge=4096, le=1 << 30)] = 1 << 20
     flush_s: Positive = 1.0

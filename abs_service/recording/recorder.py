@@ -1,4 +1,4 @@
-"""Records all messages of a rig unchanged; reports losses and failures in its health."""
+"""Records all messages of a rig, images in fewer bytes; reports losses and failures in its health."""
 
 import shutil
 import threading
@@ -19,6 +19,8 @@ from abs_service.bus.stamps import WallClock
 from abs_service.recording.recording_file import RecordingFile, open_for_writing
 from abs_service.wire import message_header as header
 from abs_service.wire.message_header import MessageHeaderError
+from drivers.encoding.codec import CodecError
+from drivers.encoding.encoded_image import ImageEncoder, unchanged
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFileError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
@@ -35,6 +37,7 @@ class RecorderSettings:
         directory: where the files go; must exist.
         name: beginning of their names.
         rig_toml: effective configuration, attached to every file.
+        encode_image: makes the recorded message of an image.
         compression, chunk_bytes: of the MCAP chunks.
         flush_s: longest time until a message is on disk, and so the most that a crash can lose.
         rotate_bytes, rotate_s: size and age at which a new file begins.
@@ -45,6 +48,7 @@ class RecorderSettings:
     directory: Path
     name: str
     rig_toml: str
+    encode_image: ImageEncoder = unchanged
     compression: Compression = Compression.LZ4
     chunk_bytes: int = CHUNK_SIZE
     flush_s: float = 1.0
@@ -104,9 +108,8 @@ class Recorder:
             "**", lambda sample: self._queue.put(sample.topic, sample, sample.size)
         )
         # Only now, so that nothing falls between the answers and the subscription.
-        self._latched = {
-            sample.topic: sample for sample in self._bus.query("**", QUERY_S) if sample.message in _LATCHED
-        }
+        answers = self._bus.query("**", QUERY_S)
+        self._latched = {sample.topic: sample for sample in answers if sample.message in _LATCHED}
         self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
@@ -169,8 +172,7 @@ class Recorder:
 
     def _fill(self, file: RecordingFile, started_ns: int) -> str:
         settings = self._settings
-        flush_ns = int(settings.flush_s * 1e9)
-        next_flush_ns = started_ns + flush_ns
+        next_flush_ns = started_ns + (flush_ns := int(settings.flush_s * 1e9))
         while True:
             sample = self._queue.take(max(0.0, (next_flush_ns - self._clock.monotonic()) / 1e9))
             if sample is not None:
@@ -196,10 +198,13 @@ class Recorder:
         try:
             about = header.parse(sample)
             stamp_ns = self._stamp_ns(about.stamp_ns, is_repeated)
-            file.write(sample.topic, sample.message, sample.payload, stamp_ns, about.seq)
+            message, payload = sample.message, sample.payload
+            if message == header.IMAGE:
+                message, payload = self._settings.encode_image(payload)
+            file.write(sample.topic, message, payload, stamp_ns, about.seq)
             if keys.is_image(sample.topic) and sample.attachment:
                 file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
-        except (MessageHeaderError, McapFileError) as error:
+        except (MessageHeaderError, CodecError, McapFileError) as error:
             # Other programs can publish below our keys; that must not end the recording.
             self._health.count("refused")
             self._health.label("refused", str(error))

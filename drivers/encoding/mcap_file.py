@@ -7,6 +7,7 @@ from typing import BinaryIO
 from absmsg.v1 import (  # noqa: F401
     deformation_state_pb2,
     deformed_mesh_pb2,
+    encoded_image_pb2,
     frame_info_pb2,
     health_pb2,
     sensor_model_pb2,
@@ -14,7 +15,12 @@ from absmsg.v1 import (  # noqa: F401
 )
 
 # Importing a message module registers its schema in the default descriptor pool, which `write` uses.
-from foxglove_schemas_protobuf import CameraCalibration_pb2, FrameTransforms_pb2, RawImage_pb2  # noqa: F401
+from foxglove_schemas_protobuf import (  # noqa: F401
+    CameraCalibration_pb2,
+    CompressedImage_pb2,
+    FrameTransforms_pb2,
+    RawImage_pb2,
+)
 from google.protobuf import descriptor_pool
 from google.protobuf.descriptor import FileDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorSet

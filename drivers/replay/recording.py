@@ -1,7 +1,7 @@
 """Offline reader of recordings: a deterministic sequence of frames and truths, without a clock or drops."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 
 from absmsg.v1.frame_info_pb2 import FrameInfo
@@ -11,7 +11,7 @@ from google.protobuf.message import DecodeError
 from calib.camera import Camera
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
-from drivers.encoding import codec
+from drivers.encoding import codec, encoded_image
 from drivers.encoding.codec import CodecError
 from drivers.encoding.sensor_model import decode_camera
 from drivers.replay.contents import Contents, RecordingError, scan
@@ -58,28 +58,33 @@ class Recording:
         self.models = self._read_models()
         self.cameras = {sensor: self._camera(model) for sensor, model in self.models.items()}
 
-    def frames(self) -> Iterator[Frame | Truth]:
-        """All frames and truths in order of time.
+    def frames(self, streams: Collection[tuple[str, str]] = ()) -> Iterator[Frame | Truth]:
+        """Frames and truths in order of time; each is decoded when it is reached.
+
+        Args:
+            streams: (sensor, stream) of the frames, others are not decoded; all if none is named.
 
         Raises:
             RecordingError: a corrupt chunk, or a malformed frame or truth.
         """
-        waiting: dict[tuple[str, int, int], bytes] = {}
-        for topic, message in messages(
-            self.path, self._contents, {codec.IMAGE_SCHEMA, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}
-        ):
+        waiting: dict[tuple[str, int, int], tuple[str, bytes]] = {}
+        wanted = {*encoded_image.SCHEMAS, codec.INFO_SCHEMA, codec.TRUTH_SCHEMA}
+        for topic, message in messages(self.path, self._contents, wanted):
             try:
                 if topic.schema == codec.TRUTH_SCHEMA:
                     yield codec.decode_truth(message.data)
                     continue
-                key = (topic.name.rpartition("/")[0], message.log_time, message.sequence)
+                stream = topic.name.rpartition("/")[0]
+                if streams and tuple(stream[1:].split("/")) not in streams:
+                    continue
+                key = (stream, message.log_time, message.sequence)
                 partner = waiting.pop(key, None)
                 if partner is None:
-                    waiting[key] = message.data
-                elif topic.schema == codec.IMAGE_SCHEMA:
-                    yield codec.decode(message.data, partner)
+                    waiting[key] = topic.schema, message.data
+                elif topic.schema == codec.INFO_SCHEMA:
+                    yield codec.decode(encoded_image.decode(*partner), message.data)
                 else:
-                    yield codec.decode(partner, message.data)
+                    yield codec.decode(encoded_image.decode(topic.schema, message.data), partner[1])
             except CodecError as error:
                 raise RecordingError(f"{self.path}: {topic.name} at {message.log_time} ns: {error}") from error
         self.unpaired = len(waiting)
@@ -121,7 +126,7 @@ def _image_counts(path: Path, contents: Contents) -> Mapping[tuple[str, str], in
     names = {topic.name for topic in contents.topics.values()}
     counts: dict[tuple[str, str], int] = {}
     for topic in contents.topics.values():
-        if topic.schema != codec.IMAGE_SCHEMA:
+        if topic.schema not in encoded_image.SCHEMAS:
             continue
         match = _IMAGE.fullmatch(topic.name)
         if not match or f"{topic.name.removesuffix('image')}info" not in names:

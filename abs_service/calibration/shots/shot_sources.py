@@ -50,7 +50,7 @@ class RecordingShots:
         # The slowest stream determines the number of shots.
         reference = min(used, key=lambda key: self.recording.counts[key])
         synchroniser = Synchroniser(reference, used, self.tolerance_ns)
-        frames = (item for item in self.recording.frames() if isinstance(item, Frame) and item.key in used)
+        frames = (item for item in self.recording.frames(used) if isinstance(item, Frame))
         yield from synchroniser.group(frames)
 
     def _first_frames(self) -> Iterator[Frame]:

@@ -12,6 +12,7 @@ from calib.camera import Camera
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec
+from drivers.encoding.encoded_image import ImageEncoder, unchanged
 from drivers.encoding.mcap_file import McapFile
 from drivers.simulated.sensors.exposure import Head
 
@@ -35,6 +36,7 @@ def write_take(
     names: Mapping[str, str],
     toml: str = "",
     finish: bool = True,
+    encode_image: ImageEncoder = unchanged,
 ) -> Path:
     """Records exposures of a simulation.
 
@@ -45,6 +47,7 @@ def write_take(
         names: heads that are recorded, and what their sensors are called.
         toml: configuration of the rig; none is attached if it is empty.
         finish: whether the recording ends as it should.
+        encode_image: as the recorder's.
     """
     with path.open("wb") as stream:
         file = McapFile(stream, chunk_size=400_000)
@@ -58,7 +61,7 @@ def write_take(
                 _write_truth(file, truth)
             for frame in frames:
                 if frame.sensor in names:
-                    _write_frame(file, replace(frame, sensor=names[frame.sensor]))
+                    _write_frame(file, replace(frame, sensor=names[frame.sensor]), encode_image)
         file.finish() if finish else file.flush()
     return path
 
@@ -77,8 +80,8 @@ def _write_truth(file: McapFile, truth: Truth) -> None:
     file.write("/sim/truth", codec.TRUTH_SCHEMA, payload, WALL_NS + truth.t_host_ns, truth.seq)
 
 
-def _write_frame(file: McapFile, frame: Frame) -> None:
+def _write_frame(file: McapFile, frame: Frame, encode_image: ImageEncoder) -> None:
     wall_ns, base = WALL_NS + frame.t_host_ns, f"/{frame.sensor}/{frame.stream}"
     header = Header(rig="demo", seq=frame.seq)
-    file.write(f"{base}/image", codec.IMAGE_SCHEMA, codec.encode_image(frame, wall_ns), wall_ns, frame.seq)
+    file.write(f"{base}/image", *encode_image(codec.encode_image(frame, wall_ns)), wall_ns, frame.seq)
     file.write(f"{base}/info", codec.INFO_SCHEMA, codec.encode_info(frame, header), wall_ns, frame.seq)

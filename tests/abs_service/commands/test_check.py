@@ -44,10 +44,35 @@ def test_what_a_configuration_describes(checked, tmp_path):
         "sensor   tof: depth 176×144 16UC1 30 Hz, amplitude 176×144 16UC1 30 Hz; noise gaussian_polynomial",
         "tracker  sheet: rigid from tof, 300 vertices; likelihood, hybrid, paced by tof/depth",
         "publishes abs/bench/sheet/state",
+        "images: 3 MB/s sent, recorded 3",
         "connect to tcp/127.0.0.1:7447",
         f"records to {tmp_path / 'recordings'}",
     ):
         assert part in out
+
+
+@pytest.mark.parametrize(
+    ("table", "rates"),
+    [
+        ("", {"sent_mb_s": 97.1, "recorded_mb_s": [97.1, 97.1]}),
+        ('depth_codec = "lossless"\ncolor_codec = "lossless"', {"sent_mb_s": 97.1, "recorded_mb_s": [9.7, 58.3]}),
+        ('color_codec = "jpeg"', {"sent_mb_s": 97.1, "recorded_mb_s": [5.1, 25.3]}),
+        ("enabled = false", {"sent_mb_s": 97.1, "recorded_mb_s": [0.0, 0.0]}),
+    ],
+)
+def test_bytes_per_second_of_the_images(checked, table, rates):
+    sensors = "tof,color,bayer&tof=64x48&color=1280x720&bayer=640x720"
+    rig = RIG.replace("sensors=tof", f"sensors={sensors}") + '[sensors.color]\ndevice = "sim"\n[sensors.bayer]\n'
+    code, out, _ = checked(rig + f'device = "sim"\n[record]\n{table}\n', "--json")
+    assert code == Exit.OK
+    assert json.loads(out)["images"] == {**rates, "unknown": []}
+
+
+def test_streams_that_are_known_once_a_device_is_open(checked):
+    rig = RIG.replace("simulated://sheet?seed=1&sensors=tof", "realsense://1")
+    code, out, _ = checked(rig)
+    assert code == Exit.OK
+    assert "images: 0 MB/s sent, recorded 0; without tof, known once open" in out
 
 
 def test_the_same_for_scripts(checked):

@@ -152,7 +152,7 @@ def test_impossible_paths_are_refused(recording, tmp_path, capsys, command, name
 
 
 def test_check_opens_no_device_that_may_be_real(tmp_path, capsys):
-    asked = ["check", str(ROOT / "examples" / "kinect.toml"), "--picture", str(tmp_path / "x.png")]
+    asked = ["check", str(ROOT / "examples" / "rigs" / "kinect.toml"), "--picture", str(tmp_path / "x.png")]
     assert cli.main(asked) == Exit.USER
     assert "devices.kinect is kinect1://, and only replay and simulated devices are opened" in capsys.readouterr().err
     assert not (tmp_path / "x.png").exists()

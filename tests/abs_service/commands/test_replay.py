@@ -11,6 +11,10 @@ from mcap_protobuf.decoder import DecoderFactory
 from abs_service import cli, config
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import free_path
+from drivers.contract.frame import Frame
+from drivers.encoding import encoded_image
+from drivers.encoding.encoded_image import ImageCodec
+from drivers.replay.recording import Recording
 from drivers.simulated.address import parse
 from tests.abs_service.commands.simulated_recording import WALL_NS, write_take
 
@@ -53,6 +57,20 @@ def test_the_estimates_are_the_same_to_the_last_bit(replayed):
     assert len(first) == COUNT
     assert first == second
     assert len(set(first)) > 10  # it does not only repeat itself
+
+
+def test_images_without_loss_give_the_same_estimates_to_the_last_bit(recording, replayed, tmp_path):
+    encode = encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.LOSSLESS)
+    names = {"tof": "tof", "color": "color"}
+    path = tmp_path / "small.mcap"
+    write_take(path, SIMULATION, range(FIRST, FIRST + COUNT), names, TOML, encode_image=encode)
+    for raw, small in zip(Recording(recording).frames(), Recording(path).frames(), strict=True):
+        if isinstance(raw, Frame):
+            assert isinstance(small, Frame)
+            assert raw.data.tobytes() == small.data.tobytes()
+            assert raw.encoding == small.encoding
+    assert cli.main(["replay", str(path)]) == Exit.OK
+    assert thetas(path.with_name("small_replay.mcap")) == thetas(replayed[0])
 
 
 def test_every_topic_can_be_decoded_by_its_schema(replayed):

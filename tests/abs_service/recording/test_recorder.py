@@ -5,13 +5,15 @@ import threading
 
 import pytest
 from absmsg.v1 import frame_info_pb2
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.capture import sensor_metadata
 from abs_service.wire import message_header
 from calib.camera import Camera
-from drivers.encoding import codec
+from drivers.encoding import codec, encoded_image
+from drivers.encoding.encoded_image import ImageCodec
 from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
 
 
@@ -35,6 +37,20 @@ def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
     schemas = {m.schema and m.schema.name for m in messages}
     assert schemas == {"foxglove.RawImage", "absmsg.v1.FrameInfo", "absmsg.v1.Health"}
     assert metadata(path) == {"ended": "stopped", "messages.tof/depth/image": "5", "messages.health/record": "1"}
+
+
+def test_images_are_recorded_in_the_form_that_the_settings_say(tmp_path):
+    rig = Rig(tmp_path, encode_image=encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.RAW))
+    rig.recorder.start()
+    published = [rig.publish_image(depth(seq)) for seq in range(3)]
+    rig.bus.deliver(Sample(DEPTH, codec.IMAGE_SCHEMA, b"\xff\xff", published[0][1]))
+    rig.recorder.stop(5)
+    assert rig.said.counters["refused"] == 1  # pixels that cannot be decoded do not end the recording
+    (path,) = recordings(tmp_path)
+    images = [m for m in read(path)[0] if m.channel.topic == f"/{DEPTH}"]
+    assert {m.schema and m.schema.name for m in images} == {"absmsg.v1.EncodedImage"}
+    decoded = [encoded_image.decode("absmsg.v1.EncodedImage", m.message.data) for m in images]
+    assert list(map(RawImage.FromString, decoded)) == [RawImage.FromString(image) for image, _ in published]
 
 
 def test_it_begins_with_what_was_announced_before_it_came_and_repeats_it_in_every_file(tmp_path):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from absmsg.v1.common_pb2 import Header
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from drivers.contract.device import Truth
@@ -119,6 +120,25 @@ def test_an_image_without_metadata_is_counted(tmp_path: Path) -> None:
     recording = Recording(path)
     assert_same(recording.frames(), items)
     assert recording.unpaired == 1
+
+
+def test_frames_of_other_streams_are_not_decoded(tmp_path: Path) -> None:
+    items = recorded(2)
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        file = McapFile(stream)
+        for item in items:
+            write_item(file, item)
+        frame = next(item for item in items if isinstance(item, Frame) and item.sensor == "color")
+        info = codec.encode_info(frame, Header())
+        file.write("/color/color/image", codec.IMAGE_SCHEMA, b"\xff\xff", WALL_NS, 99)
+        file.write("/color/color/info", codec.INFO_SCHEMA, info, WALL_NS, 99)
+        file.finish()
+    recording = Recording(path)
+    with pytest.raises(RecordingError, match="/color/color"):
+        list(recording.frames())
+    depths = [item for item in items if not isinstance(item, Frame) or item.key == ("tof", "depth")]
+    assert_same(recording.frames([("tof", "depth")]), depths)
 
 
 def foreign(path: Path) -> None:

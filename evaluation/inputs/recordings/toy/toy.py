@@ -27,7 +27,7 @@ from evaluation.inputs.recordings.agreement import Agreement, agreement
 CAMERA = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
 RATE_HZ = 30.0
 #: The configuration that users are given for such images.
-EXAMPLE = Path(__file__).parents[4] / "examples" / "image_folder.toml"
+EXAMPLE = Path(__file__).parents[4] / "examples" / "rigs" / "image_folder.toml"
 FOLDER, TRACKER = "sl_rgbd_deform_petit", "toy"
 
 #: What the tracker is given in place of a frame set; None if it is to see nothing of that reference.

@@ -1,0 +1,49 @@
+"""Bytes per second of a rig's images: on the bus, which for another host is its network, and in a recording."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from abs_service.config.tables import RecordTable
+from drivers.contract.capabilities import StreamInfo
+from drivers.contract.frame import ENCODINGS
+from drivers.encoding.encoded_image import ImageCodec, codec_of
+
+#: Least and greatest share of the bytes that a codec leaves of real and simulated images with noise
+#: (docs/decisions/0020, experiment `image_codecs`).
+LEFT: Mapping[ImageCodec, tuple[float, float]] = {
+    ImageCodec.RAW: (1.0, 1.0),
+    ImageCodec.LOSSLESS: (0.1, 0.6),
+    ImageCodec.JPEG: (0.04, 0.2),
+}
+
+
+def describe(streams: Mapping[str, Iterable[StreamInfo]], table: RecordTable) -> dict[str, Any]:
+    """Rates as plain data, in MB/s.
+
+    Args:
+        streams: by sensor; none of a sensor whose device is not open.
+        table: settings of the recorder.
+    """
+    sent, least, most, unknown = 0.0, 0.0, 0.0, []
+    for sensor, infos in streams.items():
+        for info in infos:
+            rate = _bytes_per_s(info)
+            shares = LEFT[codec_of(info.encoding, ImageCodec(table.depth_codec), ImageCodec(table.color_codec))]
+            sent, least, most = sent + rate, least + shares[0] * rate, most + shares[1] * rate
+        if not infos:
+            unknown.append(sensor)
+    recorded = [round(1e-6 * least, 1), round(1e-6 * most, 1)] if table.enabled else [0.0, 0.0]
+    return {"sent_mb_s": round(1e-6 * sent, 1), "recorded_mb_s": recorded, "unknown": unknown}
+
+
+def text(rates: Mapping[str, Any]) -> str:
+    """The same for people."""
+    least, most = rates["recorded_mb_s"]
+    written = f"{most:g}" if least == most else f"{least:g} to {most:g}, by how noisy they are"
+    without = f"; without {', '.join(rates['unknown'])}, known once open" if rates["unknown"] else ""
+    return f"images: {rates['sent_mb_s']:g} MB/s sent, recorded {written}{without}"
+
+
+def _bytes_per_s(info: StreamInfo) -> float:
+    dtype, channels = ENCODINGS[info.encoding]
+    return info.width * info.height * channels * dtype.itemsize * info.rate_hz
