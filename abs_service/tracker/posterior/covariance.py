@@ -140,6 +140,30 @@ def unheld_deviation(
     return float(np.sqrt(np.median(variance)))
 
 
+def unseen_motion(
+    motion: NDArray[np.float64],
+    curvature: NDArray[np.float64],
+    precision: NDArray[np.float64],
+    least_precision: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The part (dim, dim) of a motion's covariance (dim, dim) that the measurements of a frame do not show.
+
+    With the widest motion prior, the gain G tells how much of a motion the estimate lacks: next to nothing where
+    something is measured, everything where nothing is. G⁸ tells the two apart. With a narrow prior, a single frame
+    shows little of any motion, and several frames show it.
+
+    Args:
+        motion: covariance of the motion between two frames.
+        curvature: (dim, dim), of likelihood and priors.
+        precision: of the motion prior (dim, dim), which is replaced by
+        least_precision: that of the widest motion prior (dim, dim).
+    """
+    unseen = solved(curvature - precision + least_precision, least_precision)
+    for _ in range(3):
+        unseen = unseen @ unseen
+    return unseen @ motion @ unseen.T
+
+
 def along_normals(surface: Surface, variance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance (n, 3, 3) [m²] of errors along the normals of a population of one with a variance (n,) [m²]."""
     normals = surface.normals[0].T.astype(np.float64)

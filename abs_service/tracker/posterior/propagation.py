@@ -9,8 +9,8 @@ with what the object has done since the frame before, q, and the score s of the 
 whose covariance is B (`covariance`). Where the sensors outweigh W, G is zero and nothing of the past is left. Where
 nothing is measured, G is one, and the errors add up:
 
-- q, the motion that was not predicted, has the size of the innovations (`motion_prior`). Where nothing has been
-  measured in the last frames, G⁸ ≈ 1, the velocity is not known either, and the whole motion counts.
+- q, the motion that was not predicted, has the size of the innovations (`motion_prior`). Where nothing is measured, the
+  velocity is not known either, and the whole motion counts.
 - A share `LASTING` of the variance of s is the same in every frame: the noise of the first frame in mesh and
   appearance. Its error is R_t s with R_t = G R_{t−1} + Σ. So is that of whole sides of the outline. The rest is this
   frame's own noise, and independent.
@@ -55,7 +55,7 @@ class ErrorPropagation:
 
         Args:
             unpredicted: covariance (dim, dim) of the motion where measurements show the object's velocity.
-            moved: that of the motion where nothing shows it.
+            moved: that of the whole motion, as far as nothing shows it.
             inverse: Σ (dim, dim).
             scores: covariance (dim, dim) of the gradient, W included.
             shared: the same of errors that are equal in all frames.
@@ -63,10 +63,7 @@ class ErrorPropagation:
         """
         gain = inverse @ precision
         if self._began:
-            unheld = gain @ gain
-            unheld = unheld @ unheld
-            unheld = unheld @ unheld
-            self._moved = self._moved + unpredicted + unheld @ moved @ unheld.T
+            self._moved = self._moved + unpredicted + moved
         self._began = True
         self._moved = gain @ self._moved @ gain.T
         own = scores - precision

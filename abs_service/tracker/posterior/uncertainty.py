@@ -15,6 +15,7 @@ from abs_service.tracker.posterior.covariance import (
     score_covariance,
     shared_covariance,
     unheld_deviation,
+    unseen_motion,
 )
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.misfit import Misfit
@@ -78,8 +79,9 @@ class Uncertainty:
         leverage = leverages(inverse, near.sensed)
         effects = self._effects.update(inverse, near.sensed, leverage)
         scores = score_covariance(curvature, near.sensed, leverage, effects)
-        shared, motion = shared_covariance(near.sensed, len(theta)), (self._motion.unpredicted, self._motion.unseen)
-        covariance = self._errors.update(*motion, inverse, scores, shared, precision)
+        shared = shared_covariance(near.sensed, len(theta))
+        moved = unseen_motion(self._motion.unseen, curvature, precision, self._motion.least_precision)
+        covariance = self._errors.update(self._motion.unpredicted, moved, inverse, scores, shared, precision)
         vertices = (
             propagated(near.sparse_jacobian, covariance)
             + along_normals(surface, self._mesh_noise.variance)
