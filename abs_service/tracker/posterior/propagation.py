@@ -9,8 +9,8 @@ with what the object has done since the frame before, q, and the score s of the 
 whose covariance is B (`covariance`). Where the sensors outweigh W, G is zero and nothing of the past is left. Where
 nothing is measured, G is one, and the errors add up:
 
-- q, the motion that was not predicted, has the size of the innovations (`motion_prior`). Where nothing is measured, the
-  velocity is not known either, and the whole motion counts.
+- q, the motion that was not predicted, has the size of the innovations less their noise (`innovations`). Where nothing
+  is measured, the velocity is not known either, and the whole motion counts.
 - A share `LASTING` of the variance of s is the same in every frame: the noise of the first frame in mesh and
   appearance. Its error is R_t s with R_t = G R_{t−1} + Σ. So is that of whole sides of the outline. The rest is this
   frame's own noise, and independent.

@@ -52,7 +52,10 @@ def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
         (["--weight", "0.3", "--plot", "x.doc"], "--plot x.doc: its suffix must be one of .png, .svg, .pdf"),
         (["--weight", "0.3", "--tracker", "sheet"], "--tracker sheet: must be a tracker with a gravity model, one of"),
         (["--weight", "0.3", "--plot", "no/folder/x.png"], "--plot no/folder/x.png: No such file or directory"),
-        (["--weight", "0.3", "--config", str(ROOT / "examples" / "rigs" / "flexpad.toml")], "no tracker has a gravity model"),
+        (
+            ["--weight", "0.3", "--config", str(ROOT / "examples" / "rigs" / "flexpad.toml")],
+            "no tracker has a gravity model",
+        ),
     ],
 )
 def test_impossible_options_are_reported(recording, capsys, options, problem):

@@ -71,7 +71,7 @@ class MotionPrior:
     @property
     def unpredicted(self) -> NDArray[np.float64]:
         """Covariance (dim, dim) of the motion between two frames that was not predicted, lately."""
-        return self._elapsed_s**2 * self._innovations.variance * self._metric.inverse
+        return self._elapsed_s**2 * self._innovations.motion_variance * self._metric.inverse
 
     @property
     def unseen(self) -> NDArray[np.float64]:
