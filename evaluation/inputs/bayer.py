@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.report.content import Cell, Column, Section, Table
-from abs_service.tracker.models import nurbs
 from calib.noise.images.bayer import GaussianBayer
 from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
@@ -89,7 +88,7 @@ class MosaicSequence:
         )
         self._cameras = {name: head.camera for name, head in simulation.heads.items()}
         self._order = order
-        self._plan = demo_plan(nurbs.Settings((4, 4), 2), reference="structured_light", vertices=vertices)
+        self._plan = demo_plan(reference="structured_light", vertices=vertices)
         self._exposures = expose(simulation, range(frames))
 
     def track(self, variant: str, sigma: float) -> Result:

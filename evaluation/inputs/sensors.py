@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from abs_service import config, wiring
 from abs_service.report.content import Column, Section, Table
-from abs_service.tracker.models import nurbs
 from calib.noise.images.binary import LightBarrier
 from calib.noise.images.color import GaussianColor
 from calib.noise.structured_light import StructuredLight
@@ -96,7 +95,7 @@ class SensorSequence:
         """Mean vertex and surface error [mm] of tracking with a subset of the sensors."""
         noises = {"tof": self._tof, **NOISES}
         rig = Rig("e7", {name: Sensor(name, self._cameras[name], noises[name]) for name in SENSORS if name in subset})
-        plan = demo_plan(nurbs.Settings((4, 4), 2), reference=next(name for name in DEPTH if name in subset))
+        plan = demo_plan(reference=next(name for name in DEPTH if name in subset))
         found = track(
             rig, plan, [replace(exposure, frames=_of(exposure.frames, subset)) for exposure in self._exposures]
         )

@@ -21,7 +21,6 @@ from scipy.linalg import eigh
 
 from abs_service.report.content import Column, Section, Table
 from abs_service.tracker.estimate import Estimate
-from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.base import DeformationModel, SparseJacobian
 from abs_service.tracker.posterior.covariance import propagated
 from abs_service.tracker.posterior.priors.change_metric import ChangeMetric
@@ -111,7 +110,7 @@ def coverage(uri: str, frames: int, sigma: float = DEMO_SIGMA) -> Coverage:
     """Tracks a simulated device with the default tracker; `sigma`: standard deviation of the colours [levels]."""
     simulation = simulate(uri)
     rig = with_noise(demo_rig(simulation), "color", GaussianColor(sigma))
-    found = track(rig, demo_plan(nurbs.Settings((4, 4), 2)), expose(simulation, range(frames)))
+    found = track(rig, demo_plan(), expose(simulation, range(frames)))
     rows, predicted, true = [], [], []
     for model, estimate, points in list(zip(found.models, found.estimates, found.material))[1:]:
         error, known = points - estimate.vertices, estimate.covariance

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 import abs_service as a
 from abs_service.report.content import Cell, Column, Section, Table
+from abs_service.tracker.models import nurbs
 from abs_service.tracker.objectives import likelihood
 from calib.rig import Rig
 from evaluation.coverage import inside_region
@@ -191,7 +192,7 @@ def _coverage(settings: Settings, context: Context) -> list[tuple[str, str, int,
         for sensors, used in (("colour and depth", rig), ("depth", depth)):
             for outline, objective in OUTLINES.items():
                 context.progress(f"seed {seed}: {sensors}, outline {outline}")
-                plan = demo_plan(objective=objective)
+                plan = demo_plan(nurbs.Settings(), objective=objective)
                 found = track(used, plan, expose(simulation, range(settings.frames)))
                 inside, error = [], []
                 for estimate, points in list(zip(found.estimates, found.material))[1:]:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives.base import Objective
 from abs_service.tracker.synthesis import dense, sparse, undistorted, warped
@@ -68,9 +67,7 @@ def recorded(seed: int, frames: int) -> Recorded:
 
 def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row:
     """Tracks all sequences with a synthesis."""
-    found = [
-        track(one.rig, demo_plan(nurbs.Settings((4, 4), 2), synthesis=synthesis), one.exposures) for one in sequences
-    ]
+    found = [track(one.rig, demo_plan(synthesis=synthesis), one.exposures) for one in sequences]
     return Row(
         tuple(one.vertex_mm for one in found),
         float(np.mean([one.surface_mm for one in found])),
@@ -80,7 +77,7 @@ def measured(synthesis: SynthesisSettings, sequences: Sequence[Recorded]) -> Row
 
 def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
     """Time to synthesise one candidate of a sequence's first frame and to compare it [µs], for every synthesis."""
-    model = Rigid(track(sequence.rig, demo_plan(nurbs.Settings((4, 4), 2)), sequence.exposures[:1]).model.mesh)
+    model = Rigid(track(sequence.rig, demo_plan(), sequence.exposures[:1]).model.mesh)
     thetas = np.random.default_rng(0).normal(0, 2e-3, (POPULATION, 6))
     objectives = {name: _objective(SYNTHESES[name], sequence, model) for name in names}
     least = dict.fromkeys(names, np.inf)
@@ -96,6 +93,6 @@ def candidates_us(names: Sequence[str], sequence: Recorded) -> dict[str, float]:
 def _objective(synthesis: SynthesisSettings, sequence: Recorded, model: Rigid) -> Objective:
     """Objective of the first frame."""
     rig, mesh = sequence.rig, model.mesh
-    objective = demo_plan(nurbs.Settings((4, 4), 2)).objective.build(rig, mesh, synthesis.build(rig, mesh))
+    objective = demo_plan().objective.build(rig, mesh, synthesis.build(rig, mesh))
     objective.observe(Observer(rig).observe(sequence.exposures[0].frames), model.deform(model.rest[None]))
     return objective

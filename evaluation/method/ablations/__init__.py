@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from abs_service.report.content import Section
-from abs_service.tracker.models import flexpad, nurbs
+from abs_service.tracker.models import flexpad
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.optimizers import cma_es, hybrid
 from abs_service.tracker.posterior.priors import settings as priors
@@ -27,6 +27,7 @@ from evaluation.method.ablations import plain_cma, report
 from evaluation.method.ablations.cold_start import Cold, Forgetful
 from evaluation.scenes.exposure import LabeledExposure
 from evaluation.sequences import (
+    SMALL,
     TrackedSequence,
     demo_plan,
     demo_rig,
@@ -152,7 +153,7 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
 
 def _noise_variants(settings: Settings) -> tuple[Variant, ...]:
     """The true noise model with a scaled σ, and simpler models."""
-    plan = demo_plan(nurbs.Settings((4, 4), 2))
+    plan = demo_plan()
     laws = {f"{factor:g} σ": assumed_rig(settings.noise, factor) for factor in settings.sigma_factors}
     laws["one σ everywhere"] = _with_noise(Constant(settings.noise * MEAN_DEVIATION))
     return tuple(Variant(name, plan, rig) for name, rig in laws.items())
@@ -183,7 +184,7 @@ def _with_noise(noise: DepthNoise) -> Rig:
 
 
 def _question(title: str, rig: Rig, lines: Mapping[str, Mapping[str, Any]]) -> Question:
-    plans = {name: demo_plan(**{"model": nurbs.Settings((4, 4), 2), **changes}) for name, changes in lines.items()}
+    plans = {name: demo_plan(**{"model": SMALL, **changes}) for name, changes in lines.items()}
     return Question(title, tuple(Variant(name, plan, rig) for name, plan in plans.items()))
 
 

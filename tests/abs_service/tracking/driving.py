@@ -18,15 +18,15 @@ from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.simulated import address
 from drivers.simulated.simulation import Simulation
-from evaluation.sequences import TruthEvaluator
+from evaluation.sequences import SMALL, TruthEvaluator
 
 CONFIG = config.load_default()
 TRACKER = next(iter(CONFIG.trackers))
 
 
 def default_plan(**changes: object) -> Plan:
-    """The default rig's plan with some parts exchanged."""
-    return dataclasses.replace(wiring.plan(CONFIG, TRACKER), **changes)
+    """The default rig's plan with few control points, which are tracked sooner, and some parts exchanged."""
+    return dataclasses.replace(wiring.plan(CONFIG, TRACKER), **{"model": SMALL, **changes})
 
 
 def rig_of(simulation: Simulation) -> Rig:
