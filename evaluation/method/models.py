@@ -117,8 +117,10 @@ def measure(case: Case, seed: int, frames: int) -> Result:
     simulation = simulate(f"simulated://{case.scene}?seed={seed}")
     plan = demo_plan(case.settings, optimizer=case.optimizer, objective=case.objective)
     found = track(demo_rig(simulation), plan, expose(simulation, range(frames)))
-    changes = [_strain(found.model.mesh, estimate.vertices) for estimate in found.estimates]
-    rms = float(np.sqrt(np.mean(np.square(changes))))
+    changes = [
+        _strain(one.mesh, estimate.vertices) for one, estimate in zip(found.models, found.estimates, strict=True)
+    ]
+    rms = float(np.sqrt(np.mean(np.square(np.concatenate(changes)))))
     return Result(found.vertex_mm, found.surface_mm, found.worst_mm, rms, found.tracked)
 
 
