@@ -3,8 +3,8 @@
   abs-service export recordings/x.mcap                  writes recordings/x_raw.mcap
   abs-service export recordings/x.mcap --out other.mcap
 
-Recordings hold images in fewer bytes, which abs-service reads and viewers do not; `record.depth_codec` and
-`record.color_codec` = "raw" record them as they are.
+With `record.depth_codec` or `record.color_codec` = "lossless", a recording holds images in fewer bytes, which
+abs-service reads and viewers do not.
 """
 
 import argparse

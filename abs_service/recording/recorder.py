@@ -1,4 +1,4 @@
-"""Records all messages of a rig, images in fewer bytes; reports losses and failures in its health."""
+"""Records all messages of a rig, images as the settings say; reports losses and failures in its health."""
 
 import shutil
 import threading
@@ -19,9 +19,9 @@ from abs_service.bus.stamps import WallClock
 from abs_service.recording.recording_file import RecordingFile, open_for_writing
 from abs_service.wire import message_header as header
 from abs_service.wire.message_header import MessageHeaderError
-from drivers.encoding.codec import CodecError
 from drivers.encoding.encoded_image import ImageEncoder, unchanged
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFileError
+from drivers.encoding.parsing import CodecError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
 _LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
@@ -171,8 +171,8 @@ class Recorder:
         return reason == "rotated"
 
     def _fill(self, file: RecordingFile, started_ns: int) -> str:
-        settings = self._settings
-        next_flush_ns = started_ns + (flush_ns := int(settings.flush_s * 1e9))
+        settings, flush_ns = self._settings, int(self._settings.flush_s * 1e9)
+        next_flush_ns = started_ns + flush_ns
         while True:
             sample = self._queue.take(max(0.0, (next_flush_ns - self._clock.monotonic()) / 1e9))
             if sample is not None:

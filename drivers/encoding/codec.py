@@ -13,11 +13,12 @@ from absmsg.v1.common_pb2 import Header
 from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.surface_truth_pb2 import SurfaceTruth
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.message import DecodeError, Message
+from google.protobuf.message import DecodeError
 
 from drivers.contract.device import Truth
-from drivers.contract.frame import ENCODINGS, Frame, FrameError, Geometry, Kind, Reference
+from drivers.contract.frame import Frame, FrameError, Geometry, Kind, Reference
 from drivers.encoding import raw_image
+from drivers.encoding.parsing import CodecError, bytes_per_pixel, parse_message, pixels_of
 
 IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name
 INFO_SCHEMA = FrameInfo.DESCRIPTOR.full_name
@@ -36,12 +37,6 @@ _REFERENCES = {
 _GEOMETRY_OF: Mapping[int, Geometry] = {number: geometry for geometry, number in _GEOMETRIES.items()}
 _REFERENCE_OF: Mapping[int, Reference] = {number: reference for reference, number in _REFERENCES.items()}
 
-_AnyMessage = TypeVar("_AnyMessage", bound=Message)
-
-
-class CodecError(ValueError):
-    """Malformed bytes of a frame or truth; the message names the problem."""
-
 
 def encode_image(frame: Frame, wall_ns: int) -> bytes:
     """The pixels of a frame as foxglove.RawImage.
@@ -56,7 +51,7 @@ def encode_image(frame: Frame, wall_ns: int) -> bytes:
         width=width,
         height=height,
         encoding=frame.encoding,
-        step=width * _bytes_per_pixel(frame.encoding),
+        step=width * bytes_per_pixel(frame.encoding),
     )
     image.timestamp.FromNanoseconds(wall_ns)
     return raw_image.serialize(image, frame.data)
@@ -108,7 +103,7 @@ def decode(image: bytes, info: bytes) -> Frame:
     Raises:
         CodecError: malformed or inconsistent messages.
     """
-    (picture, pixels), about = _parse_image(image), _parse(FrameInfo, info)
+    (picture, pixels), about = _parse_image(image), parse_message(FrameInfo, info)
     name = f"{about.sensor}/{about.stream}"
     if not about.sensor or not about.stream:
         raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
@@ -118,7 +113,7 @@ def decode(image: bytes, info: bytes) -> Frame:
             sensor=about.sensor,
             stream=about.stream,
             kind=_kind(name, about.kind),
-            data=_pixels(name, picture, pixels),
+            data=pixels_of(name, picture, pixels),
             encoding=picture.encoding,
             t_host_ns=about.header.t_host_ns,
             t_arrival_ns=about.t_arrival_ns,
@@ -169,7 +164,7 @@ def decode_truth(payload: bytes) -> Truth:
     Raises:
         CodecError: malformed message, or a number of points that differs from the declared one.
     """
-    message = _parse(SurfaceTruth, payload)
+    message = parse_message(SurfaceTruth, payload)
     expected = message.rows * message.columns * 3 * 4
     if expected == 0 or len(message.points_f32) != expected:
         raise CodecError(
@@ -180,42 +175,11 @@ def decode_truth(payload: bytes) -> Truth:
     return Truth(message.seq, message.header.t_host_ns, points_r, message.surface)
 
 
-def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
-    try:
-        return schema.FromString(payload)
-    except DecodeError as error:
-        raise CodecError(f"{len(payload)} bytes are no {schema.DESCRIPTOR.full_name}: {error}") from error
-
-
 def _parse_image(payload: bytes) -> tuple[RawImage, memoryview]:
     try:
         return raw_image.parse(payload)
     except DecodeError as error:
         raise CodecError(f"{len(payload)} bytes are no {IMAGE_SCHEMA}: {error}") from error
-
-
-def _bytes_per_pixel(encoding: str) -> int:
-    dtype, channels = ENCODINGS[encoding]
-    return dtype.itemsize * channels
-
-
-def _pixels(name: str, image: RawImage, data: memoryview) -> np.ndarray:
-    if image.encoding not in ENCODINGS:
-        raise CodecError(f"{name}: encoding {image.encoding!r} is none of {sorted(ENCODINGS)}")
-    dtype, channels = ENCODINGS[image.encoding]
-    step = image.width * _bytes_per_pixel(image.encoding)
-    if image.step != step:
-        raise CodecError(
-            f"{name}: a row of {image.width} {image.encoding} pixels has {step} bytes, step is {image.step}"
-        )
-    if len(data) != step * image.height or not data:
-        raise CodecError(
-            f"{name}: {image.width} × {image.height} {image.encoding} needs {step * image.height} bytes (more than 0), "
-            f"has {len(data)}"
-        )
-    shape = (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
-    # Where they begin is up to the sender; kernels take aligned numbers only.
-    return np.require(np.frombuffer(data, dtype), requirements="A").reshape(shape)
 
 
 def _kind(name: str, value: str) -> Kind:

@@ -6,20 +6,19 @@ The input is untrusted: decoding yields bytes of a `foxglove.RawImage` or a `Cod
 import math
 from collections.abc import Callable, Mapping
 from enum import StrEnum
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
 from absmsg.v1.encoded_image_pb2 import EncodedImage
 from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
 from drivers.contract.frame import ENCODINGS
-from drivers.encoding import codec, pixel_filter
-from drivers.encoding.codec import CodecError
+from drivers.encoding import codec, pixel_filter, raw_image
+from drivers.encoding.parsing import CodecError, parse_message, pixels_of, shape_of
 from drivers.encoding.pixel_filter import Filter, PixelFilterError, Predictor
 
 ENCODED_SCHEMA = EncodedImage.DESCRIPTOR.full_name
@@ -36,8 +35,6 @@ _LARGEST = 1 << 30
 
 #: From a serialized foxglove.RawImage to the full name of a message and that message.
 ImageEncoder = Callable[[bytes], tuple[str, bytes]]
-
-_AnyMessage = TypeVar("_AnyMessage", bound=Message)
 
 
 class ImageCodec(StrEnum):
@@ -64,7 +61,7 @@ def encoder(depth: ImageCodec, color: ImageCodec) -> ImageEncoder:
         return unchanged
 
     def encode(image: bytes) -> tuple[str, bytes]:
-        picture = _parse(RawImage, image)
+        picture = parse_message(RawImage, image)
         chosen = codec_of(picture.encoding, depth, color)
         if chosen == ImageCodec.RAW:
             return codec.IMAGE_SCHEMA, image
@@ -89,17 +86,11 @@ def decode(schema: str, payload: bytes) -> bytes:
         CodecError: malformed or inconsistent message.
     """
     if schema == ENCODED_SCHEMA:
-        return _of_lossless(_parse(EncodedImage, payload)).SerializeToString()
+        message = parse_message(EncodedImage, payload)
+        return raw_image.serialize(_without_pixels(message), _pixels(message))
     if schema == JPEG_SCHEMA:
-        return _of_jpeg(_parse(CompressedImage, payload)).SerializeToString()
+        return _of_jpeg(parse_message(CompressedImage, payload))
     return payload
-
-
-def _parse(schema: type[_AnyMessage], payload: bytes) -> _AnyMessage:
-    try:
-        return schema.FromString(payload)
-    except DecodeError as error:
-        raise CodecError(f"{len(payload)} bytes are no {schema.DESCRIPTOR.full_name}: {error}") from error
 
 
 def is_mosaic(encoding: str) -> bool:
@@ -116,11 +107,12 @@ def _lossless(picture: RawImage) -> EncodedImage:
         encoding=picture.encoding,
         step=picture.step,
     )
-    if not _is_consistent(picture):
+    try:
+        pixels = pixels_of(picture.frame_id, picture, picture.data)
+    except CodecError:
         # Other programs can publish what we do not understand; it is kept as it is.
         message.codec, message.data = EncodedImage.CODEC_RAW, picture.data
         return message
-    pixels = np.frombuffer(picture.data, ENCODINGS[picture.encoding][0]).reshape(_shape(picture))
     chosen, message.data = pixel_filter.encode(pixels, is_mosaic(picture.encoding))
     message.codec = EncodedImage.CODEC_FILTERED_ZSTD
     message.predictor = _PREDICTORS[chosen.predictor]
@@ -128,7 +120,7 @@ def _lossless(picture: RawImage) -> EncodedImage:
     return message
 
 
-def _of_lossless(message: EncodedImage) -> RawImage:
+def _without_pixels(message: EncodedImage) -> RawImage:
     return RawImage(
         timestamp=_stamp(message),
         frame_id=message.frame_id,
@@ -136,27 +128,26 @@ def _of_lossless(message: EncodedImage) -> RawImage:
         height=message.height,
         encoding=message.encoding,
         step=message.step,
-        data=_data(message),
     )
 
 
-def _data(message: EncodedImage) -> bytes:
+def _pixels(message: EncodedImage) -> NDArray[Any]:
     """Pixels of a losslessly encoded image, as in its RawImage."""
     name = message.frame_id
     if message.codec == EncodedImage.CODEC_RAW:
-        return message.data
+        return np.frombuffer(message.data, "u1")
     if message.codec != EncodedImage.CODEC_FILTERED_ZSTD:
         raise CodecError(f"{name}: codec {message.codec} is none of {[1, 2]}; a newer version may read it")
     if message.predictor not in _PREDICTORS.values():
         raise CodecError(f"{name}: predictor {message.predictor} is none of {sorted(_PREDICTORS.values())}")
     if message.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {message.encoding!r} is none of {sorted(ENCODINGS)}")
-    dtype, shape = ENCODINGS[message.encoding][0], _shape(message)
+    dtype, shape = ENCODINGS[message.encoding][0], shape_of(message)
     if not 0 < math.prod(shape) * dtype.itemsize <= _LARGEST:
         raise CodecError(f"{name}: an image of {message.width} × {message.height} pixels is empty or too large")
     chosen = Filter(Predictor(message.predictor), message.green_subtracted)
     try:
-        return pixel_filter.decode(message.data, chosen, shape, dtype, is_mosaic(message.encoding)).tobytes()
+        return pixel_filter.decode(message.data, chosen, shape, dtype, is_mosaic(message.encoding))
     except PixelFilterError as error:
         raise CodecError(f"{name}: {error}") from error
 
@@ -165,46 +156,32 @@ def _stamp(message: RawImage | EncodedImage | CompressedImage) -> Timestamp | No
     return message.timestamp if message.HasField("timestamp") else None
 
 
-def _shape(image: RawImage | EncodedImage) -> tuple[int, ...]:
-    """Shape of the pixels, by the image's encoding, which is one of `ENCODINGS`."""
-    channels = ENCODINGS[image.encoding][1]
-    return (image.height, image.width) if channels == 1 else (image.height, image.width, channels)
-
-
-def _is_consistent(picture: RawImage) -> bool:
-    """True if the image holds as many bytes, in rows without padding, as its size and encoding say."""
-    if picture.encoding not in ENCODINGS or not picture.data:
-        return False
-    dtype, channels = ENCODINGS[picture.encoding]
-    step = picture.width * channels * dtype.itemsize
-    return picture.step == step and len(picture.data) == step * picture.height
-
-
 def _jpeg(picture: RawImage) -> CompressedImage:
-    if not _is_consistent(picture):
-        raise CodecError(
-            f"{picture.frame_id}: {len(picture.data)} bytes are no {picture.width} × {picture.height} pixels"
-        )
-    pixels = _JPEG_COLORS[picture.encoding](np.frombuffer(picture.data, "u1").reshape(_shape(picture)))
-    data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    try:
+        pixels = pixels_of(picture.frame_id, picture, picture.data)
+    except CodecError as error:
+        size = f"{picture.width} × {picture.height}"
+        raise CodecError(f"{picture.frame_id}: {len(picture.data)} bytes are no {size} pixels") from error
+    ordered = _JPEG_COLORS[picture.encoding](pixels)
+    data = cv2.imencode(".jpg", ordered, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
     return CompressedImage(timestamp=_stamp(picture), frame_id=picture.frame_id, data=data, format="jpeg")
 
 
-def _of_jpeg(message: CompressedImage) -> RawImage:
-    """A colour image, whatever the order of the channels was."""
+def _of_jpeg(message: CompressedImage) -> bytes:
+    """The serialized RawImage of a colour image, whatever the order of the channels was."""
     pixels = cv2.imdecode(np.frombuffer(message.data, "u1"), cv2.IMREAD_COLOR_RGB) if message.data else None
     if pixels is None:
         raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {message.format or 'compressed'} image")
     height, width = pixels.shape[:2]
-    return RawImage(
+    image = RawImage(
         timestamp=_stamp(message),
         frame_id=message.frame_id,
         width=width,
         height=height,
         encoding="rgb8",
         step=3 * width,
-        data=pixels.tobytes(),
     )
+    return raw_image.serialize(image, pixels)
 
 
 def _of_rgb(pixels: NDArray[Any]) -> NDArray[Any]:

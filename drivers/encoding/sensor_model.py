@@ -6,7 +6,7 @@ from absmsg.v1.sensor_model_pb2 import SensorModel
 from calib.camera import Camera
 from calib.lenses.by_name import lens_of
 from calib.lenses.lens import Lens
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 
 
 def decode_camera(model: SensorModel) -> Camera:

@@ -12,7 +12,7 @@ from drivers.contract.device import DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Frame
 from drivers.contract.frame_gate import FrameGate
 from drivers.encoding import codec
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 from drivers.remote.link import Link
 from drivers.remote.probe import IMAGES, RemoteRig
 

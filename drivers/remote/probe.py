@@ -15,7 +15,7 @@ from drivers.contract.discovery import Found, choose
 from drivers.contract.frame import Frame
 from drivers.contract.host_clock import host_clock
 from drivers.encoding import codec
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 from drivers.remote.address import Address
 from drivers.remote.link import Link

@@ -12,7 +12,7 @@ from calib.camera import Camera
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame
 from drivers.encoding import codec, encoded_image
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 from drivers.replay.contents import Contents, RecordingError, scan
 from drivers.replay.messages import messages

@@ -1,4 +1,4 @@
-"""What sensors are is published with the configuration."""
+"""Cameras, noise models and poses of the sensors are published with the configuration."""
 
 import dataclasses
 
@@ -23,7 +23,7 @@ from abs_service.commands.parts.rig_devices import HeadError
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.lenses.fisheye import KannalaBrandt
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.capture.fake_device import CAMERA, FakeDevice

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as hnp
 from drivers.contract.device import Truth
 from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind, Reference
 from drivers.encoding import codec
-from drivers.encoding.codec import CodecError
+from drivers.encoding.parsing import CodecError
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 NAMES = st.text(st.characters(codec="utf-8"), min_size=1, max_size=8)

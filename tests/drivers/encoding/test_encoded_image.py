@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from drivers.contract.frame import ENCODINGS
 from drivers.encoding import codec, encoded_image
-from drivers.encoding.codec import CodecError
 from drivers.encoding.encoded_image import ImageCodec
+from drivers.encoding.parsing import CodecError
 from tests.drivers.encoding.test_codec import frames, small_frame
 
 LOSSLESS = encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.LOSSLESS)
