@@ -141,12 +141,8 @@ class Kernel:
         used = ((name, value.digest if isinstance(value, Kernel) else value) for name, value in self._globals.items())
         values = sorted((name, repr(value)) for name, value in used if not (callable(value) or ismodule(value)))
         built = _FASTMATH, _OPTIONS, _CALLED
-        made_of = (
-            self.function.__module__,
-            _readable(self.function),
-            values,
-            built,
-        )  # cached code imports its modules by name
+        # The module, because cached code imports its modules by name.
+        made_of = self.function.__module__, _readable(self.function), values, built
         return hashlib.sha256(repr(made_of).encode()).hexdigest()[:12]
 
     @functools.cached_property

@@ -80,7 +80,7 @@ class RigState:
         return any(self.health(f"track/{name}").labels.get("phase") == "preparing" for name in self.trackers)
 
     def compiled(self) -> str:
-        """How many kernels are compiled, by tracker; "" if none has to be."""
+        """Progress of the compilation of kernels, by tracker; "" if none has to be compiled."""
         labels = {name: self.health(f"track/{name}").labels.get("kernels", "") for name in self.trackers}
         return "; ".join(f"{name} {label}" for name, label in labels.items() if label)
 

@@ -54,7 +54,7 @@ class FoundMesh:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preview:
-    """What a tracker would track.
+    """The object that a tracker would track.
 
     Attributes:
         number: index of the frame set that is shown: the first one in which the object is found, else the first one

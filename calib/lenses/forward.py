@@ -111,7 +111,7 @@ def undistort_step_fisheye(
 
 
 def lens_parts(lens: LensModel) -> dict[str, Callable[..., Any]]:
-    """What `composed` replaces in a kernel for Brown–Conrady lenses, by the kernel's names, for another lens."""
+    """Parts of a lens for `composed`, by the names of a kernel that is written for Brown–Conrady lenses."""
     if isinstance(lens, KannalaBrandt):
         return {
             "distort": distort_fisheye,

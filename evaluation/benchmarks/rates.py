@@ -1,4 +1,4 @@
-"""What whole frames cost at the paper's full budgets and with `hybrid`, and which share of it is the search's own.
+"""Time of whole frames at the paper's full budgets and with `hybrid`, and the share of it that is the search's own.
 
     NUMBA_NUM_THREADS=2 python -m evaluation.benchmarks.rates --frames 20 --rounds 3
 

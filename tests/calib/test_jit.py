@@ -96,7 +96,7 @@ def test_what_was_compiled_is_found_again_unless_something_that_it_calls_has_cha
     cache = tmp_path / "cache"
 
     def run(number: int) -> tuple[str, dict[Path, int]]:
-        """What the program prints, and when the files of machine code were written."""
+        """Output of the program, and times at which the files of machine code were written."""
         (tmp_path / "parts.py").write_text(PARTS.format(number=number))
         paths = f"{tmp_path}{os.pathsep}{Path(__file__).parents[2]}"
         environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(cache)}

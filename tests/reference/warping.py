@@ -8,7 +8,7 @@ from calib.camera import Camera
 def warped(
     source: Camera, view: Camera, distance: np.ndarray, sigma: np.ndarray, largest_step: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a view sees of the faces between neighbouring pixels, each a plane that the view's rays meet.
+    """View of the faces between neighbouring pixels, each a plane that the view's rays meet.
 
     Returns:
         Radial distances, their deviations, and by which share of a face's corners a pixel is near to any face's edge.

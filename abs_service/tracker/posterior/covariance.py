@@ -117,19 +117,17 @@ def _multiply(
 
 def unheld_deviation(
     curvature: NDArray[np.float64],
-    precision: NDArray[np.float64],
     least_precision: NDArray[np.float64],
     sparse_jacobian: SparseJacobian,
 ) -> float:
     """Standard deviation [m] of a vertex by the measurements of one frame alone, median: large if nothing holds it.
 
     Args:
-        curvature: (dim, dim), of likelihood and priors.
-        precision: of the motion prior (dim, dim), which is removed.
+        curvature: (dim, dim), of likelihood and priors without the motion prior.
         least_precision: of the widest motion prior (dim, dim), of which hardly anything is kept.
         sparse_jacobian: derivative of the vertices.
     """
-    alone = curvature - precision + KEPT_PRIOR * least_precision
+    alone = curvature + KEPT_PRIOR * least_precision
     some = np.linspace(0, len(sparse_jacobian.local) - 1, PROBES).astype(np.intp)
     rows = np.zeros((PROBES, 3, len(alone)))
     np.put_along_axis(
@@ -143,7 +141,6 @@ def unheld_deviation(
 def unseen_motion(
     motion: NDArray[np.float64],
     curvature: NDArray[np.float64],
-    precision: NDArray[np.float64],
     least_precision: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """The part (dim, dim) of a motion's covariance (dim, dim) that the measurements of a frame do not show.
@@ -154,11 +151,10 @@ def unseen_motion(
 
     Args:
         motion: covariance of the motion between two frames.
-        curvature: (dim, dim), of likelihood and priors.
-        precision: of the motion prior (dim, dim), which is replaced by
-        least_precision: that of the widest motion prior (dim, dim).
+        curvature: (dim, dim), of likelihood and priors without the motion prior.
+        least_precision: of the widest motion prior (dim, dim).
     """
-    unseen = solved(curvature - precision + least_precision, least_precision)
+    unseen = solved(curvature + least_precision, least_precision)
     for _ in range(3):
         unseen = unseen @ unseen
     return unseen @ motion @ unseen.T

@@ -80,12 +80,13 @@ class Uncertainty:
         effects = self._effects.update(inverse, near.sensed, leverage)
         scores = score_covariance(curvature, near.sensed, leverage, effects)
         shared = shared_covariance(near.sensed, len(theta))
-        moved = unseen_motion(self._motion.unseen, curvature, precision, self._motion.least_precision)
+        without_motion, least_precision = curvature - precision, self._motion.least_precision
+        moved = unseen_motion(self._motion.unseen, without_motion, least_precision)
         covariance = self._errors.update(self._motion.unpredicted, moved, inverse, scores, shared, precision)
         vertices = (
             propagated(near.sparse_jacobian, covariance)
             + along_normals(surface, self._mesh_noise.variance)
             + isotropic(self._misfit.variance(frame.misfit(surface)))
         )
-        unheld_m = unheld_deviation(curvature, precision, self._motion.least_precision, near.sparse_jacobian)
+        unheld_m = unheld_deviation(without_motion, least_precision, near.sparse_jacobian)
         return Covariances(covariance, vertices, unheld_m)

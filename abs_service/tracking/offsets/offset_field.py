@@ -133,7 +133,7 @@ def _sweep(
 
 
 def relief_prior(offset: NDArray[np.float64], deviation: NDArray[np.float64], mesh: Mesh, parameters: int) -> Prior:
-    """What the first frame's offsets tell of the object's relief: its size, and how far neighbours are alike.
+    """Prior of the object's relief, its size and how far neighbours are alike, from the first frame's offsets.
 
     Both are what the offsets vary beyond their noise. The surface has already taken a part of that, as it was fitted to
     them. A size below what so many vertices tell of noise is not known to be smaller.

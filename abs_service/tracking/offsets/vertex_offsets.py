@@ -165,7 +165,7 @@ class LearntOffsets:
 
 
 def folded(vertices: NDArray[np.float64], normals: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.bool_]:
-    """Which vertices (n,) belong to a folded face: one that is turned away from the surface.
+    """Mask (n,) of the vertices of folded faces: of faces that are turned away from the surface.
 
     Args:
         vertices, normals: of the mesh (n, 3) [m], and unit normals of the surface that it is bound to (n, 3).

@@ -66,7 +66,7 @@ def _flow(
 
 
 def _in(mask: NDArray[np.bool_], places: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Whether places (n, 2) [px] are pixels of a mask."""
+    """True for places (n, 2) [px] that are pixels of a mask (n,)."""
     column, row = np.floor(places + 0.5).astype(int).T
     seen = (column >= 0) & (column < mask.shape[1]) & (row >= 0) & (row < mask.shape[0])
     inside = np.zeros(len(places), bool)

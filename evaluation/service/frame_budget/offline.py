@@ -76,7 +76,7 @@ def run_through(take: Path, is_watched: bool) -> Pass:
 
 
 class _Process:
-    """What the process of a tracker does with a frame set."""
+    """Work of a tracker's process on a frame set."""
 
     def __init__(self, tracking: TrackingSession, headers: HeaderFactory, watch: Stopwatch):
         self.took_ns: list[int] = []

@@ -1,8 +1,6 @@
 """A rig of today: its configuration, and a recording of it as its recorder makes one, from the simulated device."""
 
-import tomllib
 from collections.abc import Callable, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -17,7 +15,7 @@ from drivers.contract.frame import Frame
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
 from drivers.simulated.address import parse
-from evaluation.service.live.rig import free_port
+from evaluation.service.live.rig import demo_table
 
 #: Name of the rig and of its tracker.
 NAME, TRACKER = "today", "sheet"
@@ -46,11 +44,7 @@ def address(head: str, seed: int) -> str:
 
 def configuration(head: str, uri: str) -> str:
     """TOML of the demo's tracker with 600 vertices and 6 × 6 control points, on a depth head and a colour camera."""
-    rig: dict[str, Any] = tomllib.loads(
-        resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
-    )
-    rig["name"] = NAME
-    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"
+    rig = demo_table(NAME)
     rig["devices"] = {"camera": {"uri": uri}}
     rig["sensors"] = {
         head: {"device": "camera", "noise": NOISES[head]},
@@ -61,7 +55,6 @@ def configuration(head: str, uri: str) -> str:
     tracker["sensors"] = [head, "color"]
     tracker["model"]["control_points"] = [6, 6]
     tracker["mesh"]["vertices"] = 600
-    rig["record"] |= {"enabled": True, "directory": "takes"}
     return tomli_w.dumps(rig)
 
 

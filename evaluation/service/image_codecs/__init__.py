@@ -1,4 +1,4 @@
-"""What lossless codecs make of images, and what a recorder that uses one writes and costs.
+"""Bytes and times of lossless image codecs, and of a recorder that uses one.
 
 The rig of today is a depth camera of 640 × 480 and a colour camera of 1280 × 720 at 30 Hz, simulated, moving.
 
@@ -6,7 +6,8 @@ Statistic: bytes of the finished recording over those of one with raw images in 
 thread that encodes and writes one set of images, times 30 Hz, by its median over all sets in single passes.
 Goals: at most 40 % of lossless images, of lossless images whose colour camera delivers a mosaic, of JPEG colours,
 and of lossless images of real cameras; at most 0.25 cores. Set by the users before any codec was measured; the
-codec was then chosen on the first six of these images and on those of the real cameras.
+codec was then chosen, and the level of Zstandard set, on the first six of these images and on those of the real
+cameras.
 Seeds: one sequence, with the context's seed + 1.
 """
 

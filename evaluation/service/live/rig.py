@@ -25,15 +25,21 @@ def write_rig(folder: Path, seed: int) -> Path:
         folder: an existing, empty folder.
         seed: of the simulated motion and noise.
     """
-    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
-    rig: dict[str, Any] = tomllib.loads(text)
-    rig["name"] = NAME
-    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"
+    rig = demo_table(NAME)
     rig["devices"]["sim"]["uri"] = URI.format(seed=seed)
-    rig["record"] |= {"enabled": True, "directory": "takes"}
     path = folder / "rig.toml"
     path.write_text(tomli_w.dumps(rig), encoding="utf-8")
     return path
+
+
+def demo_table(name: str) -> dict[str, Any]:
+    """The demo rig as a table, under another name and on a free port; it records to `takes` beside it."""
+    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    rig: dict[str, Any] = tomllib.loads(text)
+    rig["name"] = name
+    rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"
+    rig["record"] |= {"enabled": True, "directory": "takes"}
+    return rig
 
 
 def endpoint_of(rig: Path) -> str:

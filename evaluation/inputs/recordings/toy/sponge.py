@@ -40,7 +40,7 @@ class MeshState:
 
 
 def states(references: Sequence[ReferenceFrame], frames: Sequence[TrackedFrame]) -> list[MeshState]:
-    """What every frame of a sequence without gaps, tracked with one mesh, shows of it."""
+    """Statistics of every frame of a sequence without gaps, tracked with one mesh."""
     first = frames[0]
     mesh, images, masks = first.estimate.vertices, [one.grey for one in references], [one.mask for one in references]
     found = features.tracks(images, masks, features.corners(images[0], masks[0]))
@@ -72,7 +72,7 @@ def distances(vertices: NDArray[np.float64], reference: ReferenceFrame) -> NDArr
 
 
 def folded(vertices: NDArray[np.float64], first: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.bool_]:
-    """Which faces (m,) are folded: turned over, seen from the origin, or by more than 90° from a neighbour.
+    """Mask (m,) of the faces that are folded: turned over, seen from the origin, or by more than 90° from a neighbour.
 
     Args:
         vertices: of the mesh (n, 3) [m].

@@ -62,7 +62,7 @@ def test_a_direction_that_no_measurement_holds_is_found_in_a_single_frame():
     local[:, 0, 0] = local[:, 1, 1] = 1.0
     jacobian = SparseJacobian(local, np.zeros(30, np.int32), np.array([[0, 1]]), 2)
     prior, measured = 1e4 * np.eye(2), np.diag([0.0, 1e6])
-    found = unheld_deviation(measured + prior, prior, prior, jacobian)
+    found = unheld_deviation(measured, prior, jacobian)
     assert found == pytest.approx(np.sqrt(1 / (KEPT_PRIOR * 1e4) + 1 / (1e6 + KEPT_PRIOR * 1e4)), rel=1e-6)
-    held = unheld_deviation(1e6 * np.eye(2) + prior, prior, prior, jacobian)
+    held = unheld_deviation(1e6 * np.eye(2), prior, jacobian)
     assert held == pytest.approx(np.sqrt(2e-6), rel=1e-3)
