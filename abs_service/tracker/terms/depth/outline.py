@@ -16,7 +16,7 @@ from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
 from abs_service.tracker.terms.depth.outline_distance import inwards
-from abs_service.tracker.terms.depth.rim import Rim, chain, locate
+from abs_service.tracker.terms.depth.rim import Rim, chain, locate, shared_by_side
 from abs_service.tracker.terms.depth.rim_classes import LARGEST_GAP_STEPS, RimClass, classify_rim
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import Visibility
@@ -174,7 +174,7 @@ class RimOutline:
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
         chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
-        shared = _sums_by_side(jacobian, slopes[use])
+        shared = shared_by_side(jacobian, residual[use], slopes[use])
         return Linearization(residual[use], jacobian, positions=points[use], shared=shared)
 
     def fit(self, surface: Surface) -> RimFit:
@@ -232,9 +232,3 @@ class RimOutline:
         distance = np.linalg.norm(points[inside] - self._camera.center, axis=1)
         hidden[inside] = expected[row[inside], column[inside]] < distance - HIDDEN_BEHIND_M
         return hidden
-
-
-def _sums_by_side(jacobian: NDArray[np.float64], slopes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, by their image gradients (k, 2)."""
-    quarter = np.floor(np.arctan2(slopes[:, 1], slopes[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
-    return np.stack([jacobian[quarter == side].sum(axis=0) for side in range(4)])

@@ -130,3 +130,21 @@ def locate(
         for i in range(2):
             places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
     look_up(inwards, places[0], values, slopes)
+
+
+def shared_by_side(
+    jacobian: NDArray[np.float64], residual: NDArray[np.float64], slopes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, times their shared deviation.
+
+    It is one, that of the outline, or what the normalised residuals (k,) show: an edge that the mesh cannot follow is
+    not where the outline says.
+
+    Args:
+        jacobian, residual: of the free edges.
+        slopes: image gradients (k, 2) of their distances from the outline, which tell the side.
+    """
+    quarter = np.floor(np.arctan2(slopes[:, 1], slopes[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
+    sides = quarter == np.arange(4)[:, None]
+    mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
+    return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)

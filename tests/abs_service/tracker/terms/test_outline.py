@@ -142,6 +142,23 @@ def test_a_sheet_that_slid_along_itself_is_drawn_back():
         np.testing.assert_allclose(theta[3:5] + step, 0, atol=1.5e-3)
 
 
+def test_edges_that_disagree_with_the_outline_share_a_larger_error():
+    """One side of the image moves against the mesh by 2 px: its shared error is as large as the misfit."""
+    term, model = outline(picture()), Rigid(MESH)
+    at_rest, slid = (
+        term.linearize(model.deform(theta[None]), model.sparse_jacobian(theta))
+        for theta in (np.zeros(6), np.array([0, 0, 0, 0.01, 0, 0]))
+    )
+    assert np.mean(at_rest.residual**2) < 1
+    along_x, along_y = 3, 4
+    right, left = (
+        slid.shared[0, along_x] / at_rest.shared[0, along_x],
+        slid.shared[2, along_x] / at_rest.shared[2, along_x],
+    )
+    np.testing.assert_allclose((right, left), 2 / 0.5, rtol=0.2)
+    np.testing.assert_allclose(slid.shared[[1, 3], along_y], at_rest.shared[[1, 3], along_y], rtol=0.05)
+
+
 def test_rows_predict_what_residuals_do():
     term, model = outline(picture()), Rigid(MESH)
     theta = np.array([0.01, -0.02, 0.03, 2e-3, 1e-3, 4e-3])
