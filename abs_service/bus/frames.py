@@ -2,7 +2,8 @@
 
 import threading
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Self
 
 from abs_service.bus import keys
@@ -106,17 +107,18 @@ class FrameSubscriber:
     Args:
         bus: where the frames are published.
         streams: (sensor, stream) of each stream wanted.
+        clock: CLOCK_MONOTONIC [ns], which tells when a frame is received.
         depth: frames per stream that may wait.
     """
 
-    def __init__(self, bus: Bus, streams: Iterable[tuple[str, str]], depth: int = DEPTH) -> None:
-        self._queue: LatestQueue[Sample] = LatestQueue(depth)
+    def __init__(
+        self, bus: Bus, streams: Iterable[tuple[str, str]], clock: Callable[[], int], depth: int = DEPTH
+    ) -> None:
+        self._queue: LatestQueue[tuple[Sample, int]] = LatestQueue(depth)
+        self._clock = clock
         self._malformed: Counter[str] = Counter()
         self.last_error = ""
-        self._subscriptions = [
-            bus.subscribe(keys.image(sensor, stream), lambda sample: self._queue.put(sample.topic, sample))
-            for sensor, stream in streams
-        ]
+        self._subscriptions = [bus.subscribe(keys.image(sensor, stream), self._receive) for sensor, stream in streams]
 
     @property
     def dropped(self) -> Mapping[str, int]:
@@ -133,7 +135,7 @@ class FrameSubscriber:
         entry = self._queue.take(timeout_s)
         if entry is None:
             return None
-        topic, sample = entry
+        topic, (sample, t_received_ns) = entry
         try:
             frame = codec.decode(sample.payload, sample.attachment)
             if keys.image(frame.sensor, frame.stream) != topic:
@@ -142,10 +144,13 @@ class FrameSubscriber:
             self._malformed[topic] += 1
             self.last_error = str(error)
             return None
-        return frame
+        return replace(frame, t_received_ns=t_received_ns)
 
     def close(self) -> None:
         """Ends the subscriptions and wakes threads that wait in `take`."""
         for subscription in self._subscriptions:
             subscription.close()
         self._queue.close()
+
+    def _receive(self, sample: Sample) -> None:
+        self._queue.put(sample.topic, (sample, self._clock()))

@@ -88,7 +88,7 @@ def _live(
     headers: HeaderFactory,
     health: Health,
 ) -> LiveTracker:
-    frames = FrameSubscriber(bus, streams(rig.sensors.values()))
+    frames = FrameSubscriber(bus, streams(rig.sensors.values()), time.monotonic_ns)
     synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,

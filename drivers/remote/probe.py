@@ -75,7 +75,7 @@ def probe(link: Link, rig: str, address: Address) -> RemoteRig:
     silent = sorted(set(wanted) - {stream.sensor for stream in streams})
     if silent:
         raise DeviceError(f'sensor {", ".join(silent)} of rig "{rig}" delivers nothing yet')
-    clocks = {model.host_clock for model in models.values()}
+    clocks = {model.header.host_clock for model in models.values()}
     return RemoteRig(cameras, streams, same_clock=clocks == {host_clock()} and clocks != {""})
 
 

@@ -2,6 +2,7 @@
 
 import queue
 import signal
+import time
 
 import pytest
 from absmsg.v1.health_pb2 import Health
@@ -35,7 +36,9 @@ def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, la
         changes, health = queue.SimpleQueue(), queue.SimpleQueue()
         bus.watch_liveliness(lambda *change: changes.put(change))
         bus.subscribe("health/capture", lambda sample: health.put(Health.FromString(sample.payload)))
-        subscriber = FrameSubscriber(bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")])
+        subscriber = FrameSubscriber(
+            bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")], time.monotonic_ns
+        )
         process = launch("capture", rig, "--connect", endpoint)
         assert changes.get(timeout=60) == ("capture", True)
         seen = {}

@@ -36,9 +36,9 @@ class Bench:
         self.now_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
-        self.headers = HeaderFactory("demo", self.wall)
+        self.headers = self.capture = HeaderFactory("demo", self.wall, host="here")
         self.health = Health(self.bus, "track/sheet", self.headers)
-        frames = FrameSubscriber(self.bus, MEMBERS)
+        frames = FrameSubscriber(self.bus, MEMBERS, lambda: self.now_ns)
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
         self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
         self.live = LiveTracker(
@@ -62,8 +62,8 @@ class Bench:
         self.now_ns = max(self.now_ns, SIMULATION.time_ns(k))
         for taken in SIMULATION.expose(k)[0]:
             if taken.kind in kinds:
-                frame = dataclasses.replace(change(taken), t_arrival_ns=self.now_ns)
-                header = self.headers.at(frame.t_host_ns, frame.seq)
+                frame = change(dataclasses.replace(taken, t_arrival_ns=self.now_ns))
+                header = self.capture.at(frame.t_host_ns, frame.seq)
                 publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
                 publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
 
@@ -277,3 +277,49 @@ def test_a_wrong_depth_scale_is_a_warning_until_it_is_right(bench):
     bench.live.process_next()
     assert list(bench.states[1].warnings) == []
     assert bench.said.level == Message.LEVEL_OK
+
+
+class Elsewhere:
+    """The cameras of a bench are on another host.
+
+    Args:
+        bench: where the tracker runs.
+        behind_ns: how far that host's clock is behind ours.
+        boot: which boot of that host.
+    """
+
+    def __init__(self, bench, behind_ns, boot="first boot"):
+        self._bench, self._behind_ns = bench, behind_ns
+        bench.capture = HeaderFactory("demo", bench.wall, host=boot)
+
+    def expose(self, k, **given):
+        self._bench.expose(k, self._shift, **given)
+
+    def _shift(self, frame):
+        times = {name: getattr(frame, name) - self._behind_ns for name in ("t_host_ns", "t_arrival_ns")}
+        return dataclasses.replace(frame, **times, epoch=max(frame.t_host_ns - self._behind_ns, 0) // 10**8)
+
+
+def test_estimates_go_on_after_a_reboot_of_the_capture_host(bench):
+    cameras = Elsewhere(bench, -(10**15))
+    for k in range(3):
+        cameras.expose(k)
+        bench.live.process_next()
+    cameras = Elsewhere(bench, -(10**10), boot="second boot")
+    for k in range(3, 6):
+        cameras.expose(k)
+        bench.live.process_next()
+    assert [state.status for state in bench.states] == 6 * [DeformationState.STATUS_TRACKING]
+    assert [state.mesh_version for state in bench.states] == [1, 1, 1, 2, 2, 2]
+
+
+def test_a_tracker_whose_clock_is_far_ahead_waits_for_all_sensors(bench):
+    depth = next(kind for kind in Kind if kind.value == MEMBERS[0][1])
+    cameras = Elsewhere(bench, 2000 * 10**9)
+    for k in range(3):
+        cameras.expose(k, kinds=(depth,))
+        bench.live.process_next()
+        cameras.expose(k, kinds=set(Kind) - {depth})
+        bench.live.process_next()
+    assert len(bench.states) == 3
+    assert not any(sensor.missing for state in bench.states for sensor in state.sensors)
