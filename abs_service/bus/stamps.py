@@ -81,6 +81,14 @@ class HeaderFactory:
         header.stamp.FromNanoseconds(self.clock.wall(t_host_ns))
         return header
 
+    def elsewhere(
+        self, t_host_ns: int, host_clock: str, t_here_ns: int, seq: int, frame_id: str = ""
+    ) -> common_pb2.Header:
+        """The header of a message about a moment on another host's clock, which was `t_here_ns` on this one's."""
+        header = self.at(t_here_ns, seq, frame_id)
+        header.t_host_ns, header.host_clock = t_host_ns, host_clock
+        return header
+
     def now(self, seq: int, frame_id: str = "") -> common_pb2.Header:
         """The header of a message about the present moment."""
         return self.at(self.clock.monotonic(), seq, frame_id)

@@ -58,7 +58,8 @@ class RunSession:
         self._clock = clock
         self._begin_ns = self._queried_ns = clock.monotonic()
         self._live = rig_state.RigState(trackers, clock.monotonic)
-        self._health = Health(bus, "run", HeaderFactory(rig, clock))
+        self._headers = HeaderFactory(rig, clock)
+        self._health = Health(bus, "run", self._headers)
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:
             bus.subscribe(pattern, lambda sample: self._inbox.put(sample.topic, sample))
@@ -99,6 +100,7 @@ class RunSession:
             children=tuple(self._supervisor.children.values()),
             elapsed_s=self.elapsed_s,
             now_ns=self._clock.monotonic(),
+            host_clock=self._headers.host_clock,
         )
 
     def _listen(self, seconds: float) -> None:

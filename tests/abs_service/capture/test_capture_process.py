@@ -7,10 +7,12 @@ import time
 import pytest
 from absmsg.v1.health_pb2 import Health
 
+from abs_service.bus import keys
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Level
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
+from drivers.contract.host_clock import host_clock
 
 pytestmark = pytest.mark.slow  # starts an interpreter that imports and compiles everything
 
@@ -47,7 +49,7 @@ def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, la
             assert frame is not None
             seen[frame.key] = frame
         assert {sample.topic for sample in bus.query("**", 2)} == {
-            *("config", "schema", "tf"),
+            *("config", "schema", "tf", keys.clock(host_clock())),
             *("tof/model", "tof/calibration", "color/model", "color/calibration"),
         }
         assert changes.empty(), "it is not alive for others any more"

@@ -9,6 +9,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus import keys
+from abs_service.bus.clock_offsets import ClockOffsets, answer
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
@@ -41,6 +42,7 @@ class Bench:
         frames = FrameSubscriber(self.bus, MEMBERS, lambda: self.now_ns)
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
         self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
+        self.clocks = ClockOffsets(self.bus, lambda: self.now_ns, "here")
         self.live = LiveTracker(
             self.tracking,
             self.sets,
@@ -48,6 +50,7 @@ class Bench:
             self.health,
             NoiseMonitor(self.health),
             self.clock,
+            self.clocks,
             budget_ms,
         )
         self.tick_ns = 0
@@ -288,7 +291,7 @@ class Elsewhere:
         boot: which boot of that host.
     """
 
-    def __init__(self, bench, behind_ns, boot="first boot"):
+    def __init__(self, bench, behind_ns, boot="first-boot"):
         self._bench, self._behind_ns = bench, behind_ns
         bench.capture = HeaderFactory("demo", bench.wall, host=boot)
 
@@ -305,7 +308,7 @@ def test_estimates_go_on_after_a_reboot_of_the_capture_host(bench):
     for k in range(3):
         cameras.expose(k)
         bench.live.process_next()
-    cameras = Elsewhere(bench, -(10**10), boot="second boot")
+    cameras = Elsewhere(bench, -(10**10), boot="second-boot")
     for k in range(3, 6):
         cameras.expose(k)
         bench.live.process_next()
@@ -323,3 +326,27 @@ def test_a_tracker_whose_clock_is_far_ahead_waits_for_all_sensors(bench):
         bench.live.process_next()
     assert len(bench.states) == 3
     assert not any(sensor.missing for state in bench.states for sensor in state.sensors)
+
+
+def test_the_age_across_hosts_is_unknown_until_their_clocks_are_compared(bench):
+    cameras, behind_ns = Elsewhere(bench, 2000 * 10**9), 2000 * 10**9
+    there = WallClock(monotonic=lambda: bench.now_ns - behind_ns, wall=lambda: 0)
+    answer(bench.bus, HeaderFactory("demo", there, host="first-boot"))
+    for k in range(2):
+        cameras.expose(k)
+        bench.now_ns += 7_000_000
+        bench.live.process_next()
+        bench.clocks.measure()
+    before, after = bench.states
+    assert np.isnan([before.age_ms, before.age_error_ms]).all()
+    assert after.age_ms == pytest.approx(7)
+    assert after.age_error_ms == pytest.approx(0, abs=0.1)
+    assert (after.header.host_clock, after.header.t_host_ns) == ("first-boot", SIMULATION.time_ns(1) - behind_ns)
+    assert after.header.stamp.ToNanoseconds() == 10**18 + SIMULATION.time_ns(1)
+    assert bench.said.gauges["clock.offset_s"] == pytest.approx(2000)
+
+
+def test_on_one_host_the_age_has_no_error(bench):
+    bench.expose(0)
+    bench.live.process_next()
+    assert bench.states[0].age_error_ms == 0
