@@ -7,7 +7,8 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import IO, Protocol
 
 from abs_service.supervision import parent_watchdog
@@ -26,6 +27,10 @@ class Process(Protocol):
 
     def poll(self) -> int | None:
         """The exit code, negative for a signal; None while it runs."""
+        ...
+
+    def waited_ns(self) -> Mapping[int, int]:
+        """Time that its threads have waited for a processor so far [ns], by number of the thread."""
         ...
 
     def terminate(self) -> None:
@@ -49,6 +54,10 @@ class _NoProcess:
     def poll(self) -> int:
         """0: ended."""
         return 0
+
+    def waited_ns(self) -> Mapping[int, int]:
+        """Nothing."""
+        return {}
 
     def terminate(self) -> None:
         """Does nothing."""
@@ -109,6 +118,15 @@ class ChildProcess:
     def poll(self) -> int | None:
         """See `Process`."""
         return self._process.poll()
+
+    def waited_ns(self) -> Mapping[int, int]:
+        """See `Process`; empty if it has ended, or where the kernel does not say (/proc/PID/task/*/schedstat)."""
+        waited: dict[int, int] = {}
+        with contextlib.suppress(OSError):
+            for task in Path(f"/proc/{self.pid}/task").iterdir():
+                with contextlib.suppress(OSError):  # the thread has ended
+                    waited[int(task.name)] = int((task / "schedstat").read_text(encoding="ascii").split()[1])
+        return waited
 
     def terminate(self) -> None:
         """See `Process`."""

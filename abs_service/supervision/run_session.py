@@ -132,7 +132,9 @@ class RunSession:
     def _report(self) -> None:
         for child in self._supervisor.children.values():
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
-            self._health.report(child.component, _LEVELS.get(child.state, Level.OK), _condition(child))
+            starved = child.state is State.RUNNING and child.reason
+            level = Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
+            self._health.report(child.component, level, _condition(child))
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         self._health.tick()
 

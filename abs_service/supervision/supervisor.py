@@ -5,7 +5,7 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -16,6 +16,8 @@ _log = logging.getLogger(__name__)
 
 #: Backoff before a restart: doubles with each end within the window, up to the longest.
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
+#: A longer time between two calls of `poll` was a stop of this process, in which it heard no child [ns].
+PAUSE_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class Limits:
     Attributes:
         restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
         startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
-        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns].
+        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it waited
+            for a processor is added, up to `startup_ns`.
         stop_ns: time that all processes together have to end in order [ns].
     """
 
@@ -72,6 +75,8 @@ class Child:
     process: Process = field(default=NO_PROCESS, repr=False)
     deadline_ns: int = 0
     start_at_ns: int = 0
+    heard_ns: int = 0
+    waited_ns: Mapping[int, int] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
 
@@ -92,10 +97,12 @@ class Supervisor:
         self._spawn = spawn
         self._clock = clock
         self._limits = limits or Limits()
+        self._polled_ns = clock()
 
     def poll(self) -> None:
         """Starts, restarts and gives up children as due."""
         now_ns = self._clock()
+        self._excuse_pause(now_ns)
         for child in self.children.values():
             if child.state is State.RUNNING:
                 self._check(child, now_ns)
@@ -106,7 +113,9 @@ class Supervisor:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)
         if child is not None and child.state is State.RUNNING:
-            child.deadline_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.heard_ns = self._clock()
+            child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.waited_ns, child.reason = child.process.waited_ns(), ""
 
     def misconfigured(self) -> Child | None:
         """A child that ended with a user error, after which the rig should stop; None if there is none."""
@@ -147,14 +156,32 @@ class Supervisor:
             for child in children:
                 self._finalize(child)
 
+    def _excuse_pause(self, now_ns: int) -> None:
+        """Extends all deadlines by the time in which this process did not run, and heard nobody."""
+        paused_ns, self._polled_ns = now_ns - self._polled_ns, now_ns
+        if paused_ns > PAUSE_NS:
+            for child in self.children.values():
+                child.deadline_ns += paused_ns
+
+    def _is_starved(self, child: Child, now_ns: int) -> bool:
+        """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
+        waited = child.process.waited_ns()
+        longest_ns = max((waited[thread] - child.waited_ns.get(thread, 0) for thread in waited), default=0)
+        if now_ns >= child.deadline_ns + min(longest_ns, self._limits.startup_ns):
+            return False
+        silent_s = (now_ns - child.heard_ns) / 1e9
+        child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
+        return True
+
     def _start(self, child: Child, now_ns: int) -> None:
         child.process = self._spawn(child.component, child.arguments)
         child.state, child.reason = State.RUNNING, ""
+        child.heard_ns, child.waited_ns = now_ns, {}
         child.deadline_ns = now_ns + self._limits.startup_ns
 
     def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
-        if code is None and now_ns < child.deadline_ns:
+        if code is None and (now_ns < child.deadline_ns or self._is_starved(child, now_ns)):
             return
         if code is None:
             child.process.kill()

@@ -15,6 +15,9 @@ class Idle:
     def poll(self) -> int | None:
         return self._code
 
+    def waited_ns(self) -> dict[int, int]:
+        return {}
+
     def terminate(self) -> None:
         self._ended.append(self._component)
         self._code = 0

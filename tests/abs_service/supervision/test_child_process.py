@@ -8,6 +8,7 @@ import time
 import pytest
 
 from abs_service.supervision.child_process import ChildProcess
+from tests.waiting import eventually
 
 PATH = os.pathsep.join(sys.path)
 
@@ -74,6 +75,7 @@ def test_killing_a_child_kills_what_it_started(child):
 SUPERVISOR = """
 import sys, time
 from abs_service.supervision.child_process import ChildProcess
+from tests.waiting import eventually
 code = '''
 import signal, time
 from abs_service import lifeline
@@ -116,3 +118,12 @@ def gone(pid, seconds=5.0):
             return True
         time.sleep(0.02)
     return False
+
+
+def test_the_time_that_a_child_waits_for_a_processor_is_known(child):
+    busy = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nwhile True: pass"
+    first, second = child(busy), child(busy)
+    both = [first, second]
+    assert eventually(lambda: all(max(one.waited_ns().values(), default=0) > 100_000_000 for one in both))
+    first.kill()
+    assert first.waited_ns() == {}
