@@ -27,8 +27,8 @@ class Limits:
     Attributes:
         restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
         startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
-        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it waited
-            for a processor is added, up to `startup_ns`.
+        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it
+            waited for a processor is added, up to `startup_ns`.
         stop_ns: time that all processes together have to end in order [ns].
     """
 

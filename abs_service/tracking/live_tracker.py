@@ -16,6 +16,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
+from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
@@ -55,10 +56,11 @@ class FrameSetQueue:
     def counters(self) -> Mapping[str, int]:
         """Counters of losses.
 
-        `skipped` frame sets; by topic, frames `dropped` unseen and `malformed` messages; by stream and cause, frames
-        that are in no set and so `unused`.
+        `skipped` frame sets; by topic, frames that were published and `lost` on the bus, frames `dropped` unseen here
+        and `malformed` messages; by stream and cause, frames that are in no set and so `unused`.
         """
         counters = {"skipped": self.skipped}
+        counters |= {f"lost.{topic}": number for topic, number in self._frames.lost.items()}
         counters |= {f"dropped.{topic}": number for topic, number in self._frames.dropped.items()}
         counters |= {f"malformed.{topic}": number for topic, number in self._frames.malformed.items()}
         counters |= {f"unused.{stream}": number for stream, number in self._synchroniser.counters.items()}
@@ -68,7 +70,8 @@ class FrameSetQueue:
     def dropped(self) -> Mapping[str, int]:
         """Frames so far that are in no set, by sensor, whatever the cause."""
         total: Counter[str] = Counter()
-        for counts in (self._frames.dropped, self._frames.malformed, self._synchroniser.counters):
+        frames = self._frames
+        for counts in (frames.lost, frames.dropped, frames.malformed, self._synchroniser.counters):
             for name, number in counts.items():
                 total[name.partition("/")[0]] += number
         return total
@@ -174,6 +177,9 @@ class LiveTracker:
         self._clocks = clocks
         self._budget_ns = round(budget_ms * 1e6)
         self._reported = 0
+        self._silence_monitor = SilenceMonitor(clock)
+        self._rejected = 0
+        self._losses_before = self._losses()  # at the last estimate
 
     def process_next(self) -> None:
         """Processes the next frame set, if there is one."""
@@ -184,6 +190,7 @@ class LiveTracker:
         try:
             estimate = self._tracking.track(frames, lambda: self._clock() - begin_ns < self._budget_ns)
         except ObservationError as error:
+            self._rejected += 1
             self._health.count("rejected")
             self._health.report("observation", Level.ERROR, str(error))
             return
@@ -196,6 +203,8 @@ class LiveTracker:
         age_ms, age_error_ms = self._age_ms(estimate.t_host_ns, known)
         effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, age_error_ms, skipped, self._sets.dropped)
         self._publisher.publish(estimate, self._tracking, effort, frames.host_clock, offset)
+        self._silence_monitor.add()
+        self._losses_before = self._losses()
         self._report(estimate, solve_ms)
 
     def report(self) -> None:
@@ -203,6 +212,19 @@ class LiveTracker:
         self._health.count_up_to(self._sets.counters)
         if self._sets.last_error:
             self._health.label("malformed", self._sets.last_error)
+        silence = self._silence_monitor.check()
+        message = f"{silence}: {self._cause_of_silence()}" if silence else ""
+        self._health.report("estimates", Level.ERROR if silence else Level.OK, message)
+
+    def _cause_of_silence(self) -> str:
+        """What has come since the last estimate, instead of a frame set."""
+        since = Counter(self._losses())
+        since.subtract(self._losses_before)
+        causes = [f"{name} {number}" for name, number in since.most_common(3) if number > 0]
+        return f"since then {', '.join(causes)}" if causes else "no frames come from the cameras"
+
+    def _losses(self) -> Mapping[str, int]:
+        return {**self._sets.counters, "rejected": self._rejected}
 
     def _age_ms(self, t_host_ns: int, known: Offset | None) -> tuple[float, float]:
         """Time since an exposure and its largest error; NaN if the offset between the clocks is unknown."""

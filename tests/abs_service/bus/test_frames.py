@@ -17,6 +17,7 @@ from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus
+from tests.waiting import eventually
 
 
 def frame(seq, sensor="tof", stream="depth", epoch=0):
@@ -97,6 +98,16 @@ def test_a_received_frame_says_when_it_came_and_of_which_clock_its_times_are():
     arrived = subscriber.take(0)
     assert arrived is not None
     assert (arrived.host_clock, arrived.t_received_ns, arrived.t_arrival_ns) == ("camera", 7, 10**9 + 5)
+
+
+def test_images_are_numbered_as_they_are_published(headers):
+    bus = LoopbackBus()
+    with publisher(bus, headers) as sink:
+        for number, seq in enumerate((5, 9, 10)):
+            sink.on_frame(frame(seq))
+            assert eventually(lambda number=number: sink.published.get("tof/depth/image", 0) > number)
+    infos = [frame_info_pb2.FrameInfo.FromString(sample.attachment) for sample in bus.sent]
+    assert [(info.header.seq, info.seq) for info in infos] == [(0, 5), (1, 9), (2, 10)]
 
 
 def test_a_publisher_that_falls_behind_drops_the_oldest_and_never_blocks(headers):

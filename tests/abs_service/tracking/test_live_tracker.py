@@ -1,6 +1,7 @@
 """A live tracker takes frame sets, counts what it passed over, and announces its mesh before it uses it."""
 
 import dataclasses
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -34,7 +35,7 @@ class Bench:
     """A live tracker on a loopback bus with a clock that only the test moves."""
 
     def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, **parts):
-        self.now_ns = 0
+        self.now_ns = self.tick_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
         self.headers = self.capture = HeaderFactory("demo", self.wall, host="here")
@@ -53,7 +54,8 @@ class Bench:
             self.clocks,
             budget_ms,
         )
-        self.tick_ns = 0
+        self.published = Counter()
+        self.lost = set()  # exposures that the bus loses
 
     def clock(self):
         """Time passes whenever the tracker looks at it."""
@@ -66,9 +68,12 @@ class Bench:
         for taken in SIMULATION.expose(k)[0]:
             if taken.kind in kinds:
                 frame = change(dataclasses.replace(taken, t_arrival_ns=self.now_ns))
-                header = self.capture.at(frame.t_host_ns, frame.seq)
-                publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
-                publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
+                topic = keys.image(*frame.key)
+                header = self.capture.at(frame.t_host_ns, self.published[topic])
+                self.published[topic] += 1
+                if k not in self.lost:
+                    publisher = self.bus.publisher(topic, codec.IMAGE_SCHEMA, IMAGES)
+                    publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
 
     def sent(self, topic, message):
         return [message.FromString(sample.payload) for sample in self.bus.sent if sample.topic == topic]
@@ -175,6 +180,48 @@ def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
     dropped = [number for name, number in counters.items() if name.startswith("dropped.")]
     assert len(dropped) == 3
     assert counters["skipped"] + dropped[0] == 9
+
+
+def test_frames_that_the_bus_lost_are_counted_by_topic_and_sensor(bench):
+    bench.lost = {1, 2, 4}
+    for k in range(6):
+        bench.expose(k)
+        bench.live.process_next()
+    counters = bench.said.counters
+    topics = [keys.image(*key) for key in MEMBERS]
+    assert {topic: counters[f"lost.{topic}"] for topic in topics} == dict.fromkeys(topics, 3)
+    assert {sensor.sensor: sensor.dropped for sensor in bench.states[-1].sensors} == {"tof": 6, "color": 3}
+
+
+SECOND = 1_000_000_000
+
+
+def test_a_tracker_without_frames_is_an_error_until_they_come(bench):
+    bench.expose(0)
+    bench.live.process_next()
+    bench.now_ns += SECOND
+    assert bench.said.level == Message.LEVEL_OK, "the first may take long"
+    for _ in range(10):
+        bench.now_ns += SECOND
+        said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert said.message == "no estimate for 11 s: no frames come from the cameras"
+    bench.expose(1)
+    bench.live.process_next()
+    assert bench.said.level == Message.LEVEL_OK
+
+
+def test_a_tracker_whose_frames_are_all_of_no_use_says_why(bench):
+    for k in range(3):
+        bench.expose(k, lambda frame: dataclasses.replace(frame, epoch=5))
+        bench.live.process_next()
+    for k in range(3, 50):
+        bench.expose(k)  # of an older epoch
+        bench.live.process_next()
+    said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert said.message.startswith("no estimate for 2 s: since then unused.")
+    assert ".old_epoch 47" in said.message
 
 
 def test_without_frames_nothing_is_published(bench):
