@@ -8,6 +8,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Protocol
 
@@ -15,6 +16,15 @@ from abs_service.supervision import parent_watchdog
 
 #: Lines of a child's output that are kept.
 TAIL_LINES = 40
+
+
+@dataclass(frozen=True, slots=True)
+class ThreadTimes:
+    """Time that a thread has run, and has waited for a processor before it ran last [ns]; whether it would run now."""
+
+    ran_ns: int = 0
+    waited_ns: int = 0
+    runnable: bool = False
 
 
 class Process(Protocol):
@@ -29,8 +39,8 @@ class Process(Protocol):
         """The exit code, negative for a signal; None while it runs."""
         ...
 
-    def waited_ns(self) -> Mapping[int, int]:
-        """Time that its threads have waited for a processor so far [ns], by number of the thread."""
+    def threads(self) -> Mapping[int, ThreadTimes]:
+        """Processor times of its threads so far, by their number."""
         ...
 
     def terminate(self) -> None:
@@ -55,8 +65,8 @@ class _NoProcess:
         """0: ended."""
         return 0
 
-    def waited_ns(self) -> Mapping[int, int]:
-        """Nothing."""
+    def threads(self) -> Mapping[int, ThreadTimes]:
+        """None."""
         return {}
 
     def terminate(self) -> None:
@@ -119,14 +129,14 @@ class ChildProcess:
         """See `Process`."""
         return self._process.poll()
 
-    def waited_ns(self) -> Mapping[int, int]:
+    def threads(self) -> Mapping[int, ThreadTimes]:
         """See `Process`; empty if it has ended, or where the kernel does not say (/proc/PID/task/*/schedstat)."""
-        waited: dict[int, int] = {}
+        threads: dict[int, ThreadTimes] = {}
         with contextlib.suppress(OSError):
             for task in Path(f"/proc/{self.pid}/task").iterdir():
                 with contextlib.suppress(OSError):  # the thread has ended
-                    waited[int(task.name)] = int((task / "schedstat").read_text(encoding="ascii").split()[1])
-        return waited
+                    threads[int(task.name)] = _thread_times(task)
+        return threads
 
     def terminate(self) -> None:
         """See `Process`."""
@@ -150,3 +160,10 @@ class ChildProcess:
             for line in output:
                 self._lines.append(line.rstrip("\n"))
                 on_line(component, line.rstrip("\n"))
+
+
+def _thread_times(task: Path) -> ThreadTimes:
+    ran, waited, _ = (task / "schedstat").read_text(encoding="ascii").split()
+    # After the name in brackets, which may hold anything.
+    state = (task / "stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[0]
+    return ThreadTimes(int(ran), int(waited), state == "R")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn
+from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
@@ -76,7 +76,7 @@ class Child:
     deadline_ns: int = 0
     start_at_ns: int = 0
     heard_ns: int = 0
-    waited_ns: Mapping[int, int] = field(default_factory=dict, repr=False)
+    threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
 
@@ -115,7 +115,7 @@ class Supervisor:
         if child is not None and child.state is State.RUNNING:
             child.heard_ns = self._clock()
             child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
-            child.waited_ns, child.reason = child.process.waited_ns(), ""
+            child.threads, child.reason = child.process.threads(), ""
 
     def misconfigured(self) -> Child | None:
         """A child that ended with a user error, after which the rig should stop; None if there is none."""
@@ -165,18 +165,17 @@ class Supervisor:
 
     def _is_starved(self, child: Child, now_ns: int) -> bool:
         """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
-        waited = child.process.waited_ns()
-        longest_ns = max((waited[thread] - child.waited_ns.get(thread, 0) for thread in waited), default=0)
-        if now_ns >= child.deadline_ns + min(longest_ns, self._limits.startup_ns):
+        silent_ns = now_ns - child.heard_ns
+        waited_ns = _longest_wait_ns(child.threads, child.process.threads(), silent_ns)
+        if now_ns >= child.deadline_ns + min(waited_ns, self._limits.startup_ns):
             return False
-        silent_s = (now_ns - child.heard_ns) / 1e9
-        child.reason = f"no health for {silent_s:.0f} s, because it waits for a processor"
+        child.reason = f"no health for {silent_ns / 1e9:.0f} s, because it waits for a processor"
         return True
 
     def _start(self, child: Child, now_ns: int) -> None:
         child.process = self._spawn(child.component, child.arguments)
         child.state, child.reason = State.RUNNING, ""
-        child.heard_ns, child.waited_ns = now_ns, {}
+        child.heard_ns, child.threads = now_ns, {}
         child.deadline_ns = now_ns + self._limits.startup_ns
 
     def _check(self, child: Child, now_ns: int) -> None:
@@ -223,6 +222,17 @@ class Supervisor:
 
     def _failed(self) -> list[Child]:
         return [child for child in self.children.values() if child.state is State.FAILED]
+
+
+def _longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, ThreadTimes], elapsed_ns: int) -> int:
+    """Longest time that a thread has waited for a processor within the elapsed time."""
+    waits_ns = [0]
+    for thread, times in now.items():
+        earlier = before.get(thread, ThreadTimes())
+        # The kernel counts a wait when it is over; a thread that would run now has waited since it ran last.
+        waited_ns = elapsed_ns if times.runnable else times.waited_ns - earlier.waited_ns
+        waits_ns.append(min(waited_ns, elapsed_ns - (times.ran_ns - earlier.ran_ns)))
+    return max(waits_ns)
 
 
 def _exit_reason(code: int, output_tail: str) -> str:

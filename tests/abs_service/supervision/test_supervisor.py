@@ -1,5 +1,6 @@
 import pytest
 
+from abs_service.supervision.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 
@@ -12,10 +13,10 @@ class FakeProcess:
     def __init__(self, world, component, pid):
         self.world, self.component, self.pid = world, component, pid
         self.code = None
-        self.waited = {}
+        self.its_threads = {}
 
-    def waited_ns(self):
-        return self.waited
+    def threads(self):
+        return self.its_threads
 
     def poll(self):
         return self.code
@@ -201,7 +202,7 @@ def test_a_child_that_waits_for_a_processor_is_not_killed_until_it_hangs(world):
     supervisor.heartbeat("track/a")
     child, process = supervisor.children["track/a"], world.latest("track/a")
     for waited_s in range(60):
-        process.waited = {1: waited_s * S, 2: 7}
+        process.its_threads = {1: ThreadTimes(S // 100, waited_s * S), 2: ThreadTimes(7, 7)}
         passes(world, supervisor, 1)
     assert world.events == []
     assert child.reason == "no health for 60 s, because it waits for a processor"
@@ -211,11 +212,21 @@ def test_a_child_that_waits_for_a_processor_is_not_killed_until_it_hangs(world):
     assert ("kill", "track/a") in world.events
 
 
+@pytest.mark.parametrize(("ran_share", "killed"), [(0.0, False), (1.0, True)])
+def test_a_child_that_would_run_is_starved_if_it_did_not_run_and_hangs_if_it_did(world, ran_share, killed):
+    supervisor = world.supervisor("track/a")
+    supervisor.heartbeat("track/a")
+    for second in range(20):
+        world.latest("track/a").its_threads = {1: ThreadTimes(int(ran_share * second * S), 0, runnable=True)}
+        passes(world, supervisor, 1)
+    assert (("kill", "track/a") in world.events) is killed
+
+
 def test_a_child_that_waits_for_ever_is_killed_in_the_end(world):
     supervisor = world.supervisor("track/a", startup_ns=20 * S)
     supervisor.heartbeat("track/a")
     for waited_s in range(31):
-        world.latest("track/a").waited = {1: waited_s * S}
+        world.latest("track/a").its_threads = {1: ThreadTimes(0, waited_s * S)}
         passes(world, supervisor, 1)
     assert ("kill", "track/a") in world.events
 
