@@ -2,12 +2,18 @@
 
 import threading
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from typing import Self
+
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, IMAGES, Bus, Publisher, Sample
 from abs_service.bus.queues import LatestQueue
+from abs_service.bus.sequence_gaps import SequenceGaps
 from abs_service.bus.stamps import HeaderFactory
 from drivers.contract.device import DeviceState, Truth
 from drivers.contract.frame import Frame
@@ -83,7 +89,8 @@ class FramePublisher:
             self._published[topic] += 1
 
     def _publish_frame(self, topic: str, frame: Frame) -> None:
-        header = self._headers.at(frame.t_host_ns, frame.seq, frame.sensor)
+        # Numbered as they are published: a gap is a loss of the bus. `FrameInfo.seq` counts exposures.
+        header = self._headers.at(frame.t_host_ns, self._published[topic], frame.sensor)
         image = codec.encode_image(frame, self._headers.clock.wall(frame.t_host_ns))
         self._publisher(topic, codec.IMAGE_SCHEMA).put(image, codec.encode_info(frame, header))
 
@@ -101,27 +108,34 @@ class FramePublisher:
 class FrameSubscriber:
     """Receives the newest frames of some streams, in the order of arrival.
 
-    A slow reader loses the oldest frames, counted. Messages that cannot be decoded are counted, too.
+    A slow reader loses the oldest frames, counted. Messages that cannot be decoded, or never come, are counted, too.
 
     Args:
         bus: where the frames are published.
         streams: (sensor, stream) of each stream wanted.
+        clock: CLOCK_MONOTONIC [ns], which tells when a frame is received.
         depth: frames per stream that may wait.
     """
 
-    def __init__(self, bus: Bus, streams: Iterable[tuple[str, str]], depth: int = DEPTH) -> None:
-        self._queue: LatestQueue[Sample] = LatestQueue(depth)
+    def __init__(
+        self, bus: Bus, streams: Iterable[tuple[str, str]], clock: Callable[[], int], depth: int = DEPTH
+    ) -> None:
+        self._queue: LatestQueue[tuple[Sample, int]] = LatestQueue(depth)
+        self._clock = clock
         self._malformed: Counter[str] = Counter()
+        self._gaps = SequenceGaps()
         self.last_error = ""
-        self._subscriptions = [
-            bus.subscribe(keys.image(sensor, stream), lambda sample: self._queue.put(sample.topic, sample))
-            for sensor, stream in streams
-        ]
+        self._subscriptions = [bus.subscribe(keys.image(sensor, stream), self._receive) for sensor, stream in streams]
 
     @property
     def dropped(self) -> Mapping[str, int]:
         """Frames dropped from the full queue, by topic."""
         return self._queue.dropped
+
+    @property
+    def lost(self) -> Mapping[str, int]:
+        """Frames that were published and did not come, by topic."""
+        return self._gaps.lost
 
     @property
     def malformed(self) -> Mapping[str, int]:
@@ -133,7 +147,7 @@ class FrameSubscriber:
         entry = self._queue.take(timeout_s)
         if entry is None:
             return None
-        topic, sample = entry
+        topic, (sample, t_received_ns) = entry
         try:
             frame = codec.decode(sample.payload, sample.attachment)
             if keys.image(frame.sensor, frame.stream) != topic:
@@ -142,10 +156,15 @@ class FrameSubscriber:
             self._malformed[topic] += 1
             self.last_error = str(error)
             return None
-        return frame
+        return replace(frame, t_received_ns=t_received_ns)
 
     def close(self) -> None:
         """Ends the subscriptions and wakes threads that wait in `take`."""
         for subscription in self._subscriptions:
             subscription.close()
         self._queue.close()
+
+    def _receive(self, sample: Sample) -> None:
+        with suppress(DecodeError):  # told when it is decoded
+            self._gaps.add(sample.topic, FrameInfo.FromString(sample.attachment).header)
+        self._queue.put(sample.topic, (sample, self._clock()))

@@ -11,7 +11,7 @@ TRANSFORMS = "tf"
 RIG_FRAME = "rig"
 
 #: First parts of topics, not allowed as names of sensors, devices and trackers.
-RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "health", "live"})
+RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live"})
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 
@@ -20,13 +20,18 @@ class KeyNameError(ValueError):
     """A name that cannot be part of a key."""
 
 
+def is_name(text: str) -> bool:
+    """True if a text can be a part of a key."""
+    return _NAME.fullmatch(text) is not None
+
+
 def check_name(name: str) -> str:
     """Returns `name` if a rig, sensor, stream, device or tracker may be called so.
 
     Raises:
         KeyNameError: it is empty, reserved, or holds a character with a meaning in keys.
     """
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise KeyNameError(f"{name!r} is no name: letters, digits, - and _, beginning with a letter or digit")
     if name in RESERVED:
         raise KeyNameError(f"{name!r} is reserved, like {sorted(RESERVED - {name})}; choose another name")
@@ -81,6 +86,11 @@ def reinitialize(tracker: str) -> str:
 def health(component: str) -> str:
     """Topic of a component's health: capture, record, run, track/<tracker>."""
     return f"health/{component}"
+
+
+def clock(host_clock: str) -> str:
+    """Topic at which the host of a clock, see `drivers.contract.host_clock`, answers queries for its time."""
+    return f"clock/{host_clock}"
 
 
 def live(component: str) -> str:

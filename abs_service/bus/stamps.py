@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 from absmsg.v1 import common_pb2
 
+from drivers.contract.host_clock import host_clock
+
 #: A larger change of the offset within a second is a step, not slewing [ns].
 STEP_NS = 50_000_000
 
@@ -57,17 +59,34 @@ class HeaderFactory:
         rig: name of the rig.
         clock: gives the stamps.
         boot_id: identifies the process instance; new with each `HeaderFactory` unless given.
+        host: which clock `clock` reads, see `drivers.contract.host_clock`; that of this host unless given.
     """
 
-    def __init__(self, rig: str, clock: WallClock, boot_id: str | None = None) -> None:
+    def __init__(self, rig: str, clock: WallClock, boot_id: str | None = None, host: str | None = None) -> None:
         self.rig = rig
         self.clock = clock
         self.boot_id = boot_id or uuid.uuid4().hex
+        self.host_clock = host_clock() if host is None else host
 
     def at(self, t_host_ns: int, seq: int, frame_id: str = "") -> common_pb2.Header:
         """The header of a message about the moment `t_host_ns` (CLOCK_MONOTONIC) [ns]."""
-        header = common_pb2.Header(t_host_ns=t_host_ns, seq=seq, rig=self.rig, frame_id=frame_id, boot_id=self.boot_id)
+        header = common_pb2.Header(
+            t_host_ns=t_host_ns,
+            seq=seq,
+            rig=self.rig,
+            frame_id=frame_id,
+            boot_id=self.boot_id,
+            host_clock=self.host_clock,
+        )
         header.stamp.FromNanoseconds(self.clock.wall(t_host_ns))
+        return header
+
+    def elsewhere(
+        self, t_host_ns: int, host_clock: str, t_here_ns: int, seq: int, frame_id: str = ""
+    ) -> common_pb2.Header:
+        """The header of a message about a moment on another host's clock, which was `t_here_ns` on this one's."""
+        header = self.at(t_here_ns, seq, frame_id)
+        header.t_host_ns, header.host_clock = t_host_ns, host_clock
         return header
 
     def now(self, seq: int, frame_id: str = "") -> common_pb2.Header:

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 
 from abs_service.bus.health import Health, Level
+from abs_service.capture.image_check import RepeatedImages
 from abs_service.capture.stall_detector import StallDetector
 from drivers.contract.device import Device, DeviceError, DeviceState, FinalError, Sink
 
@@ -70,6 +71,7 @@ class DeviceSupervisor:
         self._abandoned = False
         self._thread = threading.Thread(target=self._run, name=f"device {name}", daemon=True)
         self._previous: Counter[str] = Counter()  # counters of earlier openings
+        self._repeated_images = RepeatedImages()
         self.finished = False
         self.fatal_error: Exception | None = None
 
@@ -111,8 +113,9 @@ class DeviceSupervisor:
         device = self._open_device(self._uri)
         streams = device.capabilities.streams if device.capabilities.regular else ()
         # Grows with every opening, also across restarts of this process, and leaves the device ten epochs a second.
+        first_epoch = self._clock() // 100_000_000
         stall_detector = StallDetector(
-            self._sink, self._heads, streams, self._clock, first_epoch=self._clock() // 100_000_000
+            self._sink, self._heads, streams, self._clock, first_epoch, self._repeated_images
         )
         try:
             self._check_serial(device)
@@ -131,7 +134,7 @@ class DeviceSupervisor:
         finally:
             device.close()
             self._previous.update(device.counters)
-            self._previous["unwanted"] += stall_detector.unwanted
+            self._previous.update(stall_detector.counters)
             self._health.count_up_to(self._previous, f"device.{self._name}.")
         return stall_detector.delivered, reason
 
@@ -161,7 +164,7 @@ class DeviceSupervisor:
         return "stopped"
 
     def _measure(self, device: Device, stall_detector: StallDetector) -> None:
-        counters = Counter({"unwanted": stall_detector.unwanted, **device.counters})
+        counters = Counter({**stall_detector.counters, **device.counters})
         counters.update(self._previous)
         self._health.count_up_to(counters, f"device.{self._name}.")
         for name, value in device.gauges.items():

@@ -17,7 +17,6 @@ from calib import pose
 from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
-from drivers.contract.host_clock import host_clock
 from drivers.encoding.mcap_file import file_descriptor_set
 
 #: Names of the lens models in `foxglove.CameraCalibration`.
@@ -69,7 +68,6 @@ def sensor_model(
     """
     message = sensor_model_pb2.SensorModel(
         header=header,
-        host_clock=host_clock(),
         sensor=sensor,
         width=camera.width,
         height=camera.height,

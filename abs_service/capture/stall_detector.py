@@ -1,12 +1,14 @@
-"""Detects streams that stall, from the arrival times of their frames."""
+"""Detects streams that stall: no frame comes, or the same image again and again."""
 
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
+from abs_service.capture.image_check import RepeatedImages, is_empty
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.device import DeviceState, Sink, Truth
-from drivers.contract.frame import Frame
+from drivers.contract.frame import Frame, Kind
 
 #: A stream without a frame for so many periods, and at least so long [ns], is stalled.
 STALL_PERIODS, STALL_NS = 5, 1_000_000_000
@@ -17,7 +19,7 @@ WARM_UP_NS = 10_000_000_000
 
 
 class StallDetector:
-    """A sink that translates head names to sensor names and notes the arrival of frames.
+    """A sink that translates head names to sensor names, notes the arrival of frames, and leaves out repeated images.
 
     Args:
         sink: where wanted frames go.
@@ -25,9 +27,9 @@ class StallDetector:
         streams: those that are monitored; none if the device delivers irregularly.
         clock: CLOCK_MONOTONIC [ns].
         first_epoch: added to the device's epochs.
+        repeated_images: knows the latest images, also those before the device was opened again.
 
     Attributes:
-        unwanted: frames of heads that the rig does not use.
         delivered: True after the first frame.
         state: last state reported by the device, and its reason.
     """
@@ -39,27 +41,36 @@ class StallDetector:
         streams: Iterable[StreamInfo],
         clock: Callable[[], int],
         first_epoch: int,
+        repeated_images: RepeatedImages,
     ) -> None:
         self._sink = sink
         self._heads = heads
         self._streams = {stream.key: stream for stream in streams if stream.sensor in heads}
         self._clock = clock
         self._first_epoch = first_epoch
+        self._repeated_images = repeated_images
+        self._counters = Counter({"unwanted": 0, "repeated": 0, "empty": 0})
+        self._repeating: set[tuple[str, str]] = set()
+        self._empty_since_ns: dict[tuple[str, str], int] = {}
         self._latest_ns: dict[tuple[str, str], int] = {}
         self._warnings: dict[str, str] = {}
         self._lock = threading.Lock()
-        self.unwanted = 0
         self.delivered = False
         self.state = (DeviceState.OPENING, "")
 
     def on_frame(self, frame: Frame) -> None:
         """See `drivers.contract.device.Sink.on_frame`."""
-        self._latest_ns[frame.key] = self._clock()
-        self.delivered = True
         sensor = self._heads.get(frame.sensor)
         if sensor is None:
-            self.unwanted += 1
+            self._counters["unwanted"] += 1
             return
+        if self._is_repeated(frame, self._is_empty(frame)):
+            self._counters["repeated"] += 1
+            self._repeating.add(frame.key)
+            return
+        self._repeating.discard(frame.key)
+        self._latest_ns[frame.key] = self._clock()
+        self.delivered = True
         self._sink.on_frame(replace(frame, sensor=sensor, epoch=self._first_epoch + frame.epoch))
 
     def on_truth(self, truth: Truth) -> None:
@@ -80,6 +91,11 @@ class StallDetector:
             self._warnings[condition] = message
         self._sink.on_warning(condition, message)
 
+    @property
+    def counters(self) -> Mapping[str, int]:
+        """`unwanted` frames of heads that the rig does not use, `repeated` images (left out), `empty` images."""
+        return dict(self._counters)
+
     def take_warnings(self) -> Mapping[str, str]:
         """Warnings since the last call, by condition."""
         with self._lock:
@@ -94,12 +110,32 @@ class StallDetector:
         verdict = self.state
         for key, stream in self._streams.items():
             silent_ns = now_ns - self._latest_ns.get(key, now_ns)
-            reason = f"{key[0]}/{key[1]} delivers nothing for {silent_ns / 1e9:.0f} s"
+            what = "delivers the same image" if key in self._repeating else "delivers nothing"
+            reason = f"{key[0]}/{key[1]} {what} for {silent_ns / 1e9:.0f} s"
             if _too_long(silent_ns, stream, REOPEN_PERIODS, REOPEN_NS):
                 return DeviceState.FAILED, reason
             if _too_long(silent_ns, stream, STALL_PERIODS, STALL_NS):
                 verdict = DeviceState.STALLED, reason
         return verdict
+
+    def _is_empty(self, frame: Frame) -> bool:
+        """True if an image holds nothing; warns when it has been so for too long."""
+        name = f"{frame.sensor}/{frame.stream}"
+        if not is_empty(frame):
+            if self._empty_since_ns.pop(frame.key, None) is not None:
+                self.on_warning(f"{name} empty", "")
+            return False
+        self._counters["empty"] += 1
+        now_ns = self._clock()
+        if now_ns - self._empty_since_ns.setdefault(frame.key, now_ns) > STALL_NS:
+            self.on_warning(f"{name} empty", f"{name}: nothing in its images; is it covered, or its light off?")
+        return True
+
+    def _is_repeated(self, frame: Frame, empty: bool) -> bool:
+        stream = self._streams.get(frame.key)
+        # Always added, so that the image before is known. One without content has no noise.
+        repeated = self._repeated_images.add(frame)
+        return repeated and not empty and stream is not None and stream.noisy and stream.kind != Kind.BINARY
 
 
 def _too_long(silent_ns: int, stream: StreamInfo, periods: int, minimum_ns: int) -> bool:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Mapping
 
 from abs_service import config
-from abs_service.bus import keys
+from abs_service.bus import clock_offsets, keys
 from abs_service.bus.contract import Bus, Publisher
 from abs_service.bus.frames import FramePublisher
 from abs_service.bus.health import Health, Level
@@ -47,6 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
         health = Health(bus, "capture", headers)
         bus.declare_liveliness("capture")
         bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)
+        if headers.host_clock:
+            clock_offsets.answer(bus, headers)
         metadata = MetadataPublisher(bus, headers, rig)
         publishers = {name: FramePublisher(bus, headers, name) for name in rig.devices}
         source = str(arguments.config or "demo.toml")

@@ -15,6 +15,7 @@ from absmsg.v1.sensor_model_pb2 import SensorModel
 
 from abs_service import config, wiring
 from abs_service.bus import keys
+from abs_service.bus.clock_offsets import ClockOffsets
 from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
@@ -67,7 +68,10 @@ def run(arguments: argparse.Namespace) -> int:
         rig = wiring.rig(settings, name, cameras)
         tracking = TrackingSession(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
-        live = _live(bus, settings, name, rig, tracking, headers, health)
+        clocks = ClockOffsets(bus, time.monotonic_ns, headers.host_clock)
+        measuring = threading.Thread(target=clocks.measure_until, args=(stop,), name="clocks", daemon=True)
+        measuring.start()
+        live = _live(bus, settings, name, rig, tracking, headers, health, clocks)
         while not stop.is_set():
             live.process_next()
             if health.due():
@@ -76,6 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
                 health.tick()
         live.report()
         health.publish()
+        measuring.join()  # it uses the bus
     return Exit.OK
 
 
@@ -87,8 +92,9 @@ def _live(
     tracking: TrackingSession,
     headers: HeaderFactory,
     health: Health,
+    clocks: ClockOffsets,
 ) -> LiveTracker:
-    frames = FrameSubscriber(bus, streams(rig.sensors.values()))
+    frames = FrameSubscriber(bus, streams(rig.sensors.values()), time.monotonic_ns)
     synchroniser = wiring.synchroniser(settings, name, rig.sensors.values())
     return LiveTracker(
         tracking,
@@ -97,6 +103,7 @@ def _live(
         health,
         NoiseMonitor(health),
         time.monotonic_ns,
+        clocks,
         settings.trackers[name].budget_ms,
     )
 

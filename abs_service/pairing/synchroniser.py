@@ -26,13 +26,14 @@ class Synchroniser:
     deadline is over, or too many reference frames wait. Sets leave in order of time, no frame is in two of them, and
     within a stream later sets hold later frames.
 
-    Frames are compared on `t_host_ns`. A stream's size and encoding are those of the first frame of its epoch.
+    Frames are compared on `t_host_ns`, all of one host's clock. When the reference stream changes it, as after a reboot
+    of that host, all streams begin anew. A stream's size and encoding are those of the first frame of its epoch.
 
     Args:
         reference: stream whose frames give the sets their time.
         members: all streams of a set; the reference may be among them.
         tolerance_ns: largest difference between a member's and the reference's `t_host_ns` [ns].
-        deadline_ns: how long after its arrival a reference frame waits for others, see `poll` [ns].
+        deadline_ns: how long after its arrival in this process a reference frame waits for others, see `poll` [ns].
         offsets_ns: what has to be added to `t_host_ns` of the frames of some sensors, as a calibration found [ns].
     """
 
@@ -49,6 +50,7 @@ class Synchroniser:
         self._tolerance_ns = tolerance_ns
         self._deadline_ns = deadline_ns
         self._offsets_ns = offsets_ns
+        self._host_clock: str | None = None
         self._seq = 0
         self._rejected: Counter[str] = Counter()
 
@@ -56,24 +58,28 @@ class Synchroniser:
     def counters(self) -> Mapping[str, int]:
         """Frames that are in no set, as `<sensor>/<stream>.<cause>`.
 
-        Causes: `unexpected` stream, `old_epoch`, exposed in the `future` of its own arrival, `changed` size or
-        encoding, `duplicate` exposure, `stale` (too late for its set), `unmatched` (no reference frame near it),
-        `overflow` (too many wait for a reference frame).
+        Causes: `unexpected` stream, `other_clock` than the reference's, `old_epoch`, exposed in the `future` of its own
+        arrival, `changed` size or encoding, `duplicate` exposure, `stale` (too late for its set), `unmatched` (no
+        reference frame near it), `overflow` (too many wait for a reference frame).
         """
         return dict(self._rejected)
 
     def add(self, frame: Frame) -> list[FrameSet]:
         """Takes one frame and returns the sets that are decided now, in order of time."""
-        stream = self._reference if frame.key == self._reference.key else self._members.get(frame.key)
-        if stream is None:
+        if frame.key != self._reference.key and frame.key not in self._members:
             self._count(frame.key, "unexpected")
-        elif frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
+            return []
+        if frame.t_host_ns > frame.t_arrival_ns + self._tolerance_ns:
             # If accepted, it would make every later frame of this stream stale.
             self._count(frame.key, "future")
-        else:
-            offset_ns = self._offsets_ns.get(frame.sensor, 0)
-            self._insert(stream, replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
-        return self._form()
+            return []
+        sets = self._follow_clock(frame)
+        if frame.host_clock != self._host_clock:
+            self._count(frame.key, "other_clock")
+            return sets
+        offset_ns = self._offsets_ns.get(frame.sensor, 0)
+        self._insert(replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
+        return sets + self._form()
 
     def group(self, frames: Iterable[Frame]) -> Iterator[FrameSet]:
         """All sets of a finished sequence, such as a recording."""
@@ -82,13 +88,15 @@ class Synchroniser:
         yield from self.flush()
 
     def poll(self, now_ns: int) -> list[FrameSet]:
-        """Returns the sets whose deadline is over at `now_ns` (CLOCK_MONOTONIC), with what there is.
+        """Returns the sets whose deadline is over at `now_ns`, with what there is.
+
+        The time is that of this host's CLOCK_MONOTONIC, to which the frames' host times need not belong.
 
         A stream that was missing in a set is not waited for until it delivers again.
         """
         sets: list[FrameSet] = []
         while self._reference.waiting:
-            is_over = self._reference.waiting[0].t_arrival_ns + self._deadline_ns <= now_ns
+            is_over = _received_ns(self._reference.waiting[0]) + self._deadline_ns <= now_ns
             if not is_over and not all(stream.stalled for stream in self._incomplete_streams()):
                 break
             sets.append(self._emit())
@@ -98,7 +106,23 @@ class Synchroniser:
         """Returns all sets that still wait, with what there is: the end of a recording."""
         return [self._emit() for _ in range(len(self._reference.waiting))]
 
-    def _insert(self, stream: "_Stream", frame: Frame) -> None:
+    def _follow_clock(self, frame: Frame) -> list[FrameSet]:
+        """Begins anew if a reference frame is of another clock; returns the sets that still waited."""
+        if self._host_clock is None:
+            self._host_clock = frame.host_clock
+        if frame.host_clock == self._host_clock or frame.key != self._reference.key:
+            return []
+        sets = self.flush()
+        for stream in self._members.values():
+            for _ in range(len(stream.waiting)):
+                self._drop_oldest(stream, "other_clock")
+        self._reference = _Stream(self._reference.key)
+        self._members = {key: _Stream(key) for key in self._members}
+        self._host_clock = frame.host_clock
+        return sets
+
+    def _insert(self, frame: Frame) -> None:
+        stream = self._members.get(frame.key, self._reference)
         if rejection_cause := stream.rejection_cause(frame):
             self._count(frame.key, rejection_cause)
             return
@@ -140,7 +164,7 @@ class Synchroniser:
             frames[stream.key] = stream.take_oldest()
             spread_ns = max(spread_ns, abs(nearest.t_host_ns - t_ns))
         self._seq += 1
-        return FrameSet(self._seq - 1, t_ns, frames, tuple(missing), spread_ns)
+        return FrameSet(self._seq - 1, t_ns, frames, tuple(missing), spread_ns, reference.host_clock)
 
     def _drop_oldest(self, stream: "_Stream", cause: str) -> None:
         stream.take_oldest()
@@ -199,6 +223,11 @@ class _Stream:
         """The waiting frame nearest to a time, if it is within the tolerance."""
         frame = min(self.waiting, key=lambda other: abs(other.t_host_ns - t_ns), default=None)
         return frame if frame is not None and abs(frame.t_host_ns - t_ns) <= tolerance_ns else None
+
+
+def _received_ns(frame: Frame) -> int:
+    """When the frame came to this process, on this host's clock."""
+    return frame.t_arrival_ns if frame.t_received_ns is None else frame.t_received_ns
 
 
 def _form_of(frame: Frame) -> tuple[object, ...]:

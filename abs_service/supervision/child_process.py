@@ -7,13 +7,24 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import IO, Protocol
 
 from abs_service.supervision import parent_watchdog
 
 #: Lines of a child's output that are kept.
 TAIL_LINES = 40
+
+
+@dataclass(frozen=True, slots=True)
+class ThreadTimes:
+    """Time that a thread has run, and has waited for a processor before it ran last [ns]; whether it would run now."""
+
+    ran_ns: int = 0
+    waited_ns: int = 0
+    runnable: bool = False
 
 
 class Process(Protocol):
@@ -26,6 +37,10 @@ class Process(Protocol):
 
     def poll(self) -> int | None:
         """The exit code, negative for a signal; None while it runs."""
+        ...
+
+    def threads(self) -> Mapping[int, ThreadTimes]:
+        """Processor times of its threads so far, by their number."""
         ...
 
     def terminate(self) -> None:
@@ -49,6 +64,10 @@ class _NoProcess:
     def poll(self) -> int:
         """0: ended."""
         return 0
+
+    def threads(self) -> Mapping[int, ThreadTimes]:
+        """None."""
+        return {}
 
     def terminate(self) -> None:
         """Does nothing."""
@@ -110,6 +129,15 @@ class ChildProcess:
         """See `Process`."""
         return self._process.poll()
 
+    def threads(self) -> Mapping[int, ThreadTimes]:
+        """See `Process`; empty if it has ended, or where the kernel does not say (/proc/PID/task/*/schedstat)."""
+        threads: dict[int, ThreadTimes] = {}
+        with contextlib.suppress(OSError):
+            for task in Path(f"/proc/{self.pid}/task").iterdir():
+                with contextlib.suppress(OSError):  # the thread has ended
+                    threads[int(task.name)] = _thread_times(task)
+        return threads
+
     def terminate(self) -> None:
         """See `Process`."""
         if self.poll() is None:
@@ -132,3 +160,10 @@ class ChildProcess:
             for line in output:
                 self._lines.append(line.rstrip("\n"))
                 on_line(component, line.rstrip("\n"))
+
+
+def _thread_times(task: Path) -> ThreadTimes:
+    ran, waited, _ = (task / "schedstat").read_text(encoding="ascii").split()
+    # After the name in brackets, which may hold anything.
+    state = (task / "stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[0]
+    return ThreadTimes(int(ran), int(waited), state == "R")

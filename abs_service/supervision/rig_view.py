@@ -47,6 +47,7 @@ class RigView:
         children: the processes.
         elapsed_s: time since the start.
         now_ns: CLOCK_MONOTONIC [ns].
+        host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
     """
 
     rig: str
@@ -56,6 +57,7 @@ class RigView:
     children: Sequence[Child]
     elapsed_s: float
     now_ns: int
+    host_clock: str
 
     @property
     def streams(self) -> list[Stream]:
@@ -130,7 +132,8 @@ class RigView:
 
     def _ages_ms(self) -> dict[str, float]:
         ages: dict[str, float] = {}
-        for tracker in self.live.trackers.values():
+        trackers = [one for one in self.live.trackers.values() if one.host_clock == self.host_clock]
+        for tracker in trackers:
             for sensor, t_host_ns in tracker.exposure_ns.items():
                 age_ms = (self.now_ns - t_host_ns) * 1e-6
                 ages[sensor] = min(age_ms, ages.get(sensor, age_ms))

@@ -1,7 +1,9 @@
 """One run of a rig: passes messages to the display and heartbeats to the supervisor."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 from abs_service.bus import keys
@@ -12,6 +14,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.supervision import rig_state
 from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Child, State, Supervisor
+from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 
 #: Messages per topic that may wait to be shown.
 DEPTH = 64
@@ -53,12 +56,17 @@ class RunSession:
         clock: WallClock,
     ) -> None:
         self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
+        # Before the first estimate, the tracker itself says why there is none.
+        trackers = tuple(trackers)
+        monitor = partial(SilenceMonitor, clock.monotonic, math.inf)
+        self._silence_monitors = {keys.state(name): monitor() for name in trackers}
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
         self._begin_ns = self._queried_ns = clock.monotonic()
         self._live = rig_state.RigState(trackers, clock.monotonic)
-        self._health = Health(bus, "run", HeaderFactory(rig, clock))
+        self._headers = HeaderFactory(rig, clock)
+        self._health = Health(bus, "run", self._headers)
         self._inbox: LatestQueue[Sample] = LatestQueue(DEPTH)
         for pattern in rig_state.PATTERNS:
             bus.subscribe(pattern, lambda sample: self._inbox.put(sample.topic, sample))
@@ -73,6 +81,7 @@ class RunSession:
         while not stop_requested() and self._supervisor.exit_code() is None:
             self._supervisor.poll()
             self._report()
+            self._report_silence()
             self._listen(PERIOD_S)
             self._request_missing_topologies()
 
@@ -99,6 +108,7 @@ class RunSession:
             children=tuple(self._supervisor.children.values()),
             elapsed_s=self.elapsed_s,
             now_ns=self._clock.monotonic(),
+            host_clock=self._headers.host_clock,
         )
 
     def _listen(self, seconds: float) -> None:
@@ -122,15 +132,25 @@ class RunSession:
     def _take(self, topic: str, sample: Sample) -> None:
         for report in self._live.take(sample):
             self._display.estimate(report)
+        if topic in self._silence_monitors:
+            self._silence_monitors[topic].add()
         if topic.startswith("health/"):
             component = topic.removeprefix("health/")
             busy = self._live.health(component).labels.get("phase") == "preparing"
             self._supervisor.heartbeat(component, busy)
 
+    def _report_silence(self) -> None:
+        for topic, monitor in self._silence_monitors.items():
+            silence = monitor.check()
+            level = Level.ERROR if silence else Level.OK
+            self._health.report(topic, level, silence and f"track/{topic.partition('/')[0]}: {silence}")
+
     def _report(self) -> None:
         for child in self._supervisor.children.values():
             self._health.count_up_to({f"restarts.{child.component}": child.restarts})
-            self._health.report(child.component, _LEVELS.get(child.state, Level.OK), _condition(child))
+            starved = child.state is State.RUNNING and child.reason
+            level = Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
+            self._health.report(child.component, level, _condition(child))
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
         self._health.tick()
 

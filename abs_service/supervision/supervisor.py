@@ -5,17 +5,19 @@ A state machine without threads: the caller calls `poll` periodically; clock and
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn
+from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
 
 #: Backoff before a restart: doubles with each end within the window, up to the longest.
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
+#: A longer time between two calls of `poll` was a stop of this process, in which it heard no child [ns].
+PAUSE_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class Limits:
     Attributes:
         restarts, window_ns: a process that needs more restarts than this within the window is given up [ns].
         startup_ns: timeout for the first health, and between healths while a process reports to be busy [ns].
-        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns].
+        stall_ns: timeout between healths afterwards; a process that exceeds it is restarted [ns]. The time that it
+            waited for a processor is added, up to `startup_ns`.
         stop_ns: time that all processes together have to end in order [ns].
     """
 
@@ -72,6 +75,8 @@ class Child:
     process: Process = field(default=NO_PROCESS, repr=False)
     deadline_ns: int = 0
     start_at_ns: int = 0
+    heard_ns: int = 0
+    threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
     exits_ns: deque[int] = field(default_factory=deque, repr=False)
 
 
@@ -92,10 +97,12 @@ class Supervisor:
         self._spawn = spawn
         self._clock = clock
         self._limits = limits or Limits()
+        self._polled_ns = clock()
 
     def poll(self) -> None:
         """Starts, restarts and gives up children as due."""
         now_ns = self._clock()
+        self._excuse_pause(now_ns)
         for child in self.children.values():
             if child.state is State.RUNNING:
                 self._check(child, now_ns)
@@ -106,7 +113,9 @@ class Supervisor:
         """Extends a component's deadline; further for a busy one, which compiles kernels."""
         child = self.children.get(component)
         if child is not None and child.state is State.RUNNING:
-            child.deadline_ns = self._clock() + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.heard_ns = self._clock()
+            child.deadline_ns = child.heard_ns + (self._limits.startup_ns if busy else self._limits.stall_ns)
+            child.threads, child.reason = child.process.threads(), ""
 
     def misconfigured(self) -> Child | None:
         """A child that ended with a user error, after which the rig should stop; None if there is none."""
@@ -147,14 +156,31 @@ class Supervisor:
             for child in children:
                 self._finalize(child)
 
+    def _excuse_pause(self, now_ns: int) -> None:
+        """Extends all deadlines by the time in which this process did not run, and heard nobody."""
+        paused_ns, self._polled_ns = now_ns - self._polled_ns, now_ns
+        if paused_ns > PAUSE_NS:
+            for child in self.children.values():
+                child.deadline_ns += paused_ns
+
+    def _is_starved(self, child: Child, now_ns: int) -> bool:
+        """True if a child that is late has waited for a processor in the meantime, instead of hanging."""
+        silent_ns = now_ns - child.heard_ns
+        waited_ns = _longest_wait_ns(child.threads, child.process.threads(), silent_ns)
+        if now_ns >= child.deadline_ns + min(waited_ns, self._limits.startup_ns):
+            return False
+        child.reason = f"no health for {silent_ns / 1e9:.0f} s, because it waits for a processor"
+        return True
+
     def _start(self, child: Child, now_ns: int) -> None:
         child.process = self._spawn(child.component, child.arguments)
         child.state, child.reason = State.RUNNING, ""
+        child.heard_ns, child.threads = now_ns, {}
         child.deadline_ns = now_ns + self._limits.startup_ns
 
     def _check(self, child: Child, now_ns: int) -> None:
         code = child.process.poll()
-        if code is None and now_ns < child.deadline_ns:
+        if code is None and (now_ns < child.deadline_ns or self._is_starved(child, now_ns)):
             return
         if code is None:
             child.process.kill()
@@ -196,6 +222,17 @@ class Supervisor:
 
     def _failed(self) -> list[Child]:
         return [child for child in self.children.values() if child.state is State.FAILED]
+
+
+def _longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, ThreadTimes], elapsed_ns: int) -> int:
+    """Longest time that a thread has waited for a processor within the elapsed time."""
+    waits_ns = [0]
+    for thread, times in now.items():
+        earlier = before.get(thread, ThreadTimes())
+        # The kernel counts a wait when it is over; a thread that would run now has waited since it ran last.
+        waited_ns = elapsed_ns if times.runnable else times.waited_ns - earlier.waited_ns
+        waits_ns.append(min(waited_ns, elapsed_ns - (times.ran_ns - earlier.ran_ns)))
+    return max(waits_ns)
 
 
 def _exit_reason(code: int, output_tail: str) -> str:

@@ -4,7 +4,10 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from statistics import median
 
+from absmsg.v1.common_pb2 import Header
+
 from abs_service.bus import keys
+from abs_service.bus.clock_offsets import ClockOffsets, Offset
 from abs_service.bus.contract import MESH, STATE, Bus
 from abs_service.bus.frames import DEPTH, FrameSubscriber
 from abs_service.bus.health import Health, Level
@@ -13,6 +16,7 @@ from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
+from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
@@ -52,10 +56,11 @@ class FrameSetQueue:
     def counters(self) -> Mapping[str, int]:
         """Counters of losses.
 
-        `skipped` frame sets; by topic, frames `dropped` unseen and `malformed` messages; by stream and cause, frames
-        that are in no set and so `unused`.
+        `skipped` frame sets; by topic, frames that were published and `lost` on the bus, frames `dropped` unseen here
+        and `malformed` messages; by stream and cause, frames that are in no set and so `unused`.
         """
         counters = {"skipped": self.skipped}
+        counters |= {f"lost.{topic}": number for topic, number in self._frames.lost.items()}
         counters |= {f"dropped.{topic}": number for topic, number in self._frames.dropped.items()}
         counters |= {f"malformed.{topic}": number for topic, number in self._frames.malformed.items()}
         counters |= {f"unused.{stream}": number for stream, number in self._synchroniser.counters.items()}
@@ -65,7 +70,8 @@ class FrameSetQueue:
     def dropped(self) -> Mapping[str, int]:
         """Frames so far that are in no set, by sensor, whatever the cause."""
         total: Counter[str] = Counter()
-        for counts in (self._frames.dropped, self._frames.malformed, self._synchroniser.counters):
+        frames = self._frames
+        for counts in (frames.lost, frames.dropped, frames.malformed, self._synchroniser.counters):
             for name, number in counts.items():
                 total[name.partition("/")[0]] += number
         return total
@@ -113,17 +119,28 @@ class EstimatePublisher:
         self._identity = Identity(tracker, model, "", calib_id, 0)
         self._seq = 0
 
-    def publish(self, estimate: Estimate, tracking: TrackingSession, effort: Effort) -> None:
-        """Publishes an estimate, after the topology of its mesh if that is new."""
+    def publish(
+        self, estimate: Estimate, tracking: TrackingSession, effort: Effort, host_clock: str, offset: Offset
+    ) -> None:
+        """Publishes an estimate, after the topology of its mesh if that is new.
+
+        Args:
+            estimate, tracking, effort: what is published.
+            host_clock: which clock the frames' times are of.
+            offset: of that clock; stamps need it.
+        """
         if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
             self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
             # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
-            header = self._headers.at(tracking.made_ns, tracking.mesh_version, keys.RIG_FRAME)
+            header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
             self._topology.put(estimate_messages.topology(header, tracking.mesh, self._identity).SerializeToString())
-        header = self._headers.at(estimate.t_host_ns, self._seq, keys.RIG_FRAME)
+        header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
         self._state.put(estimate_messages.state(header, estimate, self._identity, effort).SerializeToString())
         self._mesh.put(estimate_messages.mesh(header, estimate, self._identity).SerializeToString())
         self._seq += 1
+
+    def _header(self, t_host_ns: int, host_clock: str, offset: Offset, seq: int) -> Header:
+        return self._headers.elsewhere(t_host_ns, host_clock, t_host_ns + offset.ns, seq, keys.RIG_FRAME)
 
 
 class LiveTracker:
@@ -136,6 +153,7 @@ class LiveTracker:
         health: of the tracker.
         noise_monitor: compares residuals with the noise models.
         clock: CLOCK_MONOTONIC [ns].
+        clocks: relates the clock of the cameras' host to it.
         budget_ms: time that the search may take per frame set; the rest of the interval is for everything else.
     """
 
@@ -147,6 +165,7 @@ class LiveTracker:
         health: Health,
         noise_monitor: NoiseMonitor,
         clock: Callable[[], int],
+        clocks: ClockOffsets,
         budget_ms: float,
     ):
         self._tracking = tracking
@@ -155,8 +174,12 @@ class LiveTracker:
         self._health = health
         self._noise_monitor = noise_monitor
         self._clock = clock
+        self._clocks = clocks
         self._budget_ns = round(budget_ms * 1e6)
         self._reported = 0
+        self._silence_monitor = SilenceMonitor(clock)
+        self._rejected = 0
+        self._losses_before = self._losses()  # at the last estimate
 
     def process_next(self) -> None:
         """Processes the next frame set, if there is one."""
@@ -167,15 +190,21 @@ class LiveTracker:
         try:
             estimate = self._tracking.track(frames, lambda: self._clock() - begin_ns < self._budget_ns)
         except ObservationError as error:
+            self._rejected += 1
             self._health.count("rejected")
             self._health.report("observation", Level.ERROR, str(error))
             return
         solve_ms = (self._clock() - begin_ns) * 1e-6
         skipped = self._sets.skipped - self._reported
         self._reported = self._sets.skipped
-        age_ms = (self._clock() - estimate.t_host_ns) * 1e-6
-        effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, skipped, self._sets.dropped)
-        self._publisher.publish(estimate, self._tracking, effort)
+        known = self._clocks.offset(frames.host_clock)
+        # As long as the offset is unknown, stamps tell when the estimate was made.
+        offset = Offset(self._clock() - estimate.t_host_ns, 0) if known is None else known
+        age_ms, age_error_ms = self._age_ms(estimate.t_host_ns, known)
+        effort = Effort(solve_ms, self._budget_ns * 1e-6, age_ms, age_error_ms, skipped, self._sets.dropped)
+        self._publisher.publish(estimate, self._tracking, effort, frames.host_clock, offset)
+        self._silence_monitor.add()
+        self._losses_before = self._losses()
         self._report(estimate, solve_ms)
 
     def report(self) -> None:
@@ -183,6 +212,27 @@ class LiveTracker:
         self._health.count_up_to(self._sets.counters)
         if self._sets.last_error:
             self._health.label("malformed", self._sets.last_error)
+        silence = self._silence_monitor.check()
+        message = f"{silence}: {self._cause_of_silence()}" if silence else ""
+        self._health.report("estimates", Level.ERROR if silence else Level.OK, message)
+
+    def _cause_of_silence(self) -> str:
+        """What has come since the last estimate, instead of a frame set."""
+        since = Counter(self._losses())
+        since.subtract(self._losses_before)
+        causes = [f"{name} {number}" for name, number in since.most_common(3) if number > 0]
+        return f"since then {', '.join(causes)}" if causes else "no frames come from the cameras"
+
+    def _losses(self) -> Mapping[str, int]:
+        return {**self._sets.counters, "rejected": self._rejected}
+
+    def _age_ms(self, t_host_ns: int, known: Offset | None) -> tuple[float, float]:
+        """Time since an exposure and its largest error; NaN if the offset between the clocks is unknown."""
+        if known is None:
+            return float("nan"), float("nan")
+        self._health.gauge("clock.offset_s", known.ns * 1e-9)
+        self._health.gauge("clock.error_ms", known.error_ns * 1e-6)
+        return (self._clock() - t_host_ns - known.ns) * 1e-6, known.error_ns * 1e-6
 
     def _report(self, estimate: Estimate, solve_ms: float) -> None:
         self._health.count("estimates")

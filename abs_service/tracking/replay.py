@@ -81,7 +81,9 @@ class OfflineTracker:
         solve_ms = (self._clock() - begin_ns) * 1e-6
         self._write_new_topology()
         header = self._headers.at(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
-        state = estimate_messages.state(header, estimate, self._identity, Effort(solve_ms, NO_BUDGET_MS, NO_AGE, 0, {}))
+        state = estimate_messages.state(
+            header, estimate, self._identity, Effort(solve_ms, NO_BUDGET_MS, NO_AGE, NO_AGE, 0, {})
+        )
         mesh = estimate_messages.mesh(header, estimate, self._identity)
         self._write(keys.state(self._name), estimate_messages.STATE, state, estimate)
         self._write(keys.mesh(self._name), estimate_messages.MESH, mesh, estimate)

@@ -48,6 +48,7 @@ class TrackingSession:
         self.mesh: Mesh | None = None
         self.mesh_version = 0
         self.made_ns = 0
+        self._host_clock = ""
         self._rig = rig
         self._plan = plan
         self._region = plan.region.build()
@@ -77,6 +78,8 @@ class TrackingSession:
         Raises:
             ObservationError: the frames do not fit the rig.
         """
+        if frames.host_clock != self._host_clock:
+            self._begin_anew(frames.host_clock)
         return self.track_observation(self._observer.observe(frames), in_time)
 
     def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
@@ -116,6 +119,14 @@ class TrackingSession:
     def reinitialize(self) -> None:
         """Requests a new detection in the next frame set; thread-safe."""
         self._reinitialize_requested = True
+
+    def _begin_anew(self, host_clock: str) -> None:
+        """Forgets the object: on another clock, nobody knows how much time has passed since the last frame."""
+        self._host_clock = host_clock
+        self._tracker = None
+        self._region = self._plan.region.build()
+        self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status.degraded_rim)
+        self._growth_due = False
 
     def _detect_again(self, tracker: Tracker, requested: bool, observation: Observation) -> None:
         """Detects the object again; DetectionError or ModelError if it is not in view or does not match the model."""

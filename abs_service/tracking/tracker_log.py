@@ -82,7 +82,8 @@ class TrackerLog:
         last: its last estimate.
         estimates, skipped: how many estimates it made, and how many frame sets it passed over.
         error_mm, surface_mm, solve_ms: totals over all estimates.
-        exposure_ns: exposure of every sensor that it used last, CLOCK_MONOTONIC [ns].
+        exposure_ns: exposure of every sensor that it used last, on the clock `host_clock` [ns].
+        host_clock: which host's clock that is, see `drivers.contract.host_clock`.
         truth: ground truth for the errors.
     """
 
@@ -93,6 +94,7 @@ class TrackerLog:
         self.skipped = 0
         self.error_mm, self.surface_mm, self.solve_ms = RunningStats(), RunningStats(), RunningStats()
         self.exposure_ns: dict[str, int] = {}
+        self.host_clock = ""
         self.truth = TruthComparison()
         self._pending: DeformationState | None = None
         self._mesh: DeformedMesh | None = None
@@ -115,6 +117,7 @@ class TrackerLog:
         """Takes an estimate; it is reported when its mesh has come, or at the latest with the next estimate."""
         if self._pending is not None:
             yield self._report(self._pending, DeformedMesh())
+        self.host_clock = state.header.host_clock
         self._pending, self._estimate_mesh = state, (state.header.boot_id, state.mesh_version)
         self.exposure_ns.update({sensor.sensor: sensor.t_host_ns for sensor in state.sensors if not sensor.missing})
         yield from self._pair()

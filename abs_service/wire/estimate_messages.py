@@ -60,7 +60,7 @@ class Effort:
     Attributes:
         solve_ms: time from frame set to Θ [ms].
         budget_ms: time that the search was allowed [ms]; 0 if unlimited.
-        age_ms: time from exposure to now [ms].
+        age_ms, age_error_ms: time from exposure to now and its largest error [ms]; NaN if unknown.
         skipped: frame sets passed over since the last estimate.
         dropped: frames so far that are in no estimate, by sensor.
     """
@@ -68,6 +68,7 @@ class Effort:
     solve_ms: float
     budget_ms: float
     age_ms: float
+    age_error_ms: float
     skipped: int
     dropped: Mapping[str, int]
 
@@ -101,6 +102,7 @@ def state(header: common_pb2.Header, estimate: Estimate, identity: Identity, eff
         budget_ms=effort.budget_ms,
         solve_ms=effort.solve_ms,
         age_ms=effort.age_ms,
+        age_error_ms=effort.age_error_ms,
         skipped=effort.skipped,
         mesh_version=identity.mesh_version,
         inlier_share=estimate.inlier_share,

@@ -36,7 +36,16 @@ HOST_CLOCK = ClockInfo()
 
 @dataclass(frozen=True, slots=True)
 class StreamInfo:
-    """One stream a device offers: its sensor (optical head), name, kind, encoding, size [px], rate [Hz] and clock."""
+    """One stream a device offers.
+
+    Attributes:
+        sensor, stream: its sensor (optical head) and name.
+        kind, encoding, width, height: of its images [px].
+        rate_hz: images per second.
+        clock: what timestamps them.
+        noisy: True if no two of its images are equal, because of the sensor's noise; False if they may be, as in a
+            simulation without noise.
+    """
 
     sensor: str
     stream: str
@@ -46,6 +55,7 @@ class StreamInfo:
     height: int
     rate_hz: float
     clock: ClockInfo = HOST_CLOCK
+    noisy: bool = True
 
     @property
     def key(self) -> tuple[str, str]:

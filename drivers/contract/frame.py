@@ -73,7 +73,7 @@ class Frame:
         data: pixels as measured, read-only, shape (height, width) or (height, width, 3), dtype given by `encoding`.
         encoding: one of `ENCODINGS`.
         t_host_ns: host time of the exposure on CLOCK_MONOTONIC [ns].
-        t_arrival_ns: host time at which the frame arrived, CLOCK_MONOTONIC [ns].
+        t_arrival_ns: host time at which the device's frame arrived, on the same clock [ns].
         seq: counts the device's exposures; depth and amplitude of one exposure share it; gaps are losses.
         epoch: incremented by each reconnect or clock step; seq and ticks restart.
         scale: value, in `unit`, of one step of `data`.
@@ -92,6 +92,9 @@ class Frame:
         aligned_to: sensor to whose view the device registered the image, "" if it is in the sensor's own view.
         filters: filters applied by the device, in order.
         incomplete, saturated: flags of the device.
+        host_clock: which host's clock the host times are of, see `drivers.contract.host_clock`; "" for this one's.
+        t_received_ns: time at which this process received the frame from another one, on this host's CLOCK_MONOTONIC
+            [ns]; None for a device of this process.
     """
 
     sensor: str
@@ -122,6 +125,8 @@ class Frame:
     filters: tuple[str, ...] = ()
     incomplete: bool = False
     saturated: bool = False
+    host_clock: str = ""
+    t_received_ns: int | None = None
 
     def __post_init__(self) -> None:
         if self.encoding not in ENCODINGS:
@@ -166,6 +171,7 @@ class FrameSet:
         frames: the members by (sensor, stream).
         missing: expected streams without a frame within the tolerance.
         spread_ns: maximum difference between a member's timestamp and `stamp_ns` [ns].
+        host_clock: which host's clock `stamp_ns` is of, see `Frame`.
     """
 
     seq: int
@@ -173,3 +179,4 @@ class FrameSet:
     frames: Mapping[tuple[str, str], Frame]
     missing: tuple[tuple[str, str], ...] = field(default=())
     spread_ns: int = 0
+    host_clock: str = ""

@@ -138,6 +138,7 @@ def decode(image: bytes, info: bytes) -> Frame:
             filters=tuple(about.filters),
             incomplete=about.incomplete,
             saturated=about.saturated,
+            host_clock=about.header.host_clock,
         )
     except FrameError as error:
         raise CodecError(str(error)) from error

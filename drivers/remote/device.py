@@ -126,7 +126,7 @@ class RemoteDevice:
             return
         stream = self._follow(frame)
         if self._same_clock:
-            self._gate.deliver(replace(frame, epoch=stream.ours))
+            self._gate.deliver(replace(frame, epoch=stream.ours, host_clock=""))
             return
         stamp = stream.clock.stamp(frame.t_arrival_ns, t_arrival_ns)
         if stamp.stepped:
@@ -135,7 +135,14 @@ class RemoteDevice:
         t_host_ns = min(stamp.t_host_ns + frame.t_host_ns - frame.t_arrival_ns, t_arrival_ns)
         sigma_ns = round(math.hypot(frame.t_sigma_ns, stamp.t_sigma_ns))
         self._gate.deliver(
-            replace(frame, epoch=stream.ours, t_host_ns=t_host_ns, t_arrival_ns=t_arrival_ns, t_sigma_ns=sigma_ns)
+            replace(
+                frame,
+                epoch=stream.ours,
+                t_host_ns=t_host_ns,
+                t_arrival_ns=t_arrival_ns,
+                t_sigma_ns=sigma_ns,
+                host_clock="",
+            )
         )
 
     def _follow(self, frame: Frame) -> _Stream:

@@ -75,7 +75,7 @@ def probe(link: Link, rig: str, address: Address) -> RemoteRig:
     silent = sorted(set(wanted) - {stream.sensor for stream in streams})
     if silent:
         raise DeviceError(f'sensor {", ".join(silent)} of rig "{rig}" delivers nothing yet')
-    clocks = {model.host_clock for model in models.values()}
+    clocks = {model.header.host_clock for model in models.values()}
     return RemoteRig(cameras, streams, same_clock=clocks == {host_clock()} and clocks != {""})
 
 
@@ -135,4 +135,5 @@ def _stream(frames: tuple[Frame, Frame]) -> StreamInfo:
     exposures, elapsed_ns = latest.seq - first.seq, latest.t_host_ns - first.t_host_ns
     rate_hz = exposures * 1e9 / elapsed_ns if exposures > 0 and elapsed_ns > 0 and first.epoch == latest.epoch else 1.0
     clock = ClockInfo(latest.clock_domain, latest.tick_hz)
-    return StreamInfo(*latest.key, latest.kind, latest.encoding, width, height, rate_hz, clock)
+    # Repeated images are left out where they are captured; those of a simulation may be equal.
+    return StreamInfo(*latest.key, latest.kind, latest.encoding, width, height, rate_hz, clock, noisy=False)

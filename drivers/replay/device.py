@@ -122,7 +122,8 @@ class ReplayDevice:
                 self._gate.deliver_truth(replace(item, t_host_ns=t_host_ns))
                 continue
             epoch = epochs.setdefault(item.epoch, self._next_epoch + len(epochs))
-            self._gate.deliver(replace(item, t_host_ns=t_host_ns, t_arrival_ns=self._clock(), epoch=epoch))
+            times = {"t_host_ns": t_host_ns, "t_arrival_ns": self._clock(), "host_clock": ""}
+            self._gate.deliver(replace(item, **times, epoch=epoch))
         else:
             self._gate.drop("unpaired", self._recording.unpaired)
         self._next_epoch += len(epochs)

@@ -185,7 +185,8 @@ class Address:
             heads = {name: factory.head(name, scene) for name in self.sensors}
         except LensError as error:
             raise AddressError(f"simulated://{self.scene}: lens = {self.lens} is too strong: {error}") from error
-        return Simulation(scene, heads, self.seed, self.rate, round(self.jitter_ms * 1e6))
+        jitter_ns = round(self.jitter_ms * 1e6)
+        return Simulation(scene, heads, self.seed, self.rate, jitter_ns, noisy=self.noise > 0)
 
     def _lens(self) -> LensModel:
         try:

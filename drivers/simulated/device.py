@@ -47,7 +47,8 @@ class SimulatedDevice:
         fault_schedule: FaultSchedule = NO_FAULT,
     ) -> None:
         self.info = DeviceInfo(uri=uri, model="simulated", serial=f"seed {simulation.seed}")
-        self.capabilities = Capabilities(tuple(s for head in simulation.heads.values() for s in head.streams))
+        streams = (stream for head in simulation.heads.values() for stream in head.streams)
+        self.capabilities = Capabilities(tuple(replace(stream, noisy=simulation.noisy) for stream in streams))
         self.cameras: Mapping[str, Camera] = {name: head.camera for name, head in simulation.heads.items()}
         self.controls = Controls()
         self._simulation = simulation
@@ -111,7 +112,7 @@ class SimulatedDevice:
             if behind > BUFFERED:
                 self._gate.drop("late", behind)
                 k += behind
-            frames, truths = self._simulation.frames(k), self._simulation.truths(k)
+            frames, truths = self._frames(k), self._simulation.truths(k)
             if self._wait(stop, max(first_ns + self._simulation.time_ns(k) - self._clock(), 0) * 1e-9):
                 return
             match fault := self._fault_schedule.at(k):
@@ -128,6 +129,14 @@ class SimulatedDevice:
             if stop.is_set():
                 return
             k += 1
+
+    def _frames(self, k: int) -> list[Frame]:
+        shown = self._fault_schedule.shown(k)
+        late_ns = self._simulation.time_ns(k) - self._simulation.time_ns(shown)
+        return [
+            replace(frame, seq=k, t_host_ns=frame.t_host_ns + late_ns, t_device_ticks=frame.t_device_ticks + late_ns)
+            for frame in self._simulation.frames(shown)
+        ]
 
     def _deliver(self, frames: list[Frame], truths: list[Truth], first_ns: int, epoch: int) -> None:
         for truth in truths:

@@ -18,6 +18,7 @@ class Fault(StrEnum):
     UNPLUG = "unplug"  # the device reports that it was unplugged
     WRONG_SIZE = "wrong_size"  # images lack one row
     NAN = "nan"  # depth images without a valid pixel
+    FREEZE = "freeze"  # the same images again and again, with new time stamps
 
 
 #: Duration of a temporary fault [exposures].
@@ -37,8 +38,12 @@ class FaultSchedule:
             return Fault.NONE
         return Fault.NONE if self.fault == Fault.DROP and (k - self.begin) % 2 else self.fault
 
+    def shown(self, k: int) -> int:
+        """The exposure whose images are those of exposure `k`."""
+        return self.begin if self.at(k) == Fault.FREEZE else k
 
-_PERMANENT = frozenset({Fault.STALL, Fault.UNPLUG})
+
+_PERMANENT = frozenset({Fault.STALL, Fault.UNPLUG, Fault.FREEZE})
 
 
 def corrupted(frame: Frame, fault: Fault) -> Frame:

@@ -23,6 +23,7 @@ class Simulation:
         rate_hz: exposures per second.
         jitter_ns: standard deviation of the timestamps' error [ns].
         truth_size: rows and columns of the grid of material points in a `Truth`.
+        noisy: False if images may be equal, see `StreamInfo`.
     """
 
     scene: Scene
@@ -31,6 +32,7 @@ class Simulation:
     rate_hz: float
     jitter_ns: int = 0
     truth_size: tuple[int, int] = (21, 31)
+    noisy: bool = True
 
     def time_ns(self, k: int) -> int:
         """Time of exposure `k` since exposure 0 [ns]."""

@@ -1,6 +1,7 @@
 """Time to transport and to record one exposure: depth and amplitude of 176 × 144, colour of 320 × 240."""
 
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -66,7 +67,7 @@ def open_bus():
 
 def test_from_a_device_to_the_frames_of_a_reader(benchmark, open_bus):
     open_bus()
-    subscriber = FrameSubscriber(open_bus(), STREAMS)
+    subscriber = FrameSubscriber(open_bus(), STREAMS, time.monotonic_ns)
     exposures = Exposures()
     with FramePublisher(open_bus(), SPEAKER, "sim") as sink:
 

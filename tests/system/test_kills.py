@@ -18,7 +18,7 @@ DEPTH = "tof/depth/image"
 def lost(frames: Sequence[FrameInfo]) -> int:
     """Exposures whose images did not arrive; the device must not have begun anew."""
     assert len({info.epoch for info in frames}) == 1, "the device was opened again"
-    numbers = [info.header.seq for info in frames]
+    numbers = [info.seq for info in frames]
     assert numbers == sorted(set(numbers)), "twice, or out of order"
     return numbers[-1] - numbers[0] + 1 - len(numbers)
 

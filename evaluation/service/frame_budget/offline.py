@@ -91,7 +91,7 @@ class _Process:
         estimate = self._tracking.track(frames, lambda: True)
         header = self._headers.at(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
         with self._watch.stage(ENCODE):
-            estimate_messages.state(header, estimate, self._identity, Effort(0, 0, 0, 0, {})).SerializeToString()
+            estimate_messages.state(header, estimate, self._identity, Effort(0, 0, 0, 0, 0, {})).SerializeToString()
             estimate_messages.mesh(header, estimate, self._identity).SerializeToString()
         self.took_ns.append(time.monotonic_ns() - begin_ns)
         self.tracked += estimate.status == Status.TRACKING

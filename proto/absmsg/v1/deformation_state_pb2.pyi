@@ -9,7 +9,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class DeformationState(_message.Message):
-    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms", "stretch", "folded_share", "deviation_m", "warnings")
+    __slots__ = ("header", "tracker", "status", "reasons", "model", "model_id", "calib_id", "theta", "log_likelihood", "search_deviation", "generations", "evaluations", "solve_ms", "age_ms", "skipped", "mesh_version", "sensors", "inlier_share", "covariance", "covariance_valid", "samples", "clock_sigma_ns", "searcher", "stop", "budget_evaluations", "budget_ms", "stretch", "folded_share", "deviation_m", "warnings", "age_error_ms")
     class Status(int, metaclass=_enum_type_wrapper.EnumTypeWrapper):
         __slots__ = ()
         STATUS_UNSPECIFIED: _ClassVar[DeformationState.Status]
@@ -95,6 +95,7 @@ class DeformationState(_message.Message):
     FOLDED_SHARE_FIELD_NUMBER: _ClassVar[int]
     DEVIATION_M_FIELD_NUMBER: _ClassVar[int]
     WARNINGS_FIELD_NUMBER: _ClassVar[int]
+    AGE_ERROR_MS_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
     status: DeformationState.Status
@@ -125,4 +126,5 @@ class DeformationState(_message.Message):
     folded_share: float
     deviation_m: float
     warnings: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ..., warnings: _Optional[_Iterable[str]] = ...) -> None: ...
+    age_error_ms: float
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., status: _Optional[_Union[DeformationState.Status, str]] = ..., reasons: _Optional[_Iterable[str]] = ..., model: _Optional[str] = ..., model_id: _Optional[str] = ..., calib_id: _Optional[str] = ..., theta: _Optional[_Iterable[float]] = ..., log_likelihood: _Optional[float] = ..., search_deviation: _Optional[float] = ..., generations: _Optional[int] = ..., evaluations: _Optional[int] = ..., solve_ms: _Optional[float] = ..., age_ms: _Optional[float] = ..., skipped: _Optional[int] = ..., mesh_version: _Optional[int] = ..., sensors: _Optional[_Iterable[_Union[DeformationState.Sensor, _Mapping]]] = ..., inlier_share: _Optional[float] = ..., covariance: _Optional[_Iterable[float]] = ..., covariance_valid: _Optional[bool] = ..., samples: _Optional[int] = ..., clock_sigma_ns: _Optional[int] = ..., searcher: _Optional[str] = ..., stop: _Optional[_Union[DeformationState.Stop, str]] = ..., budget_evaluations: _Optional[int] = ..., budget_ms: _Optional[float] = ..., stretch: _Optional[float] = ..., folded_share: _Optional[float] = ..., deviation_m: _Optional[float] = ..., warnings: _Optional[_Iterable[str]] = ..., age_error_ms: _Optional[float] = ...) -> None: ...

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from absmsg.v1 import common_pb2 as absmsg_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x61\x62smsg/v1/sensor_model.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\x8a\x03\n\x0bSensorModel\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0e\n\x06sensor\x18\x02 \x01(\t\x12\r\n\x05width\x18\x03 \x01(\r\x12\x0e\n\x06height\x18\x04 \x01(\r\x12\n\n\x02\x66x\x18\x05 \x01(\x01\x12\n\n\x02\x66y\x18\x06 \x01(\x01\x12\n\n\x02\x63x\x18\x07 \x01(\x01\x12\n\n\x02\x63y\x18\x08 \x01(\x01\x12\x0c\n\x04lens\x18\t \x03(\x01\x12\x0c\n\x04T_rs\x18\n \x03(\x01\x12\x10\n\x08\x63\x61lib_id\x18\x0b \x01(\t\x12\r\n\x05noise\x18\x0c \x01(\t\x12\x45\n\x10noise_parameters\x18\r \x03(\x0b\x32+.absmsg.v1.SensorModel.NoiseParametersEntry\x12\x12\n\nlens_model\x18\x0e \x01(\t\x12\x12\n\nhost_clock\x18\x0f \x01(\t\x1aM\n\x14NoiseParametersEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12$\n\x05value\x18\x02 \x01(\x0b\x32\x15.absmsg.v1.NumberList:\x02\x38\x01\"\x1c\n\nNumberList\x12\x0e\n\x06values\x18\x01 \x03(\x01\"Z\n\x06\x43onfig\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0c\n\x04toml\x18\x02 \x01(\t\x12\x0e\n\x06sha256\x18\x03 \x01(\t\x12\x0f\n\x07version\x18\x04 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1c\x61\x62smsg/v1/sensor_model.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"\x88\x03\n\x0bSensorModel\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0e\n\x06sensor\x18\x02 \x01(\t\x12\r\n\x05width\x18\x03 \x01(\r\x12\x0e\n\x06height\x18\x04 \x01(\r\x12\n\n\x02\x66x\x18\x05 \x01(\x01\x12\n\n\x02\x66y\x18\x06 \x01(\x01\x12\n\n\x02\x63x\x18\x07 \x01(\x01\x12\n\n\x02\x63y\x18\x08 \x01(\x01\x12\x0c\n\x04lens\x18\t \x03(\x01\x12\x0c\n\x04T_rs\x18\n \x03(\x01\x12\x10\n\x08\x63\x61lib_id\x18\x0b \x01(\t\x12\r\n\x05noise\x18\x0c \x01(\t\x12\x45\n\x10noise_parameters\x18\r \x03(\x0b\x32+.absmsg.v1.SensorModel.NoiseParametersEntry\x12\x12\n\nlens_model\x18\x0e \x01(\t\x1aM\n\x14NoiseParametersEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12$\n\x05value\x18\x02 \x01(\x0b\x32\x15.absmsg.v1.NumberList:\x02\x38\x01J\x04\x08\x0f\x10\x10R\nhost_clock\"\x1c\n\nNumberList\x12\x0e\n\x06values\x18\x01 \x03(\x01\"Z\n\x06\x43onfig\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0c\n\x04toml\x18\x02 \x01(\t\x12\x0e\n\x06sha256\x18\x03 \x01(\t\x12\x0f\n\x07version\x18\x04 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,11 +35,11 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._loaded_options = None
   _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_options = b'8\001'
   _globals['_SENSORMODEL']._serialized_start=68
-  _globals['_SENSORMODEL']._serialized_end=462
-  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_start=385
-  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_end=462
-  _globals['_NUMBERLIST']._serialized_start=464
-  _globals['_NUMBERLIST']._serialized_end=492
-  _globals['_CONFIG']._serialized_start=494
-  _globals['_CONFIG']._serialized_end=584
+  _globals['_SENSORMODEL']._serialized_end=460
+  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_start=365
+  _globals['_SENSORMODEL_NOISEPARAMETERSENTRY']._serialized_end=442
+  _globals['_NUMBERLIST']._serialized_start=462
+  _globals['_NUMBERLIST']._serialized_end=490
+  _globals['_CONFIG']._serialized_start=492
+  _globals['_CONFIG']._serialized_end=582
 # @@protoc_insertion_point(module_scope)

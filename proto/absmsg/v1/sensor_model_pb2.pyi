@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SensorModel(_message.Message):
-    __slots__ = ("header", "sensor", "width", "height", "fx", "fy", "cx", "cy", "lens", "T_rs", "calib_id", "noise", "noise_parameters", "lens_model", "host_clock")
+    __slots__ = ("header", "sensor", "width", "height", "fx", "fy", "cx", "cy", "lens", "T_rs", "calib_id", "noise", "noise_parameters", "lens_model")
     class NoiseParametersEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -30,7 +30,6 @@ class SensorModel(_message.Message):
     NOISE_FIELD_NUMBER: _ClassVar[int]
     NOISE_PARAMETERS_FIELD_NUMBER: _ClassVar[int]
     LENS_MODEL_FIELD_NUMBER: _ClassVar[int]
-    HOST_CLOCK_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     sensor: str
     width: int
@@ -45,8 +44,7 @@ class SensorModel(_message.Message):
     noise: str
     noise_parameters: _containers.MessageMap[str, NumberList]
     lens_model: str
-    host_clock: str
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., sensor: _Optional[str] = ..., width: _Optional[int] = ..., height: _Optional[int] = ..., fx: _Optional[float] = ..., fy: _Optional[float] = ..., cx: _Optional[float] = ..., cy: _Optional[float] = ..., lens: _Optional[_Iterable[float]] = ..., T_rs: _Optional[_Iterable[float]] = ..., calib_id: _Optional[str] = ..., noise: _Optional[str] = ..., noise_parameters: _Optional[_Mapping[str, NumberList]] = ..., lens_model: _Optional[str] = ..., host_clock: _Optional[str] = ...) -> None: ...
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., sensor: _Optional[str] = ..., width: _Optional[int] = ..., height: _Optional[int] = ..., fx: _Optional[float] = ..., fy: _Optional[float] = ..., cx: _Optional[float] = ..., cy: _Optional[float] = ..., lens: _Optional[_Iterable[float]] = ..., T_rs: _Optional[_Iterable[float]] = ..., calib_id: _Optional[str] = ..., noise: _Optional[str] = ..., noise_parameters: _Optional[_Mapping[str, NumberList]] = ..., lens_model: _Optional[str] = ...) -> None: ...
 
 class NumberList(_message.Message):
     __slots__ = ("values",)

@@ -2,6 +2,7 @@
 
 import queue
 import threading
+import time
 from dataclasses import fields
 
 import numpy as np
@@ -16,6 +17,7 @@ from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus
+from tests.waiting import eventually
 
 
 def frame(seq, sensor="tof", stream="depth", epoch=0):
@@ -34,12 +36,18 @@ def frame(seq, sensor="tof", stream="depth", epoch=0):
     )
 
 
+#: What only a frame that came over the bus has.
+RECEIVED = ("host_clock", "t_received_ns")
+
+
 def same(a, b):
+    """True if two frames hold the same, apart from how one came here."""
     return all(
         np.array_equal(
             getattr(a, f.name), getattr(b, f.name), equal_nan=f.name in ("exposure_s", "gain", "temperature_c")
         )
         for f in fields(Frame)
+        if f.name not in RECEIVED
     )
 
 
@@ -54,7 +62,7 @@ def publisher(bus, headers):
 
 def test_frames_and_truths_arrive_as_they_were(headers):
     bus = LoopbackBus()
-    subscriber = FrameSubscriber(bus, [("tof", "depth")])
+    subscriber = FrameSubscriber(bus, [("tof", "depth")], time.monotonic_ns)
     truth = Truth(3, 123, np.ones((2, 2, 3), np.float32))
     with publisher(bus, headers) as sink:
         sink.on_frame(frame(5))
@@ -72,13 +80,34 @@ def test_frames_and_truths_arrive_as_they_were(headers):
 
 def test_a_frame_crosses_real_sessions_unchanged(open_bus, headers):
     open_bus()
-    subscriber = FrameSubscriber(open_bus(), [("tof", "depth")])
+    subscriber = FrameSubscriber(open_bus(), [("tof", "depth")], time.monotonic_ns)
     with publisher(open_bus(), headers) as sink:
         arrived = None
         while arrived is None:
             sink.on_frame(frame(5))
             arrived = subscriber.take(0.05)
     assert same(arrived, frame(5))
+
+
+def test_a_received_frame_says_when_it_came_and_of_which_clock_its_times_are():
+    bus, now = LoopbackBus(), [7]
+    subscriber = FrameSubscriber(bus, [("tof", "depth")], lambda: now[0])
+    with publisher(bus, HeaderFactory("demo", WallClock(), host="camera")) as sink:
+        sink.on_frame(frame(5))
+    now[0] = 20  # the reader is late
+    arrived = subscriber.take(0)
+    assert arrived is not None
+    assert (arrived.host_clock, arrived.t_received_ns, arrived.t_arrival_ns) == ("camera", 7, 10**9 + 5)
+
+
+def test_images_are_numbered_as_they_are_published(headers):
+    bus = LoopbackBus()
+    with publisher(bus, headers) as sink:
+        for number, seq in enumerate((5, 9, 10)):
+            sink.on_frame(frame(seq))
+            assert eventually(lambda number=number: sink.published.get("tof/depth/image", 0) > number)
+    infos = [frame_info_pb2.FrameInfo.FromString(sample.attachment) for sample in bus.sent]
+    assert [(info.header.seq, info.seq) for info in infos] == [(0, 5), (1, 9), (2, 10)]
 
 
 def test_a_publisher_that_falls_behind_drops_the_oldest_and_never_blocks(headers):
@@ -104,7 +133,7 @@ def test_a_publisher_that_falls_behind_drops_the_oldest_and_never_blocks(headers
 
 def test_a_slow_reader_gets_the_newest_and_the_loss_is_counted(headers):
     bus = LoopbackBus()
-    subscriber = FrameSubscriber(bus, [("tof", "depth"), ("color", "depth")], depth=2)
+    subscriber = FrameSubscriber(bus, [("tof", "depth"), ("color", "depth")], time.monotonic_ns, depth=2)
     with publisher(bus, headers) as sink:
         for seq in range(5):
             sink.on_frame(frame(seq))
@@ -118,7 +147,7 @@ def test_a_slow_reader_gets_the_newest_and_the_loss_is_counted(headers):
 
 def test_what_is_no_frame_of_its_topic_is_counted_and_explained(headers):
     bus = LoopbackBus()
-    subscriber = FrameSubscriber(bus, [("tof", "depth")])
+    subscriber = FrameSubscriber(bus, [("tof", "depth")], time.monotonic_ns)
     topic = keys.image("tof", "depth")
     raw = bus.publisher(topic, codec.IMAGE_SCHEMA, IMAGES)
     raw.put(b"\xff\xff", b"\xff")
@@ -130,7 +159,7 @@ def test_what_is_no_frame_of_its_topic_is_counted_and_explained(headers):
 
 
 def test_closing_wakes_the_reader(headers):
-    subscriber = FrameSubscriber(LoopbackBus(), [("tof", "depth")])
+    subscriber = FrameSubscriber(LoopbackBus(), [("tof", "depth")], time.monotonic_ns)
     reader = threading.Thread(target=subscriber.take)
     reader.start()
     subscriber.close()

@@ -2,14 +2,17 @@
 
 import queue
 import signal
+import time
 
 import pytest
 from absmsg.v1.health_pb2 import Health
 
+from abs_service.bus import keys
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Level
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
+from drivers.contract.host_clock import host_clock
 
 pytestmark = pytest.mark.slow  # starts an interpreter that imports and compiles everything
 
@@ -35,7 +38,9 @@ def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, la
         changes, health = queue.SimpleQueue(), queue.SimpleQueue()
         bus.watch_liveliness(lambda *change: changes.put(change))
         bus.subscribe("health/capture", lambda sample: health.put(Health.FromString(sample.payload)))
-        subscriber = FrameSubscriber(bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")])
+        subscriber = FrameSubscriber(
+            bus, [("tof", "depth"), ("tof", "amplitude"), ("color", "color")], time.monotonic_ns
+        )
         process = launch("capture", rig, "--connect", endpoint)
         assert changes.get(timeout=60) == ("capture", True)
         seen = {}
@@ -44,7 +49,7 @@ def test_it_publishes_frames_and_answers_queries_until_sigterm(rig, endpoint, la
             assert frame is not None
             seen[frame.key] = frame
         assert {sample.topic for sample in bus.query("**", 2)} == {
-            *("config", "schema", "tf"),
+            *("config", "schema", "tf", keys.clock(host_clock())),
             *("tof/model", "tof/calibration", "color/model", "color/calibration"),
         }
         assert changes.empty(), "it is not alive for others any more"

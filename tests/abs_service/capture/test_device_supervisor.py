@@ -2,6 +2,8 @@
 
 import queue
 import threading
+import time
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from abs_service.commands.parts.rig_devices import HeadError, SettingError
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
 from drivers.contract.device import AddressError, DeviceError, DeviceState
 from drivers.contract.frame import Frame, Kind
+from drivers.simulated import open_device
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.capture.fake_device import FakeDevice
 from tests.waiting import eventually
@@ -56,7 +59,7 @@ def keep(monkeypatch, asked):
     monkeypatch.setattr(device_supervisor, "FIRST_BACKOFF_S", 0.1)
     supervisors = []
 
-    def keep(*make, on_open=lambda device: None):
+    def keep(*make, on_open=lambda device: None, heads=MappingProxyType({"head": "tof"})):
         makers = iter(make)
         collector, bus = Collector(), LoopbackBus()
         health = Health(bus, "capture", HeaderFactory("demo", WallClock()))
@@ -66,7 +69,7 @@ def keep(monkeypatch, asked):
             return next(makers)()
 
         supervisor = DeviceSupervisor(
-            "sim", "fake://", open_device, on_open, collector, {"head": "tof"}, health, WallClock().monotonic
+            "sim", "fake://", open_device, on_open, collector, heads, health, WallClock().monotonic
         )
         supervisors.append(supervisor)
         supervisor.start()
@@ -259,3 +262,19 @@ def test_what_fails_after_the_end_is_no_error_of_the_rig(keep):
     fail_now.set()
     assert device.closed.wait(5)
     assert supervisor.fatal_error is None
+
+
+def test_a_frozen_camera_is_opened_again_and_counted(keep, monkeypatch):
+    monkeypatch.setattr(stall_detector, "STALL_NS", 200_000_000)
+    monkeypatch.setattr(stall_detector, "REOPEN_NS", 600_000_000)
+
+    def frozen():
+        return open_device("simulated://sheet?sensors=tof&tof=32x24&fault=freeze@5", time.monotonic_ns)
+
+    _, collector, health = keep(frozen, frozen, heads={"tof": "tof"})
+    first = collector.frames.get(timeout=20)
+    assert eventually(lambda: health().labels["device.sim"] == "stalled")
+    assert "delivers the same image for" in health().message
+    assert eventually(lambda: health().counters["device.sim.reconnects"] == 1)
+    assert eventually(lambda: collector.frames.get(timeout=5).epoch > first.epoch)
+    assert health().counters["device.sim.repeated"] > 5

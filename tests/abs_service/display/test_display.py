@@ -106,6 +106,7 @@ def view(live, **changes):
         "children": children,
         "elapsed_s": 83.4,
         "now_ns": 102 * S,
+        "host_clock": "",
     }
     return RigView(**(fields | changes))
 

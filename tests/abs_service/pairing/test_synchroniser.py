@@ -130,6 +130,40 @@ def test_a_new_epoch_may_count_anew_and_have_another_size():
     assert sync.counters == {}
 
 
+def elsewhere(key, t_s, host, *, epoch=0, received_s=0.0):
+    """A frame of another host's clock that comes here at a time of our clock."""
+    made = frame(key, t_s * 1000, epoch=epoch)
+    return replace(made, host_clock=host, t_received_ns=int(received_s * 1e9))
+
+
+def test_after_a_reboot_of_the_capture_host_sets_are_formed_on_its_new_clock():
+    sync = synchroniser()
+    sync.add(elsewhere(TOF, 9_000, "first boot", epoch=90_000))
+    assert sync.add(elsewhere(COLOR, 50, "second boot", epoch=500)) == [], "the reference decides"
+    (last,) = sync.add(elsewhere(TOF, 50.033, "second boot", epoch=500))
+    assert (last.stamp_ns, last.missing, last.host_clock) == (9_000_000 * MS, (COLOR,), "first boot")
+    (formed,) = sync.add(elsewhere(COLOR, 50.033, "second boot", epoch=500))
+    assert (formed.stamp_ns, formed.missing, formed.host_clock) == (50_033 * MS, (), "second boot")
+    assert sync.counters == {"color/color.other_clock": 1}
+
+
+def test_what_waits_for_a_reference_of_another_clock_is_counted():
+    sync = synchroniser()
+    sync.add(elsewhere(COLOR, 9_000, "first boot"))
+    sync.add(elsewhere(TOF, 50, "second boot"))
+    assert sync.add(elsewhere(COLOR, 50, "second boot"))[0].missing == ()
+    assert sync.counters == {"color/color.other_clock": 1}
+
+
+@pytest.mark.parametrize("ahead_s", [-2000, 2000])
+def test_the_deadline_needs_no_common_clock(ahead_s):
+    sync = synchroniser(deadline_ns=50 * MS)
+    sync.add(elsewhere(TOF, 5_000, "other host", received_s=5_000 + ahead_s))
+    assert sync.poll((5_000_049 + ahead_s * 1000) * MS) == []
+    (formed,) = sync.poll((5_000_050 + ahead_s * 1000) * MS)
+    assert formed.missing == (COLOR,)
+
+
 def test_memory_is_bounded_without_a_reference_and_without_members():
     sync = synchroniser()
     for t_ms in range(1000):

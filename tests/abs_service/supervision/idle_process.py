@@ -1,5 +1,7 @@
 """A process that does nothing until it is asked to end."""
 
+from abs_service.supervision.child_process import ThreadTimes
+
 
 class Idle:
     """A `Process` that does nothing; appends its name to `ended` when it is asked to end."""
@@ -14,6 +16,9 @@ class Idle:
 
     def poll(self) -> int | None:
         return self._code
+
+    def threads(self) -> dict[int, ThreadTimes]:
+        return {}
 
     def terminate(self) -> None:
         self._ended.append(self._component)

@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from abs_service.supervision.child_process import ChildProcess
+from abs_service.supervision.child_process import ChildProcess, ThreadTimes
+from tests.waiting import eventually
 
 PATH = os.pathsep.join(sys.path)
 
@@ -73,7 +74,8 @@ def test_killing_a_child_kills_what_it_started(child):
 
 SUPERVISOR = """
 import sys, time
-from abs_service.supervision.child_process import ChildProcess
+from abs_service.supervision.child_process import ChildProcess, ThreadTimes
+from tests.waiting import eventually
 code = '''
 import signal, time
 from abs_service import lifeline
@@ -116,3 +118,16 @@ def gone(pid, seconds=5.0):
             return True
         time.sleep(0.02)
     return False
+
+
+def test_the_time_that_a_child_waits_for_a_processor_is_known(child):
+    busy = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\nwhile True: pass"
+    both = [child(busy), child(busy)]
+
+    def compete(process):
+        times = process.threads().get(process.pid, ThreadTimes())
+        return min(times.ran_ns, times.waited_ns) > 100_000_000 and times.runnable
+
+    assert eventually(lambda: all(map(compete, both)))
+    both[0].kill()
+    assert both[0].threads() == {}

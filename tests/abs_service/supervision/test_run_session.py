@@ -20,6 +20,7 @@ from abs_service.display.lines import PlainDisplay
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import estimate_messages
 from tests.abs_service.bus.loopback import LoopbackBus
 from tests.abs_service.supervision.idle_process import Idle
@@ -158,6 +159,25 @@ def test_a_topology_that_the_network_lost_is_queried():
     bench.session.run_until(lambda: bool(asked) or bench.session.elapsed_s > 30)
     assert len(asked) == 1
     assert bench.session.view().live.missing_topologies() == []
+
+
+def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch):
+    monkeypatch.setattr(silence_monitor, "SILENCE_NS", 100_000_000)
+    bench = Bench(PlainDisplay(io.StringIO(), io.StringIO()), trackers=["sheet"])
+    state = DeformationState(tracker="sheet").SerializeToString()
+    publisher = bench.bus.publisher(keys.state("sheet"), estimate_messages.STATE, EVENTS)
+    publisher.put(state)
+    publisher.put(state)
+
+    def last():
+        told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
+        return told[-1] if told else Health()
+
+    bench.session.run_until(lambda: last().level == Health.LEVEL_ERROR or bench.session.elapsed_s > 30)
+    assert last().message == "track/sheet: no estimate for 0 s"
+    publisher.put(state)
+    bench.session.run_until(lambda: last().level == Health.LEVEL_OK or bench.session.elapsed_s > 60)
+    assert last().level == Health.LEVEL_OK
 
 
 def test_the_processes_are_stopped_also_when_the_output_is_closed():

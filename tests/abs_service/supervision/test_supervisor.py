@@ -1,5 +1,6 @@
 import pytest
 
+from abs_service.supervision.child_process import ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 
@@ -12,6 +13,10 @@ class FakeProcess:
     def __init__(self, world, component, pid):
         self.world, self.component, self.pid = world, component, pid
         self.code = None
+        self.its_threads = {}
+
+    def threads(self):
+        return self.its_threads
 
     def poll(self):
         return self.code
@@ -67,6 +72,13 @@ def ends(world, supervisor, component, code):
     supervisor.poll()
     world.now_ns += 4 * S
     supervisor.poll()
+
+
+def passes(world, supervisor, seconds):
+    """So much time, in which the supervisor works."""
+    for _ in range(2 * seconds):
+        world.now_ns += S // 2
+        supervisor.poll()
 
 
 def test_all_children_are_started_at_once(world):
@@ -154,29 +166,69 @@ def test_when_the_devices_have_no_more_images_the_run_is_over(world):
 def test_a_silent_child_is_killed_and_started_again(world):
     supervisor = world.supervisor("capture")
     supervisor.heartbeat("capture")
-    world.now_ns += 9 * S
+    passes(world, supervisor, 9)
     supervisor.heartbeat("capture")
-    world.now_ns += 9 * S
-    supervisor.poll()
+    passes(world, supervisor, 9)
     assert supervisor.children["capture"].state is State.RUNNING
-    world.now_ns += 1 * S
-    supervisor.poll()
+    passes(world, supervisor, 1)
     assert ("kill", "capture") in world.events
     assert supervisor.children["capture"].state is State.STALLED
-    world.now_ns += 1 * S
-    supervisor.poll()
+    passes(world, supervisor, 1)
     assert supervisor.children["capture"].state is State.RUNNING
     assert supervisor.children["capture"].restarts == 1
 
 
 def test_a_child_that_starts_or_compiles_may_be_silent_for_longer(world):
     supervisor = world.supervisor("track/a")
-    world.now_ns += 170 * S
-    supervisor.poll()
+    passes(world, supervisor, 170)
     supervisor.heartbeat("track/a", busy=True)
-    world.now_ns += 170 * S
-    supervisor.poll()
+    passes(world, supervisor, 170)
     assert world.events == []
+
+
+def test_a_child_that_was_not_heard_because_the_supervisor_stood_still_is_not_killed(world):
+    supervisor = world.supervisor("capture")
+    supervisor.heartbeat("capture")
+    passes(world, supervisor, 3)
+    world.now_ns += 15 * S  # SIGSTOP, say
+    passes(world, supervisor, 6)
+    assert world.events == []
+    passes(world, supervisor, 2)
+    assert ("kill", "capture") in world.events, "but it has to say something afterwards"
+
+
+def test_a_child_that_waits_for_a_processor_is_not_killed_until_it_hangs(world):
+    supervisor = world.supervisor("track/a")
+    supervisor.heartbeat("track/a")
+    child, process = supervisor.children["track/a"], world.latest("track/a")
+    for waited_s in range(60):
+        process.its_threads = {1: ThreadTimes(S // 100, waited_s * S), 2: ThreadTimes(7, 7)}
+        passes(world, supervisor, 1)
+    assert world.events == []
+    assert child.reason == "no health for 60 s, because it waits for a processor"
+    supervisor.heartbeat("track/a")
+    assert child.reason == ""
+    passes(world, supervisor, 10)
+    assert ("kill", "track/a") in world.events
+
+
+@pytest.mark.parametrize(("ran_share", "killed"), [(0.0, False), (1.0, True)])
+def test_a_child_that_would_run_is_starved_if_it_did_not_run_and_hangs_if_it_did(world, ran_share, killed):
+    supervisor = world.supervisor("track/a")
+    supervisor.heartbeat("track/a")
+    for second in range(20):
+        world.latest("track/a").its_threads = {1: ThreadTimes(int(ran_share * second * S), 0, runnable=True)}
+        passes(world, supervisor, 1)
+    assert (("kill", "track/a") in world.events) is killed
+
+
+def test_a_child_that_waits_for_ever_is_killed_in_the_end(world):
+    supervisor = world.supervisor("track/a", startup_ns=20 * S)
+    supervisor.heartbeat("track/a")
+    for waited_s in range(31):
+        world.latest("track/a").its_threads = {1: ThreadTimes(0, waited_s * S)}
+        passes(world, supervisor, 1)
+    assert ("kill", "track/a") in world.events
 
 
 def test_health_of_unknown_components_is_ignored(world):

@@ -1,6 +1,7 @@
 """A live tracker takes frame sets, counts what it passed over, and announces its mesh before it uses it."""
 
 import dataclasses
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service.bus import keys
+from abs_service.bus.clock_offsets import ClockOffsets, answer
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
@@ -33,14 +35,15 @@ class Bench:
     """A live tracker on a loopback bus with a clock that only the test moves."""
 
     def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, **parts):
-        self.now_ns = 0
+        self.now_ns = self.tick_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
-        self.headers = HeaderFactory("demo", self.wall)
+        self.headers = self.capture = HeaderFactory("demo", self.wall, host="here")
         self.health = Health(self.bus, "track/sheet", self.headers)
-        frames = FrameSubscriber(self.bus, MEMBERS)
+        frames = FrameSubscriber(self.bus, MEMBERS, lambda: self.now_ns)
         self.sets = FrameSetQueue(frames, Synchroniser(MEMBERS[0], MEMBERS, tolerance_ns), lambda: self.now_ns)
         self.tracking = TrackingSession(RIG, default_plan(optimizer=cma.Settings(generations=2), **parts))
+        self.clocks = ClockOffsets(self.bus, lambda: self.now_ns, "here")
         self.live = LiveTracker(
             self.tracking,
             self.sets,
@@ -48,9 +51,11 @@ class Bench:
             self.health,
             NoiseMonitor(self.health),
             self.clock,
+            self.clocks,
             budget_ms,
         )
-        self.tick_ns = 0
+        self.published = Counter()
+        self.lost = set()  # exposures that the bus loses
 
     def clock(self):
         """Time passes whenever the tracker looks at it."""
@@ -62,10 +67,13 @@ class Bench:
         self.now_ns = max(self.now_ns, SIMULATION.time_ns(k))
         for taken in SIMULATION.expose(k)[0]:
             if taken.kind in kinds:
-                frame = dataclasses.replace(change(taken), t_arrival_ns=self.now_ns)
-                header = self.headers.at(frame.t_host_ns, frame.seq)
-                publisher = self.bus.publisher(keys.image(*frame.key), codec.IMAGE_SCHEMA, IMAGES)
-                publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
+                frame = change(dataclasses.replace(taken, t_arrival_ns=self.now_ns))
+                topic = keys.image(*frame.key)
+                header = self.capture.at(frame.t_host_ns, self.published[topic])
+                self.published[topic] += 1
+                if k not in self.lost:
+                    publisher = self.bus.publisher(topic, codec.IMAGE_SCHEMA, IMAGES)
+                    publisher.put(codec.encode_image(frame, 0), codec.encode_info(frame, header))
 
     def sent(self, topic, message):
         return [message.FromString(sample.payload) for sample in self.bus.sent if sample.topic == topic]
@@ -174,6 +182,49 @@ def test_frames_that_newer_ones_pushed_out_are_counted_too(bench):
     assert counters["skipped"] + dropped[0] == 9
 
 
+def test_frames_that_the_bus_lost_are_counted_by_topic_and_sensor(bench):
+    bench.lost = {1, 2, 4}
+    for k in range(6):
+        bench.expose(k)
+        bench.live.process_next()
+    counters = bench.said.counters
+    topics = [keys.image(*key) for key in MEMBERS]
+    assert {topic: counters[f"lost.{topic}"] for topic in topics} == dict.fromkeys(topics, 3)
+    assert {sensor.sensor: sensor.dropped for sensor in bench.states[-1].sensors} == {"tof": 6, "color": 3}
+
+
+SECOND = 1_000_000_000
+
+
+def test_a_tracker_without_frames_is_an_error_until_they_come(bench):
+    bench.expose(0)
+    bench.live.process_next()
+    bench.now_ns += SECOND
+    assert bench.said.level == Message.LEVEL_OK, "the first may take long"
+    for _ in range(10):
+        bench.now_ns += SECOND
+        bench.live.report()
+    said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert said.message == "no estimate for 11 s: no frames come from the cameras"
+    bench.expose(1)
+    bench.live.process_next()
+    assert bench.said.level == Message.LEVEL_OK
+
+
+def test_a_tracker_whose_frames_are_all_of_no_use_says_why(bench):
+    for k in range(3):
+        bench.expose(k, lambda frame: dataclasses.replace(frame, epoch=5))
+        bench.live.process_next()
+    for k in range(3, 50):
+        bench.expose(k)  # of an older epoch
+        bench.live.process_next()
+    said = bench.said
+    assert said.level == Message.LEVEL_ERROR
+    assert said.message.startswith("no estimate for 2 s: since then unused.")
+    assert ".old_epoch 47" in said.message
+
+
 def test_without_frames_nothing_is_published(bench):
     bench.live.process_next()
     assert bench.bus.sent == []
@@ -277,3 +328,73 @@ def test_a_wrong_depth_scale_is_a_warning_until_it_is_right(bench):
     bench.live.process_next()
     assert list(bench.states[1].warnings) == []
     assert bench.said.level == Message.LEVEL_OK
+
+
+class Elsewhere:
+    """The cameras of a bench are on another host.
+
+    Args:
+        bench: where the tracker runs.
+        behind_ns: how far that host's clock is behind ours.
+        boot: which boot of that host.
+    """
+
+    def __init__(self, bench, behind_ns, boot="first-boot"):
+        self._bench, self._behind_ns = bench, behind_ns
+        bench.capture = HeaderFactory("demo", bench.wall, host=boot)
+
+    def expose(self, k, **given):
+        self._bench.expose(k, self._shift, **given)
+
+    def _shift(self, frame):
+        times = {name: getattr(frame, name) - self._behind_ns for name in ("t_host_ns", "t_arrival_ns")}
+        return dataclasses.replace(frame, **times, epoch=max(frame.t_host_ns - self._behind_ns, 0) // 10**8)
+
+
+def test_estimates_go_on_after_a_reboot_of_the_capture_host(bench):
+    cameras = Elsewhere(bench, -(10**15))
+    for k in range(3):
+        cameras.expose(k)
+        bench.live.process_next()
+    cameras = Elsewhere(bench, -(10**10), boot="second-boot")
+    for k in range(3, 6):
+        cameras.expose(k)
+        bench.live.process_next()
+    assert [state.status for state in bench.states] == 6 * [DeformationState.STATUS_TRACKING]
+    assert [state.mesh_version for state in bench.states] == [1, 1, 1, 2, 2, 2]
+
+
+def test_a_tracker_whose_clock_is_far_ahead_waits_for_all_sensors(bench):
+    depth = next(kind for kind in Kind if kind.value == MEMBERS[0][1])
+    cameras = Elsewhere(bench, 2000 * 10**9)
+    for k in range(3):
+        cameras.expose(k, kinds=(depth,))
+        bench.live.process_next()
+        cameras.expose(k, kinds=set(Kind) - {depth})
+        bench.live.process_next()
+    assert len(bench.states) == 3
+    assert not any(sensor.missing for state in bench.states for sensor in state.sensors)
+
+
+def test_the_age_across_hosts_is_unknown_until_their_clocks_are_compared(bench):
+    cameras, behind_ns = Elsewhere(bench, 2000 * 10**9), 2000 * 10**9
+    there = WallClock(monotonic=lambda: bench.now_ns - behind_ns, wall=lambda: 0)
+    answer(bench.bus, HeaderFactory("demo", there, host="first-boot"))
+    for k in range(2):
+        cameras.expose(k)
+        bench.now_ns += 7_000_000
+        bench.live.process_next()
+        bench.clocks.measure()
+    before, after = bench.states
+    assert np.isnan([before.age_ms, before.age_error_ms]).all()
+    assert after.age_ms == pytest.approx(7)
+    assert after.age_error_ms == pytest.approx(0, abs=0.1)
+    assert (after.header.host_clock, after.header.t_host_ns) == ("first-boot", SIMULATION.time_ns(1) - behind_ns)
+    assert after.header.stamp.ToNanoseconds() == 10**18 + SIMULATION.time_ns(1)
+    assert bench.said.gauges["clock.offset_s"] == pytest.approx(2000)
+
+
+def test_on_one_host_the_age_has_no_error(bench):
+    bench.expose(0)
+    bench.live.process_next()
+    assert bench.states[0].age_error_ms == 0

@@ -42,7 +42,7 @@ MESH = Mesh(np.zeros((3, 3)), np.array([[0, 1, 2]], np.int32), np.full((3, 3), n
 
 
 def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
-    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
     assert list(state.covariance) == pytest.approx([1.0, 0.1, 0.2, 2.0, 0.3, 3.0])
     assert state.covariance_valid
     assert state.log_likelihood == -12.5
@@ -51,7 +51,7 @@ def test_the_covariance_travels_as_its_upper_triangle_row_by_row():
 @pytest.mark.parametrize("status", [Status.LOST, Status.INITIALIZING])
 def test_the_covariance_is_invalid_while_not_tracking(status):
     lost = replace(ESTIMATE, status=status)
-    assert not estimate_messages.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {})).covariance_valid
+    assert not estimate_messages.state(Header(), lost, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {})).covariance_valid
     assert estimate_messages.mesh(Header(), lost, IDENTITY).covariance_f32 == b""
 
 
@@ -63,7 +63,9 @@ def test_the_covariance_of_every_vertex_travels_as_its_six_different_entries():
 
 
 def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
-    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 3, {"tof": 4, "color": 5}))
+    state = estimate_messages.state(
+        Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 3, {"tof": 4, "color": 5})
+    )
     tof, color = state.sensors
     assert (tof.sensor, tof.seq, tof.samples, tof.dropped, tof.missing) == ("tof", 42, 270, 4, False)
     assert (color.sensor, color.dropped, color.missing) == ("color", 5, True)
@@ -71,14 +73,14 @@ def test_every_sensor_is_named_with_what_it_contributed_and_what_was_lost():
 
 
 def test_what_the_status_is_judged_by_is_published():
-    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
     tof = state.sensors[0]
     assert (tof.rim_visible, tof.rim_outside, tof.rim_inside, tof.rim_occluded) == (60, 5, 3, 2)
     assert (state.stretch, state.folded_share, state.deviation_m) == (0.02, 0.01, 1.5e-3)
 
 
 def test_effort_and_budget_of_the_search_are_published():
-    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    state = estimate_messages.state(Header(), ESTIMATE, IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {}))
     assert (state.searcher, state.stop) == ("cma_es", estimate_messages.State.STOP_TIME)
     assert (state.generations, state.evaluations) == (3, 45)
     assert (state.budget_evaluations, state.budget_ms) == (1000, 24.0)
@@ -86,7 +88,9 @@ def test_effort_and_budget_of_the_search_are_published():
 
 @pytest.mark.parametrize("stop", Stop)
 def test_every_reason_to_stop_has_its_word(stop):
-    state = estimate_messages.state(Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0, {}))
+    state = estimate_messages.state(
+        Header(), replace(ESTIMATE, stop=stop), IDENTITY, Effort(1.0, 24.0, 2.0, 0.5, 0, {})
+    )
     word = estimate_messages.State.Stop.Name(state.stop).removeprefix("STOP_").lower()
     assert word == ("unspecified" if stop == Stop.NOTHING else stop.value)
 
