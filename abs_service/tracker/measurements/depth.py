@@ -71,7 +71,9 @@ class _DepthDecoder:
     def decode(self, frames: Mapping[Kind, Frame]) -> DepthImage:
         depth = frames[Kind.DEPTH]
         gain = self._per_z if depth.geometry == Geometry.Z else self._per_radial
-        distance = depth.si() * gain + self._offset
+        distance = depth.si()
+        distance *= gain
+        distance += self._offset
         return DepthImage(distance, self._amplitude(frames, gain, distance.shape))
 
     def _amplitude(

@@ -71,39 +71,33 @@ class DesignEffects:
         leverage: Sequence[NDArray[np.float64]],
     ) -> NDArray[np.float64]:
         """Squared lengths of the scores, added up within clusters, and one by one (2,)."""
-        scores, numbers, total = np.zeros((CLUSTERS, len(inverse))), np.full(CLUSTERS, -1, np.int64), 0.0
-        every = np.arange(len(inverse))
+        every, numbers, total = np.arange(len(inverse)), np.full(CLUSTERS, -1, np.int64), 0.0
+        placed = []
         for part, share in zip(parts, leverage):
             if len(part.residual) and len(part.positions) == len(part.residual):
-                own = every[part.parameters]
+                placed.append((part, np.empty(len(part.residual), np.int64)))
+                _find_clusters(part.positions, 1 / self._side_m, numbers, placed[-1][1])
                 total += float(np.vdot(part.residual**2, share))  # the squared length of a score is r² h
-                _add_clusters(part.positions, 1 / self._side_m, part.residual, part.jacobian, own, numbers, scores)
-        used = scores[: numbers.max() + 1]
-        return np.array([float(np.vdot(used @ inverse, used)), total])
+        scores = np.zeros((numbers.max() + 1, len(inverse)))
+        for part, clusters in placed:
+            _add_scores(clusters, part.residual, part.jacobian, every[part.parameters], scores)
+        return np.array([float(np.vdot(scores @ inverse, scores)), total])
 
 
 @kernel
-def _add_clusters(
-    positions: NDArray[np.floating],
-    per_metre: float,
-    residual: NDArray[np.float64],
-    jacobian: NDArray[np.float64],
-    own: NDArray[np.int64],
-    numbers: NDArray[np.int64],
-    scores: NDArray[np.float64],
+def _find_clusters(
+    positions: NDArray[np.floating], per_metre: float, numbers: NDArray[np.int64], clusters: NDArray[np.int64]
 ) -> None:
-    """Adds scores Jᵀr to those of the clusters of their positions.
+    """Clusters of positions, numbered in the order in which they are found.
 
     Args:
         positions: of the points (m, 3) [m].
         per_metre: inverse side of a cell [1/m].
-        residual, jacobian: (m,) and (m, k).
-        own: parameters (k,).
-        numbers: row of a cluster in `scores` by the hash of its cell (clusters,); −1 if it has none yet.
-        scores: of the clusters (clusters, dim).
+        numbers: number of a cluster by the hash of its cell (clusters,); −1 if it has none yet.
+        clusters: number of every point's cluster (m,).
     """
     count = numbers.max() + 1
-    for m in range(residual.size):
+    for m in range(clusters.size):
         x = np.int64(np.floor(positions[m, 0] * per_metre))
         y = np.int64(np.floor(positions[m, 1] * per_metre))
         z = np.int64(np.floor(positions[m, 2] * per_metre))
@@ -112,6 +106,19 @@ def _add_clusters(
         if numbers[cell] < 0:
             numbers[cell] = count
             count += 1
-        row = scores[numbers[cell]]
+        clusters[m] = numbers[cell]
+
+
+@kernel
+def _add_scores(
+    clusters: NDArray[np.int64],
+    residual: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
+    own: NDArray[np.int64],
+    scores: NDArray[np.float64],
+) -> None:
+    """Adds scores Jᵀr, of residuals (m,) and rows (m, k) by parameters (k,), to those of their clusters (…, dim)."""
+    for m in range(residual.size):
+        row = scores[clusters[m]]
         for k in range(own.size):
             row[own[k]] += residual[m] * jacobian[m, k]

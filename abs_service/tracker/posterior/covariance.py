@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.posterior.curvature import add_at, solved
+from abs_service.tracker.posterior.curvature import add_at, solved, taken_at
 from abs_service.tracker.terms.linearization import Linearization
 from calib.jit import kernel
 
@@ -46,28 +46,40 @@ def leverages(inverse: NDArray[np.float64], sensed: Sensed) -> PerResidual:
 
 
 def _leverage(inverse: NDArray[np.float64], part: Linearization) -> NDArray[np.float64]:
-    answer = part.jacobian @ inverse[part.parameters][:, part.parameters]
-    return np.einsum("md,md->m", answer, part.jacobian)
+    result = np.empty(len(part.residual))
+    _dot_rows(part.jacobian @ taken_at(part.parameters, inverse), part.jacobian, result)
+    return result
+
+
+@kernel
+def _dot_rows(one: NDArray[np.float64], other: NDArray[np.float64], result: NDArray[np.float64]) -> None:
+    """Dot products (m,) of the rows of two matrices (m, k)."""
+    for m in range(result.size):
+        total = 0.0
+        for k in range(one.shape[1]):
+            total += one[m, k] * other[m, k]
+        result[m] = total
 
 
 def score_covariance(
-    curvature: NDArray[np.float64], sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]
+    priors: NDArray[np.float64], sensed: Sensed, leverage: PerResidual, effects: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P, where P = Σ⁻¹ − JᵀJ.
+    """Covariance (dim, dim) of the gradient: B = Jᵀ diag(D r² / (1 − h)) J + P.
 
     The covariance of Θ is the sandwich Σ B Σ.
 
     Args:
-        curvature: Σ⁻¹ (dim, dim), of likelihood and priors.
+        priors: P (dim, dim).
         sensed: r and J of the sensors.
         leverage: h.
         effects: design effect D (sources,) of the residuals of every source, see `correlation`.
     """
-    result = curvature.copy()
+    result = priors.copy()
     for parts, shares, effect in zip(sensed, leverage, effects):
         for part, share in zip(parts, shares):
-            weight = effect * part.residual**2 / np.maximum(1 - share, LEAST_KEPT) - 1
-            add_at(part.parameters, (part.jacobian.T * weight) @ part.jacobian, result)
+            scale = part.residual * np.sqrt(effect / np.maximum(1 - share, LEAST_KEPT))
+            scaled = part.jacobian * scale[:, None]
+            add_at(part.parameters, scaled.T @ scaled, result)  # of one matrix: half the products
     return result
 
 
@@ -89,7 +101,7 @@ def propagated(sparse_jacobian: SparseJacobian, covariance: NDArray[np.float64])
             slice(vertices[0], vertices[-1] + 1) if in_a_row else vertices
         ]  # a slice copies nothing
         # One product of matrices for all vertices: n small ones take several times as long.
-        weighted = (local.reshape(-1, len(own)) @ covariance[own[:, None], own]).reshape(local.shape)
+        weighted = (local.reshape(-1, len(own)) @ taken_at(own, covariance)).reshape(local.shape)
         _multiply(weighted, local, vertices, result)
     return result
 

@@ -26,6 +26,9 @@ class Quadratic:
     gradient: NDArray[np.float64]
     curvature: NDArray[np.float64]
 
+    def __add__(self, other: "Quadratic") -> "Quadratic":
+        return Quadratic(self.gradient + other.gradient, self.curvature + other.curvature)
+
 
 def gauss_newton(parts: Sequence[Linearization], dimension: int) -> Quadratic:
     """Gauss–Newton approximation of the cost: sums of the gradients Jᵀr and the curvatures JᵀJ of all parts."""
@@ -42,6 +45,24 @@ def add_at(parameters: NDArray[np.int64] | slice, square: NDArray[np.float64], t
         total[parameters, parameters] += square
     else:
         _scatter(parameters, square, total)
+
+
+def taken_at(parameters: NDArray[np.int64] | slice, square: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The part (k, k) for some parameters of a matrix for all (dim, dim)."""
+    if isinstance(parameters, slice):
+        return square[parameters, parameters]
+    result = np.empty((len(parameters), len(parameters)))
+    _gather(parameters, square, result)
+    return result
+
+
+@kernel
+def _gather(parameters: NDArray[np.int64], square: NDArray[np.float64], part: NDArray[np.float64]) -> None:
+    """The opposite of `_scatter`, as fast."""
+    for i in range(parameters.size):
+        row = square[parameters[i]]
+        for j in range(parameters.size):
+            part[i, j] = row[parameters[j]]
 
 
 @kernel

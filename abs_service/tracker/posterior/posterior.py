@@ -27,12 +27,14 @@ class Linearized:
     Attributes:
         theta: the parameters (dim,).
         quadratic: likelihood and priors.
+        priors: curvature (dim, dim) of the priors alone.
         sensed: residuals and derivatives of the sensors alone, by the origin of their errors, each in parts.
         sparse_jacobian: derivatives of the vertices.
     """
 
     theta: NDArray[np.float64]
     quadratic: Quadratic
+    priors: NDArray[np.float64]
     sensed: list[list[Linearization]]
     sparse_jacobian: SparseJacobian
 
@@ -110,9 +112,9 @@ class FramePosterior:
         surface, sparse_jacobian = of.model.deform(theta[None]), of.model.sparse_jacobian(theta)
         terms = of.objective.linearize(surface, sparse_jacobian)
         sensed = [source.parts() for term in terms for source in term.sources()]
-        parts = [part for source in sensed for part in source]
-        quadratic = gauss_newton([*parts, *self._priors(surface, sparse_jacobian, theta)], self.dimension)
-        self.linearized = Linearized(theta, quadratic, sensed, sparse_jacobian)
+        priors = gauss_newton(self._priors(surface, sparse_jacobian, theta), self.dimension)
+        quadratic = priors + gauss_newton([part for source in sensed for part in source], self.dimension)
+        self.linearized = Linearized(theta, quadratic, priors.curvature, sensed, sparse_jacobian)
         return quadratic
 
     def linearized_near(self, theta: NDArray[np.float64]) -> Linearized:

@@ -78,7 +78,7 @@ class Uncertainty:
         curvature = near.quadratic.curvature
         leverage = leverages(inverse, near.sensed)
         effects = self._effects.update(inverse, near.sensed, leverage)
-        scores = score_covariance(curvature, near.sensed, leverage, effects)
+        scores = score_covariance(near.priors, near.sensed, leverage, effects)
         shared = shared_covariance(near.sensed, len(theta))
         without_motion, least_precision = curvature - precision, self._motion.least_precision
         moved = unseen_motion(self._motion.unseen, without_motion, least_precision)

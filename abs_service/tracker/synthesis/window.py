@@ -89,15 +89,19 @@ class Bordered:
 
     def begin(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
         """The image (height + 2, width + 2, channels) of a shape (height, width), its window filled with `border`."""
+        image = self.move(shape, window)
+        _fill(image, *limits(window, shape), self._border)
+        return image
+
+    def move(self, shape: tuple[int, ...], window: Window) -> NDArray[np.float32]:
+        """The same with anything in its window, for those who fill it."""
         height, width = shape
         if self._image.shape[:2] != (height + 2, width + 2):
             self._image = np.empty((height + 2, width + 2, len(self._border)), np.float32)
             self._image[:] = self._border
             self.window = WHOLE
-        new = limits(window, shape)
-        for left_over in _without(limits(self.window, shape), new):
+        for left_over in _without(limits(self.window, shape), limits(window, shape)):
             _fill(self._image, *left_over, self._beyond)
-        _fill(self._image, *new, self._border)
         self.window = window
         return self._image
 

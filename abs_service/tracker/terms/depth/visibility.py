@@ -144,9 +144,12 @@ def _holes(
         metres: width of a pixel on the object [m].
         empty: missing returns that show the background unless they are too deep inside the expected outline.
     """
+    inside = missing & expected
+    if not inside.any():
+        return inside, empty & ~inside
     with np.errstate(over="ignore"):  # where the object fills the image, its outline is infinitely far away
         depth = _depth_inside(expected) * metres
-    hole = missing & (depth > np.where(empty, np.float32(DEEPEST_M), np.float32(RIM_M)))
+    hole = inside & (depth > np.where(empty, np.float32(DEEPEST_M), np.float32(RIM_M)))
     if hole.any():
         hole |= missing & ~empty & (_depth_inside(~hole) * metres < 2 * RIM_M)
     return hole, empty & ~hole

@@ -77,7 +77,7 @@ class ChannelTerm:
         values, constant = np.ascontiguousarray(image.values[window]), LOG_SQRT_2PI + self._bounds.inlier
         fill(values, image.channels, self._noise.deviation(values), constant, *corner(window), self._texels)
         self._image = self._synthesizer.image(self.sensor, self._texels)
-        texture = self._bordered.begin(self._image.shape[:2], window)
+        texture = self._bordered.move(self._image.shape[:2], window)
         copy(self._image, *limits(window, self._image.shape), texture)
         self._texture = texture.reshape(-1, 4)
         self._view.look(predicted)

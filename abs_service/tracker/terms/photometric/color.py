@@ -60,7 +60,7 @@ class ColorTerm:
             self._levels = np.zeros(image.rgb.shape, np.float32)
         self._levels[window] = image.rgb[window]
         self._image = self._synthesizer.image(self.sensor, self._levels)
-        texture = self._bordered.begin(self._image.shape[:2], window)
+        texture = self._bordered.move(self._image.shape[:2], window)
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)

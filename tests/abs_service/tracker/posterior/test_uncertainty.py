@@ -66,7 +66,9 @@ def test_least_squares_corrects_the_projection_of_the_meshs_own_errors_and_leave
 def sandwich(inverse: np.ndarray, residual: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Covariance of the solutions, of independent residuals."""
     curvature, sensed = np.asarray(np.linalg.inv(inverse), np.float64), [[Linearization(residual, rows)]]
-    return inverse @ score_covariance(curvature, sensed, leverages(inverse, sensed), np.ones(1)) @ inverse
+    return (
+        inverse @ score_covariance(curvature - rows.T @ rows, sensed, leverages(inverse, sensed), np.ones(1)) @ inverse
+    )
 
 
 @given(SEEDS)
