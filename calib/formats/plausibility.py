@@ -1,4 +1,4 @@
-"""What no camera of a rig is likely to be: signs of another unit, image size or kind of lens than the file was read in."""
+"""Implausible cameras: signs of a unit, an image size or a kind of lens that was misread."""
 
 from collections.abc import Mapping
 from itertools import combinations
@@ -26,8 +26,8 @@ def doubts(cameras: Mapping[str, Camera]) -> tuple[str, ...]:
         if not np.all((fields > least) & (fields < most)):
             angles = " × ".join(f"{np.rad2deg(field):.3g}°" for field in fields)
             found.append(
-                f"{name}: its field of view is {angles}. Are fx = {one.fx:g} and fy = {one.fy:g} in pixels of images of "
-                f"{one.width} × {one.height}?"
+                f"{name}: its field of view is {angles}. Are fx = {one.fx:g} and fy = {one.fy:g} in pixels of images "
+                f"of {one.width} × {one.height}?"
             )
         if not (0 <= one.cx <= one.width and 0 <= one.cy <= one.height):
             found.append(

@@ -18,8 +18,8 @@ the report says.
 
 Writes OUT.toml (tables [sensors.NAME.noise] and, if a target tells how often returns are missing,
 [sensors.NAME.no_return], to copy into the rig file), OUT.npz (maps of pixels, if they are worth
-it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, which OUT.toml says, 2
-bad: only the report is written.
+it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good; 1 doubtful, which
+OUT.toml says, too; 2 bad, and only the report is written.
 """
 
 import argparse

@@ -14,7 +14,7 @@ from pathlib import Path
 from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file, target_file
 from abs_service.calibration.files.rig_file import SensorCalibration
-from abs_service.calibration.shots import corner_extraction
+from abs_service.calibration.shots import corner_extraction, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
@@ -98,7 +98,7 @@ def material(arguments: argparse.Namespace) -> Material:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
-        seen = BoardObservations()
+        seen, shot = BoardObservations(), None
         for shot in shots:
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
@@ -107,7 +107,12 @@ def material(arguments: argparse.Namespace) -> Material:
             say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
             if is_live and live.views(seen) >= arguments.shots:
                 break
-    coverage.check(view for view in seen.corners)
+    if shot is not None and not seen.corners:
+        raise SolveOptionError(unseen.reason(target, seen, shot))
+    try:
+        coverage.check(view for view in seen.corners)
+    except coverage.TooFewViewsError as error:
+        raise SolveOptionError(f"{error}. {unseen.STILLS}" if unseen.mostly_moved(seen) else str(error)) from error
     return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
 
 
