@@ -1,5 +1,6 @@
 """Images that no calibration can come from are counted and named, with what is wrong in them."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from tests.abs_service.calibration.simulated import scene
 
 @pytest.fixture
 def said(capsys, tmp_path: Path) -> Callable[..., str]:
-    """Runs `calibrate intrinsics` with a board, which has to fail before anything is written; gives what it said."""
+    """Runs `calibrate intrinsics` with a board, which has to write no calibration; gives what it said."""
 
     def said(board: Chessboard, *options: str) -> str:
         target_file.write(board, tmp_path / "board.toml")
@@ -40,6 +41,9 @@ def test_images_without_a_board_are_counted_by_what_is_wrong(said, tmp_path: Pat
         cv2.imwrite(str(tmp_path / f"c_{number}.png"), np.full((120, 160), 255 if number > 3 else 90, np.uint8))
     error = said(Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.png")
     assert "no board of 9 × 6 inner corners in any of 6 images: nothing found in 4, saturated in 2" in error
+    report = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "bad"
+    assert report["verdicts"][0]["text"] in error.replace("\n", ".\n")
 
 
 def test_stills_with_the_times_of_a_film_are_recognised(said, tmp_path: Path) -> None:
