@@ -47,7 +47,10 @@ class Steps:
         """Steps [m] at distances [m], in their shape."""
         x = np.asarray(x, np.float64)
         law = np.maximum(self.digit, self.growth * np.square(x))
-        return np.maximum(law, np.interp(x, *zip(*self.observed))) if self.observed else law
+        if not self.observed:
+            return law
+        distances, steps = np.array(self.observed).T
+        return np.maximum(law, np.interp(x, distances, steps))
 
 
 def recognize(lengths: NDArray[np.floating], digit: float) -> Steps:

@@ -1,6 +1,7 @@
 """Reading of one image file, which has to be whole."""
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ from drivers.image_folder.listing import ImageFolderError
 _ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
 
 
-def read(path: Path) -> NDArray[np.generic]:
+def read(path: Path) -> NDArray[Any]:
     """The pixels as the file has them, (height, width) or (height, width, channels) in OpenCV's order, not turned.
 
     Raises:

@@ -44,7 +44,7 @@ class UnusableImagesError(ValueError):
 
 @contextmanager
 def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
-    """Reports what the images do not allow on the page beside the calibration, which is not written; the error goes on."""
+    """Reports what the images do not allow; the calibration is not written, and the error goes on."""
     try:
         yield
     except Exception as error:

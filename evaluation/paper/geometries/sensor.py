@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from calib.noise import gaussian_polynomial, per_pixel, tof_amplitude
+from calib.noise.base import pixels_where
 from calib.noise.fit.samples import Samples, from_images
 from calib.noise.fit.shrinkage import Repeats
 from calib.noise.per_pixel import PerPixel
@@ -89,6 +90,6 @@ def _static(sensor: TimeOfFlight, wall: Wall, frames: int, generator: np.random.
     variance = np.nanmean((distance[:, some] - mean) ** 2, axis=0)
     return Evidence(
         samples=from_images(distance[:FEW], view.distance, amplitude[:FEW]).returns(with_amplitude=True),
-        means=Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], *np.nonzero(some)),
+        means=Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], *pixels_where(some)),
         repeats=Repeats(times[some].astype(float), variance),
     )

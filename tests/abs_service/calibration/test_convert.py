@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -136,7 +137,7 @@ def test_published_calibrations_are_read(convert, data_set: Callable[[str], Path
     assert found["left_intrinsics"].camera.lens.coefficients[4] == pytest.approx(0.23839153080878486, rel=1e-14)
 
 
-def stored(path: Path, **values: object) -> Path:
+def stored(path: Path, **values: Any) -> Path:
     """A file of OpenCV."""
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for key, value in values.items():

@@ -50,7 +50,7 @@ def test_stills_with_the_times_of_a_film_are_recognised(said, tmp_path: Path) ->
     board = scene("chessboard", "sensors=color", "rate=2", "seed=5", "color=320x240", "hold=0.1")
     for k in range(6):
         (frame,) = board.simulation.frames(4 * k)
-        cv2.imwrite(str(tmp_path / f"color_{k}.png"), frame.data[..., ::-1])
+        cv2.imwrite(str(tmp_path / f"color_{k}.png"), np.ascontiguousarray(frame.data[..., ::-1], np.uint8))
     camera = board.simulation.heads["color"].camera
     keys = f"width = 320\nheight = 240\nfx = {camera.fx}\nfy = {camera.fy}\ncx = {camera.cx}\ncy = {camera.cy}\n"
     (tmp_path / "camera.toml").write_text(f"[depth]\n{keys}[color]\n{keys}")
@@ -64,9 +64,8 @@ def test_stills_with_the_times_of_a_film_are_recognised(said, tmp_path: Path) ->
 
 @pytest.mark.parametrize("suffix", ["png", "jpg"])
 def test_a_truncated_image_is_named(said, tmp_path: Path, suffix: str) -> None:
-    for number in range(2):
-        file = tmp_path / f"c_{number}.{suffix}"
-        cv2.imwrite(str(file), np.random.default_rng(0).integers(0, 255, (120, 160), np.uint8))
+    file = tmp_path / f"c_1.{suffix}"
+    cv2.imwrite(str(file), np.random.default_rng(0).integers(0, 255, (120, 160), np.uint8))
     file.write_bytes(file.read_bytes()[:-2000])
     assert f"c_1.{suffix}: the image is truncated" in said(
         Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.{suffix}"
