@@ -112,9 +112,7 @@ def calibrate(
     everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
     own_degree = int(_by_sequence(statics) and distances[1] > _SEVERAL * distances[0])
-    # Without a target, what a pixel shows of its own is what it looks at.
-    no_target = references[0].kind is Kind.MEAN
-    maps = [] if no_target else of_places(law.candidate, statics[0].mean.shape, own_degree)
+    maps = of_places(law.candidate, statics[0].mean.shape, own_degree) if references[0].kind.has_target else []
     again, *places = _tried([law.candidate, *maps], evidence, alike, say)
     chosen = choose([again, *places])
     say(f"fitting {chosen.candidate.name} to everything")
@@ -219,7 +217,6 @@ def _tried(
 
 
 def _steps(statics: Sequence[Static]) -> Steps:
-    """Quantisation over all sequences."""
     growth = [static.steps.growth for static in statics if static.steps.growth > 0]
     most = len(growth) > len(statics) / 2
     return Steps(max(static.steps.digit for static in statics), float(np.median(growth)) if most else 0.0)
