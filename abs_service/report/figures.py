@@ -29,9 +29,7 @@ def coverage_map(
         cells: parts of the image across and down.
     """
     edges = np.linspace(-0.5, width - 0.5, cells[0] + 1), np.linspace(-0.5, height - 0.5, cells[1] + 1)
-    counts = np.zeros(cells)
-    for pixels in views:
-        counts += np.histogram2d(pixels[:, 0], pixels[:, 1], bins=edges)[0] > 0
+    counts = coverage_counts(views, width, height, cells)
     figure = plots.figure(7.5, 6.1 * height / width + 0.6)
     axes = figure.add_subplot()
     shown = axes.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="YlGn", vmin=0)
@@ -41,6 +39,17 @@ def coverage_map(
     figure.colorbar(shown, ax=axes, label="views (grey: none)")
     _as_image(axes, width, height)
     return figure
+
+
+def coverage_counts(
+    views: Sequence[NDArray[np.floating]], width: int, height: int, cells: tuple[int, int] = (8, 6)
+) -> NDArray[np.int64]:
+    """Number of views with corners in each cell (across, down) of an image; arguments as of `coverage_map`."""
+    edges = np.linspace(-0.5, width - 0.5, cells[0] + 1), np.linspace(-0.5, height - 0.5, cells[1] + 1)
+    counts = np.zeros(cells, np.int64)
+    for pixels in views:
+        counts += np.histogram2d(pixels[:, 0], pixels[:, 1], bins=edges)[0] > 0
+    return counts
 
 
 def residual_field(pixels: NDArray[np.floating], residuals: NDArray[np.floating], width: int, height: int) -> "Figure":

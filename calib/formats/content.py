@@ -13,6 +13,9 @@ from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens, LensError, LensModel
 from calib.pose import Pose
 
+#: Displacement of the edge of an image by a skew that is rounding [px].
+NO_SKEW_PX = 0.01
+
 
 class FormatError(ValueError):
     """Invalid text, or a camera that a format cannot express."""
@@ -25,12 +28,12 @@ class Hints:
     Attributes:
         name: of the camera, for a format without names.
         size: width and height [px], for a format without image sizes; None if unknown.
-        unit: length of the unit of translations [m], for a format without fixed units.
+        lens: "brown-conrady" or "fisheye", for a format that leaves it open; "" if unknown.
     """
 
     name: str = "camera"
     size: tuple[int, int] | None = None
-    unit: float = 1.0
+    lens: str = ""
 
 
 @dataclass(frozen=True)
@@ -107,6 +110,24 @@ def camera(size: Sequence[Any], matrix: Sequence[Any], lens: LensModel, T_rs: Po
         return Camera(width, height, fx, fy, cx, cy, lens, pose.identity() if T_rs is None else T_rs)
     except (TypeError, ValueError, OverflowError) as error:
         raise FormatError(f"no camera: {error}") from error
+
+
+def focal(matrix: ArrayLike) -> tuple[float, float, float, float]:
+    """fx, fy, cx, cy of a camera matrix (3, 3).
+
+    Raises:
+        FormatError: it is none, or has a skew that moves pixels, which our cameras have not.
+    """
+    given = np.asarray(matrix, np.float64)
+    if given.shape != (3, 3) or not np.allclose(given[[1, 2, 2, 2], [0, 0, 1, 2]], (0, 0, 0, 1)):
+        raise FormatError(f"a camera matrix is [[fx, skew, cx], [0, fy, cy], [0, 0, 1]], not {given.tolist()}")
+    (fx, skew, cx), (_, fy, cy), _ = given.tolist()
+    if abs(skew * cy) > NO_SKEW_PX * abs(fy):
+        raise FormatError(
+            f"a skew of {skew:g} moves the top of the image by {abs(skew * cy / fy):.2g} px; our cameras have none. "
+            "Calibrate without it"
+        )
+    return fx, fy, cx, cy
 
 
 def only(cameras: Mapping[str, Camera], what: str) -> tuple[str, Camera]:

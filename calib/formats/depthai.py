@@ -11,7 +11,18 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, fisheye, relative, rigid
+from calib.formats.content import (
+    Content,
+    FormatError,
+    Hints,
+    Written,
+    brown_conrady,
+    camera,
+    fisheye,
+    focal,
+    relative,
+    rigid,
+)
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import LensModel
 from calib.pose import Pose
@@ -40,9 +51,9 @@ def read(text: str, hints: Hints) -> Content:
         for socket, table in sorted(tables.items()):
             root, T_rs = _to_root(socket, links)
             roots.add(root)
-            (fx, _, cx), (_, fy, cy), _ = table["intrinsicMatrix"]
+            matrix = focal(np.array(table["intrinsicMatrix"], float).reshape(3, 3))
             lens = _lens(int(table.get("cameraType", _PERSPECTIVE)), table["distortionCoeff"])
-            cameras[_name(socket)] = camera((table["width"], table["height"]), (fx, fy, cx, cy), lens, T_rs)
+            cameras[_name(socket)] = camera((table["width"], table["height"]), matrix, lens, T_rs)
     except KeyError as error:
         raise FormatError(f"no calibration of DepthAI: {error} is missing") from None
     except FormatError:

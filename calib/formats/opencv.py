@@ -12,7 +12,18 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
-from calib.formats.content import Content, FormatError, Hints, Written, brown_conrady, camera, fisheye, rigid
+from calib.formats.content import (
+    Content,
+    FormatError,
+    Hints,
+    Written,
+    brown_conrady,
+    camera,
+    extra,
+    fisheye,
+    focal,
+    rigid,
+)
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import LensModel
 
@@ -20,9 +31,19 @@ _MATRICES = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "CameraMatrix", "
 _DISTORTIONS = (
     "distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "dist_coeffs", "dist", "D", "D1", "D2",
 )  # fmt: skip
+#: Kinds of lenses that four coefficients may be those of.
+FISHEYE, BROWN_CONRADY = "fisheye", "brown-conrady"
+FISHEYE_COEFFICIENTS = 4
+#: Names of a fisheye as `distortion_model`: ours, OpenCV's and those of ROS.
+FISHEYE_NAMES = (KannalaBrandt.name, "fisheye", "equidistant", "kannala_brandt", "kannala_brandt4")
+
 _SIZES = ("img_size", "image_size", "imageSize", "size")
 _WIDTHS = ("image_width", "image_Width", "width")
 _HEIGHTS = ("image_height", "image_Height", "height")
+_KNOWN = (
+    *_MATRICES, *_DISTORTIONS, *_SIZES, *_WIDTHS, *_HEIGHTS, "T_rs", "R", "T", "camera_name", "distortion_model",
+    "fisheye_model", "xi",
+)  # fmt: skip
 
 
 def read(text: str, hints: Hints) -> Content:
@@ -53,7 +74,8 @@ def read(text: str, hints: Hints) -> Content:
     }
     if not cameras:
         raise FormatError(f"no camera: none of the keys {', '.join(_MATRICES)}")
-    return Content(cameras)
+    lost = (part for key in cameras for part in extra(key, tables[key], _KNOWN))
+    return Content(cameras, tuple(lost))
 
 
 def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_YAML) -> Written:
@@ -106,18 +128,31 @@ def _camera(name: str, table: Mapping[str, Any], hints: Hints) -> Camera:
         if hints.size is None:
             raise FormatError(f"{name}: the size of the image is missing; give it as --size WIDTHxHEIGHT")
         size = list(hints.size)
-    matrix = np.array(_find(table, _MATRICES), float)
-    if matrix.shape != (3, 3):
-        raise FormatError(f"{name}: a camera matrix has 3 × 3 numbers")
     T_rs = rigid(table["T_rs"]) if table.get("T_rs") is not None else pose.identity()
-    return camera(size, matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist(), _lens(table), T_rs)
+    try:
+        return camera(size, focal(_find(table, _MATRICES)), _lens(table, hints), T_rs)
+    except FormatError as error:
+        raise FormatError(f"{name}: {error}") from None
 
 
-def _lens(table: Mapping[str, Any]) -> LensModel:
+def _lens(table: Mapping[str, Any], hints: Hints) -> LensModel:
     coefficients = _find(table, _DISTORTIONS)
-    numbers = np.zeros(0) if coefficients is None else np.asarray(coefficients, float)
-    is_fisheye = table.get("distortion_model") == KannalaBrandt.name or bool(table.get("fisheye_model"))
-    return fisheye(numbers) if is_fisheye else brown_conrady(numbers)
+    numbers = np.zeros(0) if coefficients is None else np.ravel(np.asarray(coefficients, float))
+    if np.any(table.get("xi")):
+        raise FormatError("xi: the omnidirectional model cannot be expressed by our lenses")
+    said = FISHEYE if _is_fisheye(table) else BROWN_CONRADY if table.get("distortion_model") else ""
+    if hints.lens and said and hints.lens != said:
+        raise FormatError(f"--lens {hints.lens}: the file says {said}")
+    if numbers.size == FISHEYE_COEFFICIENTS and np.any(numbers) and not (said or hints.lens):
+        raise FormatError(
+            f"four coefficients, {numbers.tolist()}, are k1 k2 p1 p2 or those of a fisheye: say which with --lens "
+            f"{BROWN_CONRADY} or --lens {FISHEYE}"
+        )
+    return fisheye(numbers) if FISHEYE in (said, hints.lens) else brown_conrady(numbers)
+
+
+def _is_fisheye(table: Mapping[str, Any]) -> bool:
+    return str(table.get("distortion_model")).lower() in FISHEYE_NAMES or bool(table.get("fisheye_model"))
 
 
 def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
@@ -127,13 +162,14 @@ def _stereo(root: Mapping[str, Any], hints: Hints) -> Content:
         for side, other in (("1", ("M2", "D2")), ("2", ("M1", "D1")))
     )
     cameras = {"left": _camera("left", _sided(left), hints), "right": _camera("right", _sided(right), hints)}
+    lost = extra("file", root, _KNOWN)
     if root.get("R") is None or root.get("T") is None:
-        return Content(cameras, ("nothing is said of where right is: R and T are missing",))
-    T_rl = rigid(np.hstack([np.array(root["R"], float), hints.unit * np.array(root["T"], float).reshape(3, 1)]))
+        return Content(cameras, (*lost, "nothing is said of where right is: R and T are missing"))
+    T_rl = rigid(np.hstack([np.array(root["R"], float), np.array(root["T"], float).reshape(3, 1)]))
     one = cameras["right"]
     matrix = (one.fx, one.fy, one.cx, one.cy)
     moved = camera((one.width, one.height), matrix, one.lens, pose.inverse(T_rl))
-    return Content(cameras | {"right": moved})
+    return Content(cameras | {"right": moved}, lost)
 
 
 def _sided(table: Mapping[str, Any]) -> dict[str, Any]:

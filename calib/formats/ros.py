@@ -16,6 +16,7 @@ from calib.formats.content import (
     camera,
     extra,
     fisheye,
+    focal,
     only,
     placed,
 )
@@ -39,9 +40,9 @@ def read(text: str, hints: Hints) -> Content:
     """
     try:
         info = yaml.safe_load(text)
-        matrix = _numbers(info["camera_matrix"], 9)
+        matrix = focal(_numbers(info["camera_matrix"], 9).reshape(3, 3))
         lens = _lens(info.get("distortion_model", "plumb_bob"), _numbers(info["distortion_coefficients"]))
-        one = camera((info["image_width"], info["image_height"]), matrix[[0, 4, 2, 5]], lens)
+        one = camera((info["image_width"], info["image_height"]), matrix, lens)
     except yaml.YAMLError as error:
         raise FormatError(f"not YAML: {error}") from error
     except KeyError as error:

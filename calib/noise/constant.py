@@ -51,7 +51,7 @@ def fit(samples: Samples) -> Constant:
     Raises:
         NoiseError: no sample has a distance.
     """
-    residual = fitting.subsampled(samples.returns(with_amplitude=False)).residual
-    one = np.ones((len(residual), 1))
-    law = fitting.maximize_likelihood(residual, fitting.Design(one, one))
-    return Constant(float(law.spread[0]), float(law.mean[0]))
+    samples = fitting.subsampled(samples.returns(with_amplitude=False))
+    one = np.ones((len(samples), 1))
+    law = fitting.maximize_likelihood(samples.residual, fitting.Design(one, one), least=samples.least_sigma)
+    return Constant(fitting.least_sigma(np.maximum(law.spread, samples.least_sigma)), float(law.mean[0]))

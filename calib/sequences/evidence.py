@@ -40,8 +40,8 @@ def gather(static: Static, reference: Reference, kept: slice = slice(None)) -> E
     samples = static.samples(reference.distance, kept)
     if not len(samples):
         raise NoiseError(f"{static.name}: no static pixel has a known distance")
-    limit = np.maximum(_CUT * np.sqrt(static.variance), static.steps.at(static.mean))
-    near = np.abs(samples.measured - static.mean[samples.pixels]) <= limit[samples.pixels]
+    limit = np.maximum(_CUT * np.sqrt(static.variance[samples.pixels]), samples.step)
+    near = np.abs(samples.measured - static.mean[samples.pixels]) <= limit
     return Evidence(samples, *_averaged(samples.take(near), static.mean.shape))
 
 
@@ -68,6 +68,6 @@ def _averaged(samples: Samples, shape: tuple[int, ...]) -> tuple[Samples, Repeat
     measured = mean(samples.measured)
     variance = mean(np.square(samples.measured - measured[place]))
     some = np.nonzero(n)[0]
-    true, amplitude = mean(samples.true), mean(samples.amplitude)
-    means = Samples(measured[some], true[some], amplitude[some], some // shape[1], some % shape[1])
+    true, amplitude, step = (mean(values) for values in (samples.true, samples.amplitude, samples.step))
+    means = Samples(measured[some], true[some], amplitude[some], some // shape[1], some % shape[1], step[some])
     return means, Repeats(n[some].astype(np.float64), variance[some])

@@ -28,6 +28,11 @@ class Kind(StrEnum):
         """True if the mean offset of all pixels is observable."""
         return self in (Kind.KNOWN, Kind.BOARD)
 
+    @property
+    def has_target(self) -> bool:
+        """True if a pixel's own error can be told from what the pixel looks at."""
+        return self is not Kind.MEAN
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reference:

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from calib.noise.base import DepthNoise, NoiseError
+from calib.noise.base import DepthNoise, NoiseError, Pixels
 from calib.noise.fit.quality import Quality, goodness_of_fit
 from calib.sequences.candidates import Candidate
 from calib.sequences.evidence import Evidence, thinned, together
@@ -76,6 +76,8 @@ def attempt(candidate: Candidate, parts: Sequence[Evidence], generator: np.rando
             for part in held_out:
                 qualities.append(goodness_of_fit(model, thinned(part.samples, ENOUGH, generator)))
                 scores.append(qualities[-1].log_likelihood)
+        if not np.isfinite(scores).all():
+            raise NoiseError("the likelihood of what was held out is not finite")
     except NoiseError as error:
         return Trial(candidate, (), _NO_QUALITY, str(error))
     values = [[getattr(one, field.name) for one in qualities] for field in fields(Quality)]
@@ -112,12 +114,25 @@ def extremes(model: DepthNoise, distances: tuple[float, float], amplitudes: tupl
     A model of a fixed image size is evaluated on a grid over the image.
     """
     x, a = np.meshgrid(np.geomspace(*distances, 25), np.linspace(*amplitudes, 25))
-    height, width = getattr(model, "shape", (1, 1))
-    grid = np.meshgrid(*(np.unique(np.linspace(0, n - 1, 8).astype(int)) for n in (height, width)))
+    grid = _grid(model)
     x, a = (np.repeat(part.ravel(), grid[0].size) for part in (x, a))
-    rows, columns = (np.tile(part.ravel(), 625) for part in grid)
+    rows, columns = (np.tile(part, 625) for part in grid)
     sigma, mu = model.deviation(x, a, (rows, columns)), model.mean(x, a, (rows, columns))
     return float(sigma.min()), float(sigma.max()), float(np.abs(mu).max())
+
+
+def typical_sigma(model: DepthNoise, distance: float, amplitude: float) -> float:
+    """Median σ of the pixels [m] at a distance [m] and an amplitude."""
+    pixels = _grid(model)
+    x, a = (np.full(pixels[0].size, value) for value in (distance, amplitude))
+    return float(np.median(model.deviation(x, a, pixels)))
+
+
+def _grid(model: DepthNoise) -> Pixels:
+    """Rows and columns of 64 pixels all over the image, or one if all are alike."""
+    height, width = getattr(model, "shape", (1, 1))
+    rows, columns = np.meshgrid(*(np.unique(np.linspace(0, n - 1, 8).astype(int)) for n in (height, width)))
+    return rows.ravel(), columns.ravel()
 
 
 def _folds(parts: Sequence[Evidence]) -> Iterator[tuple[list[Evidence], list[Evidence]]]:

@@ -53,7 +53,7 @@ class Static:
 
     def samples(self, reference: NDArray[np.floating], kept: slice = slice(None)) -> Samples:
         """Measurements of some kept frames, with true distances (height, width) [m]; NaN where unknown."""
-        samples = from_images(self.distance[kept], reference, self.amplitude[kept])
+        samples = from_images(self.distance[kept], reference, self.amplitude[kept], self.steps.at(self.mean))
         return samples.take(np.isfinite(samples.measured) & np.isfinite(samples.true))
 
 

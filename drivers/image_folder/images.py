@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.image_folder import image_file
 from drivers.image_folder.listing import ImageFile, ImageFolderError
 
 
@@ -145,9 +145,7 @@ class ImageFolder:
 
 
 def _read(path: Path, camera: Camera) -> NDArray[np.generic]:
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise ImageFolderError(f"{path}: cannot be read as an image")
+    image = image_file.read(path)
     height, width = image.shape[:2]
     if (width, height) != (camera.width, camera.height):
         expected = f"{camera.width} × {camera.height}"

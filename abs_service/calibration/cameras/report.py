@@ -10,7 +10,6 @@ from abs_service.report import figures
 from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
 from abs_service.report.provenance import Provenance
 from calib.solve.solution import Solution, ViewFit
-from calib.solve.validation.support import coverage
 from calib.solve.validation.verdict import Assessment
 
 
@@ -121,10 +120,19 @@ def _sensor(name: str, solution: Solution, found: Assessment) -> Section:
         if each.name.startswith(f"{name}.")
     )
     columns = (Column("parameter"), Column("value", "px, rad, m, s", ".7g"), Column("deviation", "", ".2g"))
-    share = coverage(solution, name)
-    text = f"Boards were seen in {share:.0%} of the image. The file keeps what was not free as it was."
+    text = f"{_covered(name, solution)}The file keeps what was not free as it was."
     blocks: list[str | Table | Picture] = [text, Table(f"Estimated parameters of {name}", columns, rows)]
     return Section(name, (*blocks, *_pictures(name, solution, found)))
+
+
+def _covered(name: str, solution: Solution) -> str:
+    """Share of the cells of the coverage map in which there are corners; "" for a sensor without any."""
+    camera = solution.cameras[name]
+    pixels = [view.pixels for view in solution.views if (view.sensor, view.of) == (name, "corners")]
+    if not pixels:
+        return ""
+    counts = figures.coverage_counts(pixels, camera.width, camera.height)
+    return f"Corners were seen in {np.count_nonzero(counts)} of {counts.size} parts of the image, see its map. "
 
 
 def _pictures(name: str, solution: Solution, found: Assessment) -> Iterator[Picture]:

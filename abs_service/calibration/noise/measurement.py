@@ -112,7 +112,7 @@ def calibrate(
     everything = lean(together(evidence), generator, THOROUGH)
     distances = domain(everything.samples.true)
     own_degree = int(_by_sequence(statics) and distances[1] > _SEVERAL * distances[0])
-    maps = of_places(law.candidate, statics[0].mean.shape, own_degree)
+    maps = of_places(law.candidate, statics[0].mean.shape, own_degree) if references[0].kind.has_target else []
     again, *places = _tried([law.candidate, *maps], evidence, alike, say)
     chosen = choose([again, *places])
     say(f"fitting {chosen.candidate.name} to everything")

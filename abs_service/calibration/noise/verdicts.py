@@ -8,7 +8,7 @@ from abs_service.calibration.noise.measurement import NoiseCalibration
 from abs_service.report.content import Level, Verdict
 from calib.sequences.candidates import Level as Places
 from calib.sequences.reference import Kind
-from calib.sequences.selection import NOTHING, Trial, extremes
+from calib.sequences.selection import NOTHING, Trial, extremes, typical_sigma
 
 #: Tolerances of coverage and variance of held-out residuals about 68.3 %, 95 % and 1.
 _COVERAGE, _VARIANCE = 0.03, (0.8, 1.25)
@@ -25,16 +25,20 @@ _WELL_KNOWN = 2e-3
 #: Factor by which the domain is extended to check extrapolation.
 _OUTSIDE = 10.0
 
+#: Largest ratio, either way, of the model's σ to what was measured.
+_MISS = 2.0
+
 
 def verdicts(found: NoiseCalibration) -> tuple[Verdict, ...]:
     """All verdicts, the most important first."""
     return (
         _use(found),
         _agreement(found),
+        *_measured(found),
         *_boards(found),
         *_undetermined(found),
         *_missing(found),
-        _places(found),
+        *_places(found),
         _outside(found),
         *_steps(found),
         *_motion(found),
@@ -46,6 +50,10 @@ def _use(found: NoiseCalibration) -> Verdict:
     amplitudes = f" and amplitudes {found.amplitudes[0]:.0f} to {found.amplitudes[1]:.0f}"
     domain = f"{near:.2f} to {far:.2f} m" + (amplitudes if math.isfinite(found.amplitudes[0]) else "")
     low, high, _ = extremes(found.model, found.distances, _amplitudes(found))
+    if not 0 < low <= high < math.inf:  # NaN fails, too
+        return Verdict(
+            Level.BAD, f"{found.chosen.candidate.name} gives no σ at some of {domain}: {low:g} to {high:g} m."
+        )
     return Verdict(
         Level.GOOD,
         f"Use {found.chosen.candidate.name}: σ is {low * 1e3:.2g} to {high * 1e3:.2g} mm for {domain}. "
@@ -62,9 +70,24 @@ def _agreement(found: NoiseCalibration) -> Verdict:
     near = abs(quality.within_one - 0.683) < _COVERAGE and abs(quality.within_95 - 0.95) < _COVERAGE
     if near and _VARIANCE[0] < quality.variance < _VARIANCE[1]:
         return Verdict(Level.GOOD, text)
+    if not all(map(math.isfinite, (quality.within_one, quality.within_95, quality.variance))):
+        return Verdict(Level.BAD, f"What was held out does not tell whether the model is right: {text}")
     return Verdict(
         Level.DOUBTFUL, text, "Measure at more distances and on more materials, and check that targets are flat."
     )
+
+
+def _measured(found: NoiseCalibration) -> list[Verdict]:
+    """Comparison of σ with the scatter of every sequence or range of distances, the dots of the report's plot."""
+    said = []
+    for name, row in found.rows:
+        sigma = typical_sigma(found.model, row.distance, row.amplitude)
+        scatter = float(np.hypot(row.temporal, np.nan_to_num(row.fixed)))
+        measured = max(scatter, row.step / math.sqrt(12))
+        if not measured / _MISS < sigma < measured * _MISS:
+            text = f"σ is {sigma * 1e3:.2g} mm at {row.distance:.2f} m, where {measured * 1e3:.2g} mm were measured."
+            said.append(Verdict(Level.BAD, text, "Do not use the model there: look at its plot.", name))
+    return said
 
 
 def _boards(found: NoiseCalibration) -> list[Verdict]:
@@ -142,15 +165,17 @@ def _missing(found: NoiseCalibration) -> list[Verdict]:
     return [Verdict(Level.GOOD, text)]
 
 
-def _places(found: NoiseCalibration) -> Verdict:
-    """Gain of maps of regions and pixels."""
+def _places(found: NoiseCalibration) -> list[Verdict]:
+    """Gain of maps of regions and pixels, which need a target."""
     parts = []
     for trial in found.trials:
         if trial.candidate.level is Places.IMAGE or not trial.scores:
             continue
         name = f"maps of {trial.candidate.level}s"
         parts.append(f"{name} {_gain(found.law, trial)}")
-    return Verdict(Level.GOOD, f"Beside one law for the whole image, {' and '.join(parts)}.") if parts else _none()
+    if found.kind is Kind.MEAN:
+        return []
+    return [Verdict(Level.GOOD, f"Beside one law for the whole image, {' and '.join(parts)}.") if parts else _none()]
 
 
 def _gain(law: Trial, trial: Trial) -> str:
@@ -192,8 +217,8 @@ def _steps(found: NoiseCalibration) -> list[Verdict]:
             " σ contains their share, step²/12."
         )
         return [Verdict(Level.GOOD, text)]
-    text = f"Distances come in steps of {found.steps.digit * 1e3:.2g} mm; σ contains their share."
-    return [Verdict(Level.GOOD, text)] if found.steps.digit > 0 else []
+    text = f"Distances come in steps of {step * 1e3:.2g} mm at {far:.2f} m; σ contains their share."
+    return [Verdict(Level.GOOD, text)] if step > 0 else []
 
 
 def _motion(found: NoiseCalibration) -> list[Verdict]:

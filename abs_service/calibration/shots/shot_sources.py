@@ -4,12 +4,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
-
 from abs_service.calibration.shots.shots import USED, Assembler, SensorShot, Shot, ShotsError, thinned
 from abs_service.pairing.synchroniser import Synchroniser
 from calib.camera import Camera
 from drivers.contract.frame import Frame, FrameSet
+from drivers.image_folder import image_file
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_number
 from drivers.replay.recording import Recording
 
@@ -92,8 +91,8 @@ class FolderShots:
 
 
 def _look(file: ImageFile) -> SensorShot:
-    # Without EXIF rotation: the image is used as the sensor delivered it.
-    image = cv2.imread(str(file.path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise ShotsError(f"{file.path}: this is no image that can be read")
+    try:
+        image = image_file.read(file.path)
+    except ImageFolderError as error:
+        raise ShotsError(str(error)) from error
     return SensorShot(file.t_ns, image, image)

@@ -8,7 +8,9 @@
 
 Formats: toml (our calibration and rig files), kalibr (camchain), ros (CameraInfo), opencv (FileStorage as YAML, XML or
 JSON), depthai (JSON), mrcal (.cameramodel), and to write only urdf and tf. What a format has no place for is said on
-standard error and, with --json, under "lost". A lens that a format cannot express is refused.
+standard error and, with --json, under "lost". What would be wrong is refused, and nothing written (exit code 2): a lens
+that a format cannot express, a skew, four coefficients of OpenCV that may be those of two lenses (--lens), cameras more
+than 5 m apart (--unit), and fields of view and principal points that no camera has.
 """
 
 import argparse
@@ -16,8 +18,10 @@ import json
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from abs_service.bus import keys
 from abs_service.calibration.files import exchange, rig_file
@@ -26,8 +30,12 @@ from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
+from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized
+
+#: Metres per unit, as values of `--unit`.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
 
 class ConvertError(Exception):
@@ -42,6 +50,7 @@ class Options:
         source, target: formats; None to detect them from the files.
         sensors: sensors to write, by their new names; all if empty.
         names: new names by old ones.
+        unit: of translations; None if it is the format's.
         hints: values that the input omits; `hints.size` is also the size to convert cameras to.
     """
 
@@ -49,6 +58,7 @@ class Options:
     target: str | None
     sensors: tuple[str, ...]
     names: Mapping[str, str]
+    unit: str | None
     hints: Hints
 
 
@@ -62,8 +72,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rename", metavar="OLD=NEW", action="append", default=[], help="call it so; repeatable")
     parser.add_argument("--size", metavar="WxH", help="size of the images, if IN does not say it or they have another")
     parser.add_argument(
-        "--unit-m", metavar="M", type=float, default=1.0, help="unit of T in OpenCV's files (default: 1)"
+        "--unit", choices=list(UNITS), help="unit of translations, if IN does not have it (default: its format's, or m)"
     )
+    parser.add_argument("--lens", choices=[opencv.BROWN_CONRADY, opencv.FISHEYE], help="kind, if IN leaves it open")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
@@ -72,8 +83,10 @@ def run(arguments: argparse.Namespace) -> int:
     out = arguments.out
     if out.exists():
         raise ConvertError(f"{out}: exists already; choose another name or remove it")
-    hints = Hints(size=_size(arguments.size), unit=arguments.unit_m)
-    options = Options(arguments.source, arguments.target, tuple(arguments.sensor), _names(arguments.rename), hints)
+    hints = Hints(size=_size(arguments.size), lens=arguments.lens or "")
+    options = Options(
+        arguments.source, arguments.target, tuple(arguments.sensor), _names(arguments.rename), arguments.unit, hints
+    )
     read = [_read(path, options) for path in arguments.inputs]
     content = _chosen(read, options)
     target = options.target or exchange.of_name(out)
@@ -84,6 +97,8 @@ def run(arguments: argparse.Namespace) -> int:
     for one in lost:
         print(f"abs-service: lost: {one}", file=sys.stderr)
     print(f"wrote {out}: {', '.join(content.cameras)}")
+    for pair, (length, angle) in plausibility.baselines(content.cameras).items():
+        print(f"  {pair}: {length * 1e3:.1f} mm apart, turned by {np.rad2deg(angle):.2f}°")
     return Exit.OK
 
 
@@ -95,11 +110,34 @@ def _read(path: Path, options: Options) -> Content:
     except UnicodeDecodeError as error:
         raise ConvertError(f"{path}: all formats are UTF-8 text, byte {error.start} is not") from error
     name = options.source or exchange.of_content(path, text)
+    if options.hints.lens and name != "opencv":
+        raise ConvertError(f"--lens {options.hints.lens}: {path} says itself which lens it has")
     if name == exchange.OWN:
         return _own(path)
     stem = re.sub(r"[^A-Za-z0-9_-]+", "_", path.stem).strip("_-") or "camera"
-    hints = Hints(stem, options.hints.size, options.hints.unit)
-    return exchange.read(path, text, name, hints)
+    content = exchange.read(path, text, name, replace(options.hints, name=stem))
+    scaled = {key: _scaled(one, UNITS[options.unit or "m"]) for key, one in content.cameras.items()}
+    _check(path, scaled, options.unit)
+    return replace(content, cameras=scaled)
+
+
+def _scaled(one: Camera, unit: float) -> Camera:
+    """Camera whose translation was in another unit [m]."""
+    T_rs = one.T_rs.copy()
+    T_rs[:3, 3] *= unit
+    return replace(one, T_rs=T_rs)
+
+
+def _check(path: Path, cameras: Mapping[str, Camera], unit: str | None) -> None:
+    """Refuses what no camera of a rig is, unless the unit was given."""
+    for doubt in plausibility.doubts(cameras):
+        raise ConvertError(f"{path}: {doubt}")
+    for pair, (length, _) in plausibility.baselines(cameras).items():
+        if length > plausibility.LARGEST_BASELINE_M and unit is None:
+            raise ConvertError(
+                f"{path}: {pair} are {length:.4g} m apart, if lengths are in metres; say what they are in with --unit, "
+                f"one of {', '.join(UNITS)}"
+            )
 
 
 def _own(path: Path) -> Content:
@@ -160,7 +198,7 @@ def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: arg
 def _command_line(arguments: argparse.Namespace) -> list[str]:
     """Command line without options that do not affect the result."""
     options = [("--from", arguments.source), ("--size", arguments.size)]
-    options += [("--unit-m", str(arguments.unit_m))] if arguments.unit_m != 1 else []
+    options += [("--unit", arguments.unit), ("--lens", arguments.lens)]
     options += [("--sensor", name) for name in arguments.sensor] + [("--rename", pair) for pair in arguments.rename]
     given = [word for option, value in options if value is not None for word in (option, value)]
     return ["calibrate", "convert", *map(str, arguments.inputs), str(arguments.out), *given]

@@ -28,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Solves, and reports also what cannot be solved."""
+    with solving.reported("Intrinsics", arguments):
+        return _solve(arguments)
+
+
+def _solve(arguments: argparse.Namespace) -> int:
     """Solves one camera."""
     found = solving.material(arguments)
     name = _sensor(arguments.sensor, found)

@@ -18,7 +18,8 @@ the report says.
 
 Writes OUT.toml (tables [sensors.NAME.noise] and, if a target tells how often returns are missing,
 [sensors.NAME.no_return], to copy into the rig file), OUT.npz (maps of pixels, if they are worth
-it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good, 1 doubtful, 2 bad.
+it), OUT.html and OUT.json (the report). The exit code is that of the verdict: 0 good; 1 doubtful, which
+OUT.toml says, too; 2 bad, and only the report is written.
 """
 
 import argparse
@@ -41,7 +42,7 @@ from abs_service.commands.calibrate import calibrations
 from abs_service.commands.images import camera_file
 from abs_service.config import plugins
 from abs_service.report import page, provenance
-from abs_service.report.content import Report, to_json
+from abs_service.report.content import Level, Report, to_json
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
@@ -105,7 +106,8 @@ def run(arguments: argparse.Namespace) -> int:
         made = report.report(
             sensor, found, tuple(c for one, _ in group for c in sigma_consistency.of_sequence(one)), trace
         )
-        written = [*_write_model(found, sensor, out), *page.write(made, out)]
+        model = [] if made.level is Level.BAD else _write_model(found, sensor, out, made.level)
+        written = [*model, *page.write(made, out)]
         _say(made, setting if len(groups) > 1 else "", written, arguments.json)
         worst = max(worst, int(made.level))
     return worst
@@ -175,9 +177,10 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
     return region
 
 
-def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path) -> list[Path]:
-    """Writes the table for the rig file, and its maps."""
+def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path, level: Level) -> list[Path]:
+    """Writes the table for the rig file, which says what it is worth, and its maps."""
     toml, written, model = out.with_suffix(".toml"), [], found.model
+    comment = f"written by abs-service calibrate noise; {level}: see {out.with_suffix('.html').name}"
     try:
         if isinstance(model, PerPixel):
             maps = out.with_suffix(".npz")
@@ -186,7 +189,7 @@ def _write_model(found: measurement.NoiseCalibration, sensor: str, out: Path) ->
             table = {"type": "per_pixel", "file": maps.name, "law": plugins.table(model.law)}
         else:
             table = plugins.table(model)
-        text = toml_text.table(("sensors", sensor, "noise"), table, "written by abs-service calibrate noise")
+        text = toml_text.table(("sensors", sensor, "noise"), table, comment)
         if found.missing.targets:
             text += "\n" + toml_text.table(("sensors", sensor, "no_return"), plugins.plain(found.missing.law))
         toml.write_text(text, encoding="utf-8")

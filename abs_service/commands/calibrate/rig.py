@@ -41,6 +41,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Solves, and reports also what cannot be solved."""
+    with solving.reported("Calibration of a rig", arguments):
+        return _solve(arguments)
+
+
+def _solve(arguments: argparse.Namespace) -> int:
     """Solves the rig."""
     found = solving.material(arguments)
     there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]

@@ -6,24 +6,26 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import report
 from abs_service.calibration.files import rig_file, target_file
 from abs_service.calibration.files.rig_file import SensorCalibration
-from abs_service.calibration.shots import corner_extraction
+from abs_service.calibration.shots import corner_extraction, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate import calibrations, live
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
+from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
 from calib.board import coverage
 from calib.camera import Camera
+from calib.formats.plausibility import baselines
 from calib.solve.bundle.lens_parameters import KINDS, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
@@ -34,6 +36,24 @@ from drivers.replay.recording import Recording
 
 class SolveOptionError(ValueError):
     """Options that do not fit the images."""
+
+
+class UnusableImagesError(ValueError):
+    """Images that no calibration can come from."""
+
+
+@contextmanager
+def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
+    """Reports what the images do not allow; the calibration is not written, and the error goes on."""
+    try:
+        yield
+    except Exception as error:
+        if isinstance(error, UnusableImagesError) or type(error).__module__.startswith("calib."):
+            data = [path for path in (arguments.source, arguments.target) if path is not None and path.exists()]
+            origin = provenance.trace(sys.argv[1:], data)
+            made = Report(title, origin, (Verdict(Level.BAD, f"{error}."),), ())
+            say(f"wrote {', '.join(map(str, page.write(made, arguments.out)))}")
+        raise
 
 
 @dataclass(frozen=True)
@@ -85,8 +105,9 @@ def material(arguments: argparse.Namespace) -> Material:
 
     Raises:
         SolveOptionError: incompatible options.
+        UnusableImagesError: no board, or too few views; the message says why.
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
-        TooFewViewsError, ViewsAlikeError: insufficient views.
+        ViewsAlikeError, MirroredSensorError: the views do not allow a calibration.
     """
     if arguments.out.exists():
         raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
@@ -98,7 +119,7 @@ def material(arguments: argparse.Namespace) -> Material:
         shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
-        seen = BoardObservations()
+        seen, shot = BoardObservations(), None
         for shot in shots:
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
@@ -107,7 +128,12 @@ def material(arguments: argparse.Namespace) -> Material:
             say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
             if is_live and live.views(seen) >= arguments.shots:
                 break
-    coverage.check(view for view in seen.corners)
+    if shot is not None and not seen.corners:
+        raise UnusableImagesError(unseen.reason(target, seen, shot))
+    try:
+        coverage.check(view for view in seen.corners)
+    except coverage.TooFewViewsError as error:
+        raise UnusableImagesError(f"{error}. {unseen.STILLS}" if unseen.mostly_moved(seen) else str(error)) from error
     return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
 
 
@@ -164,6 +190,8 @@ def finish(title: str, task: Task, arguments: argparse.Namespace, found: Materia
     else:
         for line in itertools.chain([assessment.verdict], assessment.reasons[1:]):
             print(line)
+        for pair, (length, angle) in baselines(solution.cameras).items():
+            print(f"{pair}: {length * 1e3:.1f} mm apart, turned by {math.degrees(angle):.2f}°")
         print(f"wrote {', '.join(map(str, written))}")
     return Exit.OK if assessment.trusted else Exit.FAILED
 

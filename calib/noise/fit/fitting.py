@@ -69,6 +69,7 @@ def maximize_likelihood(
     power: int = 1,
     pseudo_samples: Design = NO_PSEUDO_SAMPLES,
     span: float = RANGE_M,
+    least: float | NDArray[np.floating] = 0.0,
 ) -> FittedNoise:
     """Fits (1 − ε) N(μ, σ²) + ε uniform to residuals, with μ = columns.mean @ m and σᵖᵒʷᵉʳ = columns.spread @ s.
 
@@ -79,6 +80,8 @@ def maximize_likelihood(
         pseudo_samples: design matrices of conditions that may lack real samples. Each counts as one sample of median
             mean and spread: negligible beside thousands of real ones, but enough to bound the extrapolation.
         span: range over which an outlier is uniform, in the unit of the residuals.
+        least: lower bound of the deviation of every sample, in the unit of the residuals: values that come in steps
+            may repeat exactly, which would make the likelihood of no deviation unbounded.
 
     Raises:
         NoiseError: the samples vary too little to identify all coefficients.
@@ -89,7 +92,8 @@ def maximize_likelihood(
     q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns: powers of x and a differ by orders of magnitude
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
-    samples = _Samples(residual / unit, Design(q_mean, q_spread), power, unit / span)
+    bound = np.maximum(least / unit, _LEAST_SPREAD)
+    samples = _Samples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
     turned = Design(_solved(pseudo_samples.mean, r_mean), _solved(pseudo_samples.spread, r_spread))
     regularization = _PseudoSamples(center / unit, turned, power)
 
@@ -99,7 +103,7 @@ def maximize_likelihood(
         weak, by_weak = regularization.cost(parameters[:k], parameters[k:-1])
         return (real + weak) / len(residual), (by_real + by_weak) / len(residual)
 
-    start = np.concatenate([*_start(samples.residual, samples.columns, power), [scipy.special.logit(0.02)]])
+    start = np.concatenate([*_start(samples), [scipy.special.logit(0.02)]])
     bounds = [(None, None)] * (len(start) - 1) + [tuple(scipy.special.logit([1e-6, 0.5]))]
     options = {"maxiter": 500, "ftol": 1e-12, "gtol": 1e-8}
     best = scipy.optimize.minimize(cost, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).x
@@ -112,17 +116,26 @@ def maximize_likelihood(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Samples:
-    """Log-likelihood of the samples, in units of their spread; `uniform` is the density of an outlier."""
+    """Log-likelihood of the samples, in units of their spread.
+
+    Attributes:
+        residual: measured minus true values (n,).
+        columns: design matrices.
+        power: of the deviation that is linear in its parameters.
+        uniform: density of an outlier.
+        least: lower bound of the deviation, a number or (n,).
+    """
 
     residual: NDArray[np.floating]
     columns: Design
     power: int
     uniform: float
+    least: float | NDArray[np.floating] = _LEAST_SPREAD
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64], logit: float) -> tuple[float, NDArray[np.floating]]:
         """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε."""
         share = scipy.special.expit(logit)
-        v, inside = _bounded(self.columns.spread @ s, self.power)
+        v, inside = _bounded(self.columns.spread @ s, self.least**self.power)
         sigma = v ** (1 / self.power)
         z = (self.residual - self.columns.mean @ m) / sigma
         normal = np.exp(-0.5 * z**2 - LOG_SQRT_2PI) / sigma
@@ -144,7 +157,7 @@ class _PseudoSamples:
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64]) -> tuple[float, NDArray[np.floating]]:
         """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε, which is zero."""
-        v, inside = _bounded(self.columns.spread @ s, self.power)
+        v, inside = _bounded(self.columns.spread @ s, _LEAST_SPREAD**self.power)
         variance = v ** (2 / self.power)
         off = self.columns.mean @ m - self.center
         square = (1 + off**2) / variance
@@ -174,10 +187,10 @@ def polynomials(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tu
         part.ravel() for part in np.meshgrid(*(np.linspace(*span, _PSEUDO_SAMPLES) for span in (distances, amplitudes)))
     )
     pseudo_samples = Design(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
-    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples)
+    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples, least=samples.least_sigma)
     sigma = law.spread.reshape(sigma_degrees[0] + 1, sigma_degrees[1] + 1, 1)
     mu = law.mean.reshape(mu_degrees[0] + 1, mu_degrees[1] + 1, 1)
-    least = least_sigma(columns.spread @ law.spread)
+    least = least_sigma(np.maximum(columns.spread @ law.spread, samples.least_sigma))
     return Polynomials(sigma, mu, distances, amplitudes, least)
 
 
@@ -218,18 +231,20 @@ def _solved(columns: NDArray[np.floating], triangle: NDArray[np.floating]) -> ND
     return np.linalg.solve(triangle.T, columns.reshape(len(columns), len(triangle)).T).T
 
 
-def _bounded(v: NDArray[np.floating], power: int) -> tuple[NDArray[np.floating], NDArray[np.bool_]]:
+def _bounded(
+    v: NDArray[np.floating], least: float | NDArray[np.floating]
+) -> tuple[NDArray[np.floating], NDArray[np.bool_]]:
     """Clamped power of the deviation, and the mask of values that were not clamped."""
-    least = _LEAST_SPREAD**power
     return np.maximum(v, least), v > least
 
 
-def _start(r: NDArray[np.floating], columns: Design, power: int) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+def _start(samples: _Samples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Initial parameters by least squares with clipped residuals; constant spread if a linear one would be negative."""
-    mean, spread = columns
+    r, (mean, spread), power = samples.residual, samples.columns, samples.power
     middle = np.median(r) if mean.shape[1] else 0.0
     offset = mean.T @ np.clip(r, middle - 5, middle + 5)
-    size = np.minimum(np.abs(r - mean @ offset) * np.sqrt(np.pi / 2), 5) ** power
+    size = np.minimum(np.abs(r - mean @ offset) * np.sqrt(np.pi / 2), 5)
+    size = np.maximum(size, 1.5 * samples.least) ** power  # where bounds hold, likelihood has no slope
     linear = spread.T @ size
     constant = spread.T @ np.full(len(r), size.mean())
     return offset, linear if (spread @ linear).min() > _LEAST_SPREAD**power else constant

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calib.noise.base import NoiseError
 
 #: Lower bound of the deviation in files without `least_sigma` [m].
-_LEAST_SIGMA = 1e-4
+LEAST_SIGMA = 1e-4
 
 
 def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
@@ -26,10 +26,20 @@ def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
     found = arrays(file, required | {"distances", "amplitudes"})
     for key in ("distances", "amplitudes"):
         check_domain(file, found, key)
-    least = found.setdefault("least_sigma", np.array(_LEAST_SIGMA))
+    found["least_sigma"] = np.array(least_sigma(file, found))
+    return found
+
+
+def least_sigma(file: Path, found: dict[str, NDArray[np.float64]]) -> float:
+    """Lower bound of the deviation in the arrays of a file [m], or the usual one.
+
+    Raises:
+        NoiseError: it is not a number above 0.
+    """
+    least = found.get("least_sigma", np.array(LEAST_SIGMA))
     if least.shape != () or not least > 0:
         raise NoiseError(f"least_sigma in {str(file)!r} must be a number above 0, not {least.tolist()}")
-    return found
+    return float(least)
 
 
 def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:

@@ -1,7 +1,7 @@
 """Measurements of known distances: input for fitting and evaluating noise models."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ class Samples:
         true: true radial distance (n,) [m].
         amplitude: measured amplitude (n,); NaN if there is none.
         row, column: measuring pixel (n,).
+        step: quantisation step of the measured distance (n,) [m]; zeros if left out.
     """
 
     measured: NDArray[np.float64]
@@ -29,9 +30,12 @@ class Samples:
     amplitude: NDArray[np.float64]
     row: NDArray[np.int64]
     column: NDArray[np.int64]
+    step: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        shapes = {field.name: getattr(self, field.name).shape for field in fields(self)}
+        if not self.step.size:
+            object.__setattr__(self, "step", np.zeros(self.measured.shape))
+        shapes = {one.name: getattr(self, one.name).shape for one in fields(self)}
         if len(set(shapes.values())) != 1 or self.measured.ndim != 1:
             raise NoiseError(f"samples must be arrays (n,) of one length, not {shapes}")
 
@@ -44,13 +48,18 @@ class Samples:
         return self.measured - self.true
 
     @property
+    def least_sigma(self) -> NDArray[np.float64]:
+        """Deviation (n,) [m] that quantisation alone makes; a bit less, as residuals of few steps are not uniform."""
+        return 0.9 * self.step / np.sqrt(12)
+
+    @property
     def pixels(self) -> Pixels:
         """Rows and columns (n,)."""
         return self.row, self.column
 
     def take(self, which: NDArray[np.integer] | NDArray[np.bool_]) -> "Samples":
         """Samples selected by an index or a mask (n,)."""
-        return Samples(*(getattr(self, field.name)[which] for field in fields(self)))
+        return Samples(*(getattr(self, one.name)[which] for one in fields(self)))
 
     def returns(self, with_amplitude: bool) -> "Samples":
         """Samples with finite, positive measured and true distance and, if asked for, amplitude.
@@ -68,22 +77,24 @@ class Samples:
 
 def joined(parts: Iterable[Samples]) -> Samples:
     """Concatenation of several sets of samples."""
-    columns = zip(*([getattr(part, field.name) for field in fields(Samples)] for part in parts))
+    columns = zip(*([getattr(part, one.name) for one in fields(Samples)] for part in parts))
     return Samples(*map(np.concatenate, columns))
 
 
-def from_images(measured: ArrayLike, true: ArrayLike, amplitude: ArrayLike) -> Samples:
+def from_images(measured: ArrayLike, true: ArrayLike, amplitude: ArrayLike, step: ArrayLike = 0.0) -> Samples:
     """Samples of one depth image, or of several.
 
     Args:
         measured: radial distances (…, height, width) [m].
         true: true distances, of the same or a broadcastable shape, such as (height, width).
         amplitude: likewise; NaN if the sensor has none.
+        step: quantisation steps [m], likewise.
     """
     distance = np.asarray(measured, np.float64)
-    real, brightness = (np.broadcast_to(np.asarray(image, np.float64), distance.shape) for image in (true, amplitude))
+    images = (np.asarray(image, np.float64) for image in (true, amplitude, step))
+    real, brightness, steps = (np.broadcast_to(image, distance.shape).ravel() for image in images)
     row, column = (np.broadcast_to(index, distance.shape) for index in np.indices(distance.shape[-2:]))
-    return Samples(distance.ravel(), real.ravel(), brightness.ravel(), row.ravel(), column.ravel())
+    return Samples(distance.ravel(), real, brightness, row.ravel(), column.ravel(), steps)
 
 
 def domain(values: NDArray[np.float64]) -> Span:

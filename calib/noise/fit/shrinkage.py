@@ -27,6 +27,9 @@ _EQUAL_M = 1e-6
 #: Minimum number of samples of a region or pixel that contributes to the variation of the deviations.
 _FEW = 4
 
+#: Lower bound of a factor on the deviation: a place that repeats itself is stuck or filtered, not ten times better.
+LEAST_FACTOR = 0.1
+
 
 class Repeats(NamedTuple):
     """Number and scatter of the measurements that a sample is the mean of, as in sequences of a static scene.
@@ -54,6 +57,7 @@ class _Groups:
         of: index of the group of every sample (n,).
         number: number of groups.
         repeats: replicates of the samples.
+        least: lower bound of the factor on the deviation (groups,).
     """
 
     residual: NDArray[np.float64]
@@ -62,6 +66,7 @@ class _Groups:
     of: NDArray[np.int64]
     number: int
     repeats: Repeats
+    least: NDArray[np.float64]
 
     def sum(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Sums (groups,) of values (n,)."""
@@ -97,7 +102,7 @@ def refine(
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
     basis = basis_of(samples.true, parent.distances, degree)
-    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of))
+    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.least_sigma)
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
@@ -120,6 +125,7 @@ def shrink(
     place: NDArray[np.integer],
     places: int,
     repeats: Repeats = ONCE,
+    least: float | NDArray[np.float64] = 0.0,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Offsets and deviation factors of places relative to their parent, by expectation–maximisation.
 
@@ -130,11 +136,16 @@ def shrink(
         place: index of the place of every sample (n,).
         places: number of places.
         repeats: replicates of the samples.
+        least: deviation of the quantisation error [m], a number or (n,): a place that repeats one value does not show
+            it, and own offsets make up for it.
 
     Returns:
         Coefficients of the own mean offsets (places, k), and factors on the deviation (places,).
     """
-    groups = _Groups(residual, deviation, basis, place.astype(np.int64), places, repeats)
+    of = place.astype(np.int64)
+    mean_square = np.bincount(of, np.square(least / deviation), places) / np.bincount(of, minlength=places).clip(1)
+    floor = np.maximum(np.sqrt(mean_square), LEAST_FACTOR)
+    groups = _Groups(residual, deviation, basis, of, places, repeats, floor)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
     offsets[:, 0] = groups.medians(groups.residual)
     rest = np.sqrt(np.square(groups.residual - offsets[groups.of, 0]) + repeats.variance) / groups.deviation
@@ -187,8 +198,9 @@ def _factors(
     rest = groups.residual - np.einsum("nk,nk->n", groups.basis, offsets[groups.of])
     squares = groups.sum(weight * (rest**2 + groups.repeats.variance) / groups.deviation**2)
     freedom = np.maximum(groups.sum(weight) - used, 0)
+    squares = np.maximum(squares, freedom * groups.least**2)
     common, confidence = _common_variance(squares, freedom)
-    return np.sqrt((confidence * common + squares) / (confidence + freedom))
+    return np.maximum(np.sqrt((confidence * common + squares) / (confidence + freedom)), groups.least)
 
 
 def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64]) -> tuple[float, float]:

@@ -4,7 +4,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from calib.camera import Camera
 from calib.solve.solution import Solution
 
 
@@ -17,14 +16,6 @@ def supported(solution: Solution, sensor: str, pixels: NDArray[np.float64]) -> N
     hull = _hull(solution, sensor)
     sides = [cv2.pointPolygonTest(hull, (u, v), False) for u, v in np.nan_to_num(pixels, nan=-1e9).tolist()]
     return np.array(sides) >= 0
-
-
-def coverage(solution: Solution, sensor: str) -> float:
-    """Fraction of the image that the hull of the corners covers; 1 for fixed intrinsics."""
-    if not solution.adjustment.layout.free_parameters[sensor].intrinsics:
-        return 1.0
-    camera: Camera = solution.cameras[sensor]
-    return float(cv2.contourArea(_hull(solution, sensor))) / (camera.width * camera.height)
 
 
 def _hull(solution: Solution, sensor: str) -> NDArray[np.float32]:

@@ -87,8 +87,9 @@ def _static(sensor: TimeOfFlight, wall: Wall, frames: int, generator: np.random.
     some = times > 1
     mean = np.nanmean(distance[:, some], axis=0)
     variance = np.nanmean((distance[:, some] - mean) ** 2, axis=0)
+    rows, columns = np.nonzero(some)
     return Evidence(
         samples=from_images(distance[:FEW], view.distance, amplitude[:FEW]).returns(with_amplitude=True),
-        means=Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], *np.nonzero(some)),
+        means=Samples(mean, view.distance[some], amplitude.mean(axis=0)[some], rows, columns),
         repeats=Repeats(times[some].astype(float), variance),
     )

@@ -3,7 +3,9 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from abs_service.report.provenance import Provenance
 from abs_service.supervision.exit_codes import Exit
 from calib import pose
 from calib.camera import Camera
+from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 
 TOF = Camera(176, 144, 220.1, 221.7, 87.3, 71.9, Lens(np.array([-0.2, 0.03])))
@@ -50,7 +53,9 @@ def convert(capsys):
 def test_there_and_back_again(convert, lab: Path, name: str, options: tuple[str, ...]) -> None:
     between, back = lab.parent / name, lab.parent / "back.toml"
     code, out, err = convert(lab, between, *options)
-    assert (code, out) == (Exit.OK, f"wrote {between}: tof, color\n")
+    assert (code, out) == (
+        Exit.OK, f"wrote {between}: tof, color\n  tof, color: 50.0 mm apart, turned by 20.67°\n"
+    )  # fmt: skip
     assert "lost: tof: depth terms" in err
     assert "lost: tof: noise model" in err
     renamed = ("--rename", "cam_a=tof", "--rename", "cam_b=color") if name == "c.json" else ()
@@ -130,3 +135,75 @@ def test_published_calibrations_are_read(convert, data_set: Callable[[str], Path
     found = calibrations.load(tmp_path / "s.toml").sensors
     assert found["left"].camera.fx == pytest.approx(534.80326845051309, rel=1e-14)
     assert found["left_intrinsics"].camera.lens.coefficients[4] == pytest.approx(0.23839153080878486, rel=1e-14)
+
+
+def stored(path: Path, **values: Any) -> Path:
+    """A file of OpenCV."""
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in values.items():
+        storage.write(key, np.array(value, float) if isinstance(value, list) else value)
+    storage.release()
+    return path
+
+
+K = [[500.0, 0, 320], [0, 501, 240], [0, 0, 1]]
+PAIR = {"M1": K, "M2": K, "R": np.eye(3).tolist(), "T": [[-83.2], [0.5], [1]]}
+
+
+def test_translations_in_millimetres_are_not_taken_for_metres(convert, tmp_path: Path) -> None:
+    given = stored(tmp_path / "p.yml", **PAIR)
+    code, _, err = convert(given, tmp_path / "a.toml", "--size", "640x480")
+    assert (code, (tmp_path / "a.toml").exists()) == (Exit.USER, False)
+    assert "left, right are 83.21 m apart" in err
+    assert "--unit" in err
+    code, out, _ = convert(given, tmp_path / "a.toml", "--size", "640x480", "--unit", "mm")
+    assert code == Exit.OK
+    assert "left, right: 83.2 mm apart, turned by 0.00°" in out
+    right = calibrations.load(tmp_path / "a.toml").sensors["right"].camera
+    np.testing.assert_allclose(right.T_sr[:3, 3], (-0.0832, 0.0005, 0.001), atol=1e-12)
+
+
+def test_four_coefficients_are_those_of_the_lens_that_is_said(convert, tmp_path: Path) -> None:
+    given = stored(tmp_path / "f.yml", K=K, D=[[0.1], [-0.02], [0.003], [0.001]], image_width=640, image_height=480)
+    code, _, err = convert(given, tmp_path / "f.toml")
+    assert (code, (tmp_path / "f.toml").exists()) == (Exit.USER, False)
+    assert "--lens fisheye" in err
+    for kind, lens in (("fisheye", KannalaBrandt), ("brown-conrady", Lens)):
+        assert convert(given, tmp_path / f"{kind}.toml", "--lens", kind)[0] == Exit.OK
+        found = calibrations.load(tmp_path / f"{kind}.toml").sensors["f"].camera.lens
+        assert isinstance(found, lens)
+        assert found.coefficients[:4].tolist() == [0.1, -0.02, 0.003, 0.001]
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"K": [[500.0, 3, 320], [0, 501, 240], [0, 0, 1]]}, "a skew of 3 moves the top of the image by 1.4 px"),
+        ({"K": [[4.6, 0, 320], [0, 4.6, 240], [0, 0, 1]]}, "its field of view is 178° × 178°"),
+        ({"K": [[500.0, 0, 960], [0, 500, 540], [0, 0, 1]]}, "its principal point (960, 540) is outside"),
+        ({"xi": [[1.2]]}, "omnidirectional"),
+        ({"D": [[0.1, 0, 0, 0]], "distortion_model": "fisheye", "option": "brown-conrady"}, "the file says fisheye"),
+    ],
+)
+def test_what_would_be_read_wrongly_is_refused(convert, tmp_path: Path, changes: dict, said: str) -> None:
+    values = {"K": K, "image_width": 640, "image_height": 480} | changes
+    options = ("--lens", values.pop("option")) if "option" in values else ()
+    code, _, err = convert(stored(tmp_path / "f.yml", **values), tmp_path / "f.toml", *options)
+    assert (code, (tmp_path / "f.toml").exists()) == (Exit.USER, False)
+    assert said in err
+
+
+def test_what_is_left_out_of_a_file_of_opencv_is_listed(convert, tmp_path: Path) -> None:
+    given = stored(tmp_path / "f.yml", K=K, image_width=640, image_height=480, exposure=5)
+    assert "lost: f: exposure" in convert(given, tmp_path / "f.toml")[2]
+    assert "says itself" in convert(tmp_path / "f.toml", tmp_path / "g.xml", "--lens", "fisheye")[2]
+
+
+def test_a_published_skew_is_refused(convert, data_set: Callable[[str], Path], tmp_path: Path) -> None:
+    text = (data_set("calib_opencv_stereo") / "left_intrinsics.yml").read_text(encoding="utf-8")
+    skewed = text.replace("0., 3.42", "2.5, 3.42", 1)
+    assert skewed != text
+    (tmp_path / "s.yml").write_text(skewed, encoding="utf-8")
+    code, _, err = convert(tmp_path / "s.yml", tmp_path / "s.toml", "--size", "640x480")
+    assert code == Exit.USER
+    assert "skew of 2.5" in err

@@ -11,10 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
-from abs_service.calibration.noise import measurement
+from abs_service.calibration.noise import measurement, verdicts
 from abs_service.calibration.shots import sequences
 from abs_service.cli import main
 from abs_service.config import plugins
+from abs_service.report.content import Level, Verdict
 from abs_service.supervision.exit_codes import Exit
 from calib.no_return import NoReturn
 from calib.noise.base import NoiseError
@@ -153,7 +154,15 @@ def test_a_folder_of_images_is_read_with_its_camera_and_so_is_a_recording(tmp_pa
     assert "The mean offset is not determined" in said
     assert "Record at five distances" in said
     assert "too few to hold out a whole one" in said
-    assert (tmp_path / "noise.toml").is_file()
+    assert "doubtful: see noise.html" in (tmp_path / "noise.toml").read_text(encoding="utf-8")
+
+
+def test_a_bad_model_is_reported_and_not_written(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(verdicts, "verdicts", lambda found: (Verdict(Level.BAD, "σ is none"),))
+    source = "simulated://wall?sensors=tof&tof=32x24&rate=200"
+    assert main(["calibrate", "noise", source, "--frames", "9", "--out", str(tmp_path / "x")]) == Exit.USER
+    assert "σ is none" in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {"x.html", "x.json"}
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def test_images_in_folders_are_paired_by_the_last_number_in_their_names(tmp_path
 
 def test_what_is_no_image_is_named(tmp_path: Path) -> None:
     (tmp_path / "left01.png").write_bytes(b"nothing")
-    with pytest.raises(ShotsError, match=r"left01\.png: this is no image"):
+    with pytest.raises(ShotsError, match=r"left01\.png: cannot be read as an image"):
         list(FolderShots({"left": f"{tmp_path}/left*.png"}))
     with pytest.raises(ShotsError, match=r"images of right: .*no file matches 'right\*\.png'"):
         list(FolderShots({"right": f"{tmp_path}/right*.png"}))

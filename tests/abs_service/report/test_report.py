@@ -154,3 +154,16 @@ def test_maps_and_fields_of_nothing_are_drawn_all_the_same() -> None:
         figures.image_map(np.full((4, 6), np.nan), "x"),
     ):
         assert drawing(figure, "c", "a").content.startswith(b"<?xml")
+
+
+def test_tables_without_rows_are_left_out_of_the_page() -> None:
+    empty = Section("Views", (Table("nothing was seen", (Column("view"),), ()), "That is all."))
+    shown = page.to_html(Report("Rig", ORIGIN, (), (empty,)))
+    assert "nothing was seen" not in shown
+    assert "That is all." in shown
+
+
+def test_counted_coverage_is_what_the_map_shows() -> None:
+    corners = np.array([[1.0, 1.0], [70.0, 50.0]])
+    assert np.count_nonzero(figures.coverage_counts([corners, corners[:1]], 80, 60)) == 2
+    assert figures.coverage_counts([corners, corners[:1]], 80, 60).max() == 2

@@ -1,0 +1,70 @@
+"""What images without a board show, in one sentence: how many there were, and why none of them could be used."""
+
+from collections import Counter
+from dataclasses import replace
+
+from abs_service.calibration.shots.corner_extraction import BoardObservations
+from abs_service.calibration.shots.shots import Shot
+from calib.board.corners import errors
+from calib.board.corners.search import find
+from calib.board.corners.to_8bit import grey
+from calib.board.target import Charuco, Chessboard, Target
+
+_WORDS = {
+    errors.NothingFoundError: "nothing found",
+    errors.MirroredBoardError: "mirrored",
+    errors.SaturatedError: "saturated",
+    errors.TooSmallError: "too small",
+    errors.CutOffError: "cut off by the border",
+    errors.BlurredError: "blurred",
+    errors.MovedError: "moved since the image before",
+}
+
+#: What to do about stills, which seem to move when they are given the times of a film.
+STILLS = "If these are single photographs, give them times of their own: abs-service import … --rate 1"
+
+
+def reason(target: Target, seen: BoardObservations, last: Shot) -> str:
+    """Why no image shows the board.
+
+    Args:
+        target: the board.
+        seen: what was seen, without any corners.
+        last: one of the shots, in which boards of similar sizes are looked for.
+    """
+    count = len(seen.rejected)
+    parts = ", ".join(f"{words} in {number}" for words, number in _reasons(seen).most_common())
+    advice = f". {STILLS}" if mostly_moved(seen) else ""
+    like = _similar(target, last)
+    found = f". Image {last.number} shows {like}: correct the description of the board" if like else ""
+    return f"no {_name(target)} in any of {count} images: {parts}{found}{advice}"
+
+
+def mostly_moved(seen: BoardObservations) -> bool:
+    """True if most rejected images seem to show a board that moves."""
+    moved = sum(isinstance(error, errors.MovedError) for error in seen.rejected.values())
+    return 2 * moved > len(seen.rejected)
+
+
+def _reasons(seen: BoardObservations) -> Counter[str]:
+    return Counter(_WORDS[type(error)] for error in seen.rejected.values())
+
+
+def _name(target: Target) -> str:
+    if isinstance(target, Chessboard):
+        return f"board of {target.columns} × {target.rows} inner corners"
+    kind = "ChArUco of {} × {} squares" if isinstance(target, Charuco) else "grid of {} × {} discs"
+    return kind.format(target.columns, target.rows)
+
+
+def _similar(target: Target, last: Shot) -> str:
+    """A chessboard of nearly this size, such as one whose squares were counted instead of its corners; "" if none."""
+    if not isinstance(target, Chessboard):
+        return ""
+    changes = ((-1, -1), (1, 1), (-1, 0), (0, -1), (1, 0), (0, 1))
+    sizes = [(target.columns + dx, target.rows + dy) for dx, dy in changes]
+    for columns, rows in ((c, r) for c, r in sizes if min(c, r) >= 3):
+        other = replace(target, columns=columns, rows=rows)
+        if any(len(find(other, grey(look.image))[0]) for look in last.sensor_shots.values() if look.image.size):
+            return f"a {_name(other)}"
+    return ""

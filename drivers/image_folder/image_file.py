@@ -1,0 +1,32 @@
+"""Reading of one image file, which has to be whole."""
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.image_folder.listing import ImageFolderError
+
+#: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
+_ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
+
+
+def read(path: Path) -> NDArray[Any]:
+    """The pixels as the file has them, (height, width) or (height, width, channels) in OpenCV's order, not turned.
+
+    Raises:
+        ImageFolderError: it is no image, or a part of it is missing; names the file.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ImageFolderError(f"{path}: cannot be read: {error.strerror}") from error
+    for first, last, end in _ENDS:
+        if content.startswith(first) and content.rfind(end) <= content.rfind(last):
+            raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
+    if image is None:
+        raise ImageFolderError(f"{path}: cannot be read as an image")
+    return image

@@ -1,0 +1,72 @@
+"""Images that no calibration can come from are counted and named, with what is wrong in them."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from abs_service import cli
+from abs_service.calibration.files import target_file
+from calib.board.target import Chessboard
+from tests.abs_service.calibration.simulated import scene
+
+
+@pytest.fixture
+def said(capsys, tmp_path: Path) -> Callable[..., str]:
+    """Runs `calibrate intrinsics` with a board, which has to write no calibration; gives what it said."""
+
+    def said(board: Chessboard, *options: str) -> str:
+        target_file.write(board, tmp_path / "board.toml")
+        out = tmp_path / "out.toml"
+        arguments = ["calibrate", "intrinsics", *options, "--target", str(tmp_path / "board.toml"), "--out", str(out)]
+        assert cli.main(arguments) == 2
+        assert not out.exists()
+        return capsys.readouterr().err
+
+    return said
+
+
+def test_a_board_that_is_in_no_image_is_said_with_what_is_there(said, data_set: Callable[[str], Path]) -> None:
+    images = f"left={data_set('calib_opencv_stereo')}/left0[1-4].jpg"
+    error = said(Chessboard(10, 7, 0.025), "--images", images)
+    assert "no board of 10 × 7 inner corners in any of 4 images: nothing found in 3" in error
+    assert "shows a board of 9 × 6 inner corners: correct the description" in error
+
+
+def test_images_without_a_board_are_counted_by_what_is_wrong(said, tmp_path: Path) -> None:
+    for number in range(6):
+        cv2.imwrite(str(tmp_path / f"c_{number}.png"), np.full((120, 160), 255 if number > 3 else 90, np.uint8))
+    error = said(Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.png")
+    assert "no board of 9 × 6 inner corners in any of 6 images: nothing found in 4, saturated in 2" in error
+    report = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "bad"
+    assert report["verdicts"][0]["text"] in error.replace("\n", ".\n")
+
+
+def test_stills_with_the_times_of_a_film_are_recognised(said, tmp_path: Path) -> None:
+    board = scene("chessboard", "sensors=color", "rate=2", "seed=5", "color=320x240", "hold=0.1")
+    for k in range(6):
+        (frame,) = board.simulation.frames(4 * k)
+        cv2.imwrite(str(tmp_path / f"color_{k}.png"), np.ascontiguousarray(frame.data[..., ::-1], np.uint8))
+    camera = board.simulation.heads["color"].camera
+    keys = f"width = 320\nheight = 240\nfx = {camera.fx}\nfy = {camera.fy}\ncx = {camera.cx}\ncy = {camera.cy}\n"
+    (tmp_path / "camera.toml").write_text(f"[depth]\n{keys}[color]\n{keys}")
+    for k in range(6):
+        cv2.imwrite(str(tmp_path / f"depth_{k}.png"), np.zeros((240, 320), np.uint16))
+    take = tmp_path / "take.mcap"
+    arguments = ["import", str(tmp_path), "--layout", "pairs", "--camera", str(tmp_path / "camera.toml")]
+    assert cli.main([*arguments, "--out", str(take)]) == 0
+    assert "--rate 1" in said(board.target, str(take), "--every", "0")
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg"])
+def test_a_truncated_image_is_named(said, tmp_path: Path, suffix: str) -> None:
+    file = tmp_path / f"c_1.{suffix}"
+    cv2.imwrite(str(file), np.random.default_rng(0).integers(0, 255, (120, 160), np.uint8))
+    file.write_bytes(file.read_bytes()[:-2000])
+    assert f"c_1.{suffix}: the image is truncated" in said(
+        Chessboard(9, 6, 0.025), "--images", f"color={tmp_path}/c_*.{suffix}"
+    )
