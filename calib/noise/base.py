@@ -148,8 +148,9 @@ def _render_rows(
     nodes = np.maximum(center + np.array([[WINDOW_M], [0.0], [-WINDOW_M]]), MIN_DISTANCE_M)
     deviation = model.deviation(nodes, a, p)
     # NumPy takes logarithms of many numbers at once, the compiler does not.
-    normalizer = np.log(deviation[1].astype(np.float32)) + np.float32(LOG_SQRT_2PI)
-    growth = np.log((deviation[2] / deviation[0]).astype(np.float32))
+    with np.errstate(over="ignore"):  # farther than 1 km, single precision has no room for every model's deviation
+        normalizer = np.log(deviation[1].astype(np.float32)) + np.float32(LOG_SQRT_2PI)
+        growth = np.log((deviation[2] / deviation[0]).astype(np.float32))
     _write_texels(*p, center, model.mean(nodes, a, p) - offset, deviation, normalizer, growth, texture)
 
 

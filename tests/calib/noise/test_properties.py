@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.polynomial.polynomial import polyval2d
@@ -111,6 +111,7 @@ def test_the_texture_is_the_exact_log_density_within_three_deviations(model, dis
     arrays(np.float32, (HEIGHT, WIDTH), elements=st.floats(width=32)),
     arrays(np.float32, (HEIGHT, WIDTH), elements=st.floats(width=32)),
 )
+@example("structured_light", np.full((HEIGHT, WIDTH), 1e30, np.float32), np.ones((HEIGHT, WIDTH), np.float32))
 def test_whatever_a_device_reports_the_texture_is_finite(name, distance, amplitude):
     """A texel is uniform where there is no finite distance above zero, or no amplitude for a model that needs one."""
     model = MODELS[name]
