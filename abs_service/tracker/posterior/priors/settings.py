@@ -18,7 +18,7 @@ class Settings:
         memory_s: time constant of the exponential decay of the predicted velocity [s].
     """
 
-    stretch: Annotated[float, Gt(0)] = 0.02
+    stretch: Annotated[float, Gt(0)] = 0.01
     speed: Annotated[float, Gt(0)] = 0.3
     least_speed: Annotated[float, Gt(0)] = 0.02
     memory_s: Annotated[float, Gt(0)] = 0.1
