@@ -133,6 +133,12 @@ class Kernel:
         return njit(**settings)(copy)
 
     @functools.cached_property
+    def size(self) -> int:
+        """Length of the byte code, with that of the kernels that it calls: what it costs to compile, roughly."""
+        called = (value.size for value in self._globals.values() if isinstance(value, Kernel))
+        return len(self.function.__code__.co_code) + sum(called)
+
+    @functools.cached_property
     def digest(self) -> str:
         """Hash of everything that determines the machine code; its key in Numba's cache.
 
@@ -151,6 +157,15 @@ class Kernel:
         used = set(self.function.__code__.co_names)
         known = self.function.__globals__ | dict(self._parts)
         return {name: value for name, value in known.items() if name in used}
+
+
+def load_compiler() -> None:
+    """Imports Numba and what it needs for any kernel, which the first call does otherwise; takes half a second."""
+    from numba.core.registry import cpu_target  # noqa: PLC0415
+
+    contexts: tuple[Any, Any] = (cpu_target.typing_context, cpu_target.target_context)
+    for context in contexts:
+        context.refresh()
 
 
 def _found(module: str, name: str, parts: Mapping[str, Any]) -> Callable[..., Any]:

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+import scipy  # its parts are imported when they are first used
 from annotated_types import Interval
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
-from scipy.special import expit, logit
 
 
 @dataclass(frozen=True)
@@ -31,11 +30,11 @@ class NoReturn:
     def log_odds(self, x: ArrayLike, cosine: ArrayLike) -> NDArray[np.float64]:
         """Logarithm of p / (1 − p) at distances `x` [m] and cosines of incidence, in their common shape."""
         away, turned = np.asarray(x, np.float64) - 1, 1 - np.asarray(cosine, np.float64)
-        return logit(self.share) + self.per_m * away + self.grazing * turned
+        return scipy.special.logit(self.share) + self.per_m * away + self.grazing * turned
 
     def probability(self, x: ArrayLike, cosine: ArrayLike) -> NDArray[np.float64]:
         """Probability p of no return, in the common shape of distances [m] and cosines of incidence."""
-        return expit(self.log_odds(x, cosine))
+        return scipy.special.expit(self.log_odds(x, cosine))
 
 
 Settings = NoReturn
@@ -69,12 +68,13 @@ def fit(
         weight: number of independent returns that each share stands for (n,).
     """
     columns = np.column_stack([np.ones_like(x), x - 1, 1 - cosine])
-    center = np.array([logit(CAUTIOUS.share), CAUTIOUS.per_m, CAUTIOUS.grazing])
+    center = np.array([scipy.special.logit(CAUTIOUS.share), CAUTIOUS.per_m, CAUTIOUS.grazing])
 
     def cost(theta: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         odds, off = columns @ theta, (theta - center) / _PRIOR
         value = np.sum(weight * (np.logaddexp(0, odds) - missing * odds)) + 0.5 * off @ off
-        return float(value), columns.T @ (weight * (expit(odds) - missing)) + off / _PRIOR
+        return float(value), columns.T @ (weight * (scipy.special.expit(odds) - missing)) + off / _PRIOR
 
-    found = minimize(cost, center, jac=True, method="L-BFGS-B", bounds=_LIMITS, options={"ftol": 1e-12}).x
-    return NoReturn(float(expit(found[0])), float(found[1]), float(found[2]))
+    options = {"ftol": 1e-12}
+    found = scipy.optimize.minimize(cost, center, jac=True, method="L-BFGS-B", bounds=_LIMITS, options=options).x
+    return NoReturn(float(scipy.special.expit(found[0])), float(found[1]), float(found[2]))

@@ -197,7 +197,7 @@ class Tracker:
 
     def warm_up(self) -> None:
         """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
-        warm_up(wiring.noises(self._settings, self._name), self._plan)
+        warm_up(self._rig, self._plan)
 
     def _track(self, frames: FrameSet) -> Estimate:
         begin_ns = time.monotonic_ns()

@@ -18,6 +18,7 @@ from abs_service import config
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
+from abs_service.recording.first_tracking import FirstTracking
 from abs_service.recording.recorder import Recorder, RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover
 from abs_service.supervision import gc_tuning
@@ -55,9 +56,15 @@ def run(arguments: argparse.Namespace) -> int:
         threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
         recorder = Recorder(bus, settings, health, clock)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
+        tracking = FirstTracking(bus, rig.trackers)
+        if rig.record.begin == "tracking":
+            _wait_for_tracking(tracking, health, stop)
+        if stop.is_set():
+            return Exit.OK
         recorder.start()
         gc_tuning.freeze_loaded_objects()
         while not stop.wait(0.2):
+            health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()
                 recorder.report()
@@ -68,6 +75,12 @@ def run(arguments: argparse.Namespace) -> int:
     if recorder.failed:
         print(f"abs-service: RECORD_FAILED {recorder.failed}", file=sys.stderr)
     return Exit.FAILED if recorder.failed else Exit.OK
+
+
+def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.Event) -> None:
+    health.label("tracking", "begins when something is tracked")
+    while not (stop.is_set() or tracking.seen.wait(0.05)):
+        health.tick()
 
 
 def _settings(rig: config.ServiceConfig) -> RecorderSettings:

@@ -9,7 +9,7 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
-from collections.abc import Mapping
+from queue import SimpleQueue
 
 from absmsg.v1.sensor_model_pb2 import SensorModel
 
@@ -29,7 +29,8 @@ from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
-from calib.rig import Noise, Rig
+from calib.jit import load_compiler
+from calib.rig import Rig
 from drivers.encoding.sensor_model import decode_camera
 
 #: Timeout of a query for calibrations [s].
@@ -53,11 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(settings, arguments) as bus:
         health = Health(bus, f"track/{name}", headers)
         bus.declare_liveliness(f"track/{name}")
-        # At once, because it takes longer than the devices take to open, and neither needs the other.
-        noises = wiring.noises(settings, name)
-        preparing = threading.Thread(target=_prepare, args=(noises, plan, health), daemon=True)
+        rigs: SimpleQueue[Rig] = SimpleQueue()
+        preparing = threading.Thread(target=_prepare, args=(rigs, plan, health), daemon=True)
         preparing.start()
         cameras = _cameras(bus, settings.trackers[name].sensors, health, stop)
+        if stop.is_set():
+            return Exit.OK
+        rigs.put(rig := wiring.rig(settings, name, cameras))
         while preparing.is_alive() and not stop.is_set():
             preparing.join(0.05)
             health.tick()
@@ -65,7 +68,6 @@ def run(arguments: argparse.Namespace) -> int:
         if stop.is_set():
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
-        rig = wiring.rig(settings, name, cameras)
         tracking = TrackingSession(rig, plan)
         bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
         clocks = ClockOffsets(bus, time.monotonic_ns, headers.host_clock)
@@ -125,8 +127,11 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     return cameras
 
 
-def _prepare(noises: Mapping[str, Noise], plan: Plan, health: Health) -> None:
+def _prepare(rigs: SimpleQueue[Rig], plan: Plan, health: Health) -> None:
+    """Loads the compiler while the devices open, and then the kernels that the rig needs."""
+    load_compiler()
+    rig = rigs.get()
     health.label("phase", "preparing")
-    warm_up(noises, plan, lambda progress: health.label("kernels", str(progress)))
+    warm_up(rig, plan, lambda progress: health.label("kernels", str(progress)))
     health.label("kernels", "")
     health.label("phase", "waiting")

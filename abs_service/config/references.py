@@ -11,7 +11,7 @@ def check(file: dict[str, Any]) -> list[Problem]:
 
     Works on the raw tables, so that these problems are reported together with all others.
     """
-    return [*_sensors(file), *_references(file), *_trackers(file)]
+    return [*_sensors(file), *_references(file), *_trackers(file), *_record(file)]
 
 
 def _tables(file: dict[str, Any], section: str) -> dict[str, dict[str, Any]]:
@@ -65,3 +65,9 @@ def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
                 ("trackers", name, "reference"),
                 "missing: the stream that paces the tracker, here or as synchronisation.reference",
             )
+
+
+def _record(file: dict[str, Any]) -> Iterator[Problem]:
+    record = file.get("record")
+    if isinstance(record, dict) and record.get("begin") == "tracking" and not _tables(file, "trackers"):
+        yield Problem(("record", "begin"), 'the rig has no tracker to wait for; allowed is "start"', "tracking")

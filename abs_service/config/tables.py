@@ -132,6 +132,8 @@ class RecordTable(Table):
     Attributes:
         enabled: `abs-service run` writes recordings.
         directory: folder of the recordings, created if it does not exist.
+        begin: `start`: at once, and what is recorded before something is tracked is said to be; `tracking`: with
+            the first TRACKING of any tracker, from whose next images on everything is kept.
         depth_codec: form of images with one channel, such as distances and amplitudes; viewers show `raw` ones only.
         color_codec: form of colour images and mosaics; viewers show `raw` and `jpeg`, which loses details
             and is for colour images alone: mosaics are `lossless` then.
@@ -146,6 +148,7 @@ class RecordTable(Table):
 
     enabled: bool = True
     directory: RelativePath = Path("recordings")
+    begin: Literal["start", "tracking"] = "start"
     depth_codec: Literal["raw", "lossless"] = "raw"
     color_codec: Literal["raw", "lossless", "jpeg"] = "raw"
     compression: Literal["none", "lz4", "zstd"] = "lz4"

@@ -93,5 +93,6 @@ def line(view: RigView) -> str:
         parts.append(f"{name} {last.status}{reasons}{error} {last.solve_ms:.1f} ms, {tracker.estimates} estimates")
     if recording := view.recording:
         parts.append(f"{recording.file.name} {size(recording.size)}, {recording.dropped} dropped")
+    parts += [f"recording: {view.recording_remark}"] if view.recording_remark else []
     parts += [f"{component}: {message}" for component, _, message in view.troubles]
     return " | ".join([*parts, view.activity] if view.activity else parts)

@@ -140,10 +140,11 @@ def _theta(name: str, report: EstimateReport) -> Text:
 def _recording(view: RigView) -> Text:
     recording = view.recording
     if recording is None:
-        return Text(" not recording", style="dim")
+        return Text(f" recording {view.recording_remark}" if view.recording_remark else " not recording", style="dim")
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(f" recording {recording.file.name}  {size(recording.size)}  {size(recording.rate)}/s  ")
     text.append(f"{recording.dropped} dropped", style="yellow" if recording.dropped else "")
+    text.append(f"  {view.recording_remark}", style="dim")
     return text
 
 

@@ -91,6 +91,11 @@ class RigView:
         )
 
     @property
+    def recording_remark(self) -> str:
+        """What the recorder says as long as nothing is tracked; "" afterwards."""
+        return self.live.health("record").labels.get("tracking", "")
+
+    @property
     def troubles(self) -> list[tuple[str, int, str]]:
         """Component, level and message of everything that needs attention."""
         found: list[tuple[str, int, str]] = [

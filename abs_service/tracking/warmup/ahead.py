@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import ceil, isfinite
 from typing import Any
 
 import numpy as np
@@ -23,16 +24,16 @@ PERIOD_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Number of kernels that are compiled, of those known to be needed, and the time since the first was [s]."""
+    """Number of kernels that are compiled, of those known to be needed, and about how long the others take [s]."""
 
     done: int
     total: int
-    elapsed_s: float
+    left_s: float
 
     def __str__(self) -> str:
-        if not self.done:
-            return f"0 of {self.total}"
-        return f"{self.done} of {self.total}, about {self.elapsed_s / self.done * (self.total - self.done):.0f} s"
+        if not isfinite(self.left_s):
+            return f"{self.done} of {self.total}"
+        return f"{self.done} of {self.total}, about {ceil(self.left_s)} s"
 
 
 def ignore(progress: Progress) -> None:
@@ -68,7 +69,7 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
             for kernel in taken:
                 kernel.forget()
         while not pool.wait(PERIOD_S):
-            report(Progress(pool.done, pool.total, pool.elapsed_s))
+            report(Progress(pool.done, pool.total, pool.left_s))
 
 
 class StandIn:

@@ -1,6 +1,6 @@
 """Tracking of a synthetic board, so that all kernels are called before the first real frame."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,48 +11,44 @@ from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup.ahead import Progress, compiled_ahead, ignore
 from calib.camera import Camera
-from calib.lenses.fisheye import KannalaBrandt
-from calib.lenses.lens import Lens
 from calib.noise.base import DepthNoise
 from calib.noise.gaussian_polynomial import GaussianPolynomial
-from calib.rig import Noise, Rig, Sensor
+from calib.rig import Rig, Sensor
 from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
-#: Placeholder camera: kernels accept images of any size, so the real cameras are not required yet.
+#: Placeholder camera: kernels accept images of any size, and in a small one there is little to compute.
 _CAMERA = Camera(160, 120, 200.0, 200.0, 79.5, 59.5)
-_DISTORTED = replace(_CAMERA, lens=Lens(np.array([-0.05])))
-_FISHEYE = replace(_CAMERA, lens=KannalaBrandt())
 #: Placeholder for every depth noise: kernels use its texture only, and a per-pixel map would not fit the camera.
 _NOISE = GaussianPolynomial(((0.01,),))
 
 
-def warm_up(noises: Mapping[str, Noise], plan: Plan, report: Callable[[Progress], None] = ignore) -> None:
-    """Tracks and loses a synthetic flat board with every kind of lens and the parts of the plan.
+def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -> None:
+    """Tracks and loses a synthetic flat board with the lenses of a rig and the parts of a plan.
 
     Kernels that are not in the cache yet are compiled by several processes; see `compiled_ahead`.
 
     Args:
-        noises: noise model of every sensor of the tracker, by name; determines the kind of image.
+        rig: the sensors of the tracker; their noise models determine the kinds of images.
         plan: settings of the tracker.
         report: told how many kernels are compiled.
     """
+    seen = Rig("warm-up", {name: _sensor(sensor) for name, sensor in rig.sensors.items()})
     with compiled_ahead(report) as pool:
-        _track_board(noises, plan, _CAMERA)
-    again = (_CAMERA,) if pool.total else ()
-    for camera in (*again, _DISTORTED, _FISHEYE):
-        _track_board(noises, plan, camera)
+        _track_board(seen, plan)
+    if pool.total:
+        _track_board(seen, plan)
 
 
-def _track_board(noises: Mapping[str, Noise], plan: Plan, camera: Camera) -> None:
-    rig = Rig("warm-up", {name: _sensor(name, camera, noise) for name, noise in noises.items()})
+def _track_board(rig: Rig, plan: Plan) -> None:
     frames = [_board(head, Kind(stream), plan.model.board) for head, stream in streams(rig.sensors.values())]
     tracking = TrackingSession(rig, replace(plan, region=nearest.Settings(), template=first_image.Settings()))
     for seq, seen in enumerate((frames, frames, [_without_object(frame) for frame in frames])):
         tracking.track(FrameSet(seq, round(seq * 33e6), {frame.key: frame for frame in seen}), lambda: False)
 
 
-def _sensor(name: str, camera: Camera, noise: Noise) -> Sensor:
-    return Sensor(name, camera, _NOISE if isinstance(noise, DepthNoise) else noise)
+def _sensor(sensor: Sensor) -> Sensor:
+    noise = _NOISE if isinstance(sensor.noise, DepthNoise) else sensor.noise
+    return Sensor(sensor.name, replace(_CAMERA, lens=sensor.camera.lens), noise)
 
 
 def _without_object(frame: Frame) -> Frame:

@@ -7,20 +7,22 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
+from math import inf
 from typing import IO, Any, Self, cast
 
 from calib.jit import Kernel
 
 _log = logging.getLogger(__name__)
 
-COMMAND = sys.executable, "-m", "abs_service.tracking.warmup.worker"
+#: Not from the folder where we are, which may hold another copy of these sources, but from where this process has them.
+COMMAND = sys.executable, "-P", "-m", "abs_service.tracking.warmup.worker"
 
 
 class Pool:
     """Compiles kernels in other processes; a context manager that ends them.
 
-    A process begins when there is work for it. No two compile the same kernel at once, for other types: Numba's index
+    A process begins when there is work for it. The largest kernel that is known is next, so that the end is not spent
+    waiting for one that began late. No two compile the same kernel at once, for other types: Numba's index
     of a kernel's code is not made for that.
 
     Args:
@@ -36,11 +38,12 @@ class Pool:
         self.done = 0
         self._workers = workers
         self._threads: list[threading.Thread] = []
-        self._waiting: deque[tuple[Kernel, tuple[Any, ...]]] = deque()
+        self._waiting: list[tuple[Kernel, tuple[Any, ...]]] = []
         self._busy: set[str] = set()
         self._changed = threading.Condition()
         self._closed = False
         self._began_s = 0.0
+        self._size = self._done_size = 0
 
     def __enter__(self) -> Self:
         return self
@@ -51,9 +54,11 @@ class Pool:
             self._changed.notify_all()
 
     @property
-    def elapsed_s(self) -> float:
-        """Time since the first kernel was asked for [s]."""
-        return time.monotonic() - self._began_s if self.total else 0.0
+    def left_s(self) -> float:
+        """About how long the others take, by the size of their code [s]; infinite as long as none is done."""
+        with self._changed:
+            share = self._done_size / self._size if self._done_size else 0.0
+        return (time.monotonic() - self._began_s) * (1 / share - 1) if share else inf
 
     def submit(self, kernel: Kernel, types: tuple[Any, ...]) -> None:
         """Asks for a kernel for arguments of these types."""
@@ -61,6 +66,7 @@ class Pool:
             if not self.total:
                 self._began_s = time.monotonic()
             self.total += 1
+            self._size += kernel.size
             self._waiting.append((kernel, types))
             if len(self._threads) < self._workers:
                 self._threads.append(threading.Thread(target=self._work, name="compilation", daemon=True))
@@ -97,16 +103,18 @@ class Pool:
         """A kernel that no other process works on; None at the end."""
         with self._changed:
             while not self._closed:
-                for task in self._waiting:
-                    if task[0].digest not in self._busy:
-                        self._waiting.remove(task)
-                        self._busy.add(task[0].digest)
-                        return task
+                free = [task for task in self._waiting if task[0].digest not in self._busy]
+                if free:
+                    task = max(free, key=lambda task: task[0].size)
+                    self._waiting.remove(task)
+                    self._busy.add(task[0].digest)
+                    return task
                 self._changed.wait()
         return None
 
     def _finish(self, kernel: Kernel) -> None:
         with self._changed:
             self.done += 1
+            self._done_size += kernel.size
             self._busy.discard(kernel.digest)
             self._changed.notify_all()

@@ -100,7 +100,7 @@ CASES = {
     "a misspelt section": ("[buss]\n", 'buss: unknown key, did you mean "bus"?'),
     "a misspelt key": (
         "[record]\nrotate_sec = 3\n",
-        'record.rotate_sec: unknown key, did you mean "rotate_s"? allowed: chunk',
+        'record.rotate_sec: unknown key, did you mean "rotate_s"? allowed: begin, chunk',
     ),
     "a value out of range": ("[record]\nflush_s = 0\n", "record.flush_s = 0: must be greater than 0"),
     "a number as text": ('[record]\nflush_s = "1"\n', 'record.flush_s = "1": must be a valid number'),
@@ -179,6 +179,11 @@ def test_all_problems_are_reported_at_once():
         "sensors.tof.device",
         "sensors.color.device",
     ]
+
+
+def test_a_recording_that_begins_with_tracking_needs_a_tracker():
+    (found,) = mistakes(SENSORS + '[record]\nbegin = "tracking"\n')
+    assert found == 'record.begin = "tracking": the rig has no tracker to wait for; allowed is "start"'
 
 
 def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():

@@ -109,8 +109,11 @@ def test_a_part_is_prepared_and_tracks_what_was_recorded(part, folder, take, tmp
     rig_file.write_text(OPTIONS[part].toml, encoding="utf-8")
     rig = config.load(rig_file)
     assert OPTIONS[part].module in {type(settings).__module__ for settings in parts(rig)}
-    warm_up(wiring.noises(rig, "object"), wiring.plan(rig, "object"))
-    recording = take(rig.devices["sim"].uri, tuple(rig.heads("sim").items()))
+    uri = rig.devices["sim"].uri
+    heads = parse(uri).build().heads
+    cameras = wiring.cameras(rig, {name: heads[head].camera for head, name in rig.heads("sim").items()})
+    warm_up(wiring.rig(rig, "object", cameras), wiring.plan(rig, "object"))
+    recording = take(uri, tuple(rig.heads("sim").items()))
     arguments = ["replay", recording, "--config", rig_file, "--out", tmp_path / "out.mcap", "--json"]
     assert cli.main(list(map(str, arguments))) == Exit.OK
     estimates = [json.loads(line) for line in capsys.readouterr().out.splitlines()]

@@ -144,6 +144,17 @@ def test_the_recorder_shows_its_file_size_rate_and_losses(live):
     assert "recording demo_2026.mcap  2.0 MB  2.0 MB/s  3 dropped" in drawn(view(live))
 
 
+def test_the_recorder_says_that_nothing_is_tracked_yet(live):
+    health = live.health("record")
+    health.labels["tracking"] = "nothing is tracked yet"
+    take_health(live, health)
+    assert "3 dropped  nothing is tracked yet" in drawn(view(live), width=120)
+    assert "recording: nothing is tracked yet" in line(view(live))
+    health.labels["file"], health.labels["tracking"] = "", "begins when something is tracked"
+    take_health(live, health)
+    assert "recording begins when something is tracked" in drawn(view(live))
+
+
 def test_processes_show_their_number_or_state_and_restarts(live):
     assert "processes  capture 4711  record backoff restarted 2×" in drawn(view(live))
 

@@ -9,11 +9,12 @@ import time
 
 import numpy as np
 import pytest
+from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.health_pb2 import Health
 from mcap.reader import make_reader
 
 from abs_service.bus import keys
-from abs_service.bus.contract import IMAGES
+from abs_service.bus.contract import IMAGES, STATE
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
@@ -69,6 +70,11 @@ class Stream:
         self._thread.join()
         self._bus.close()
 
+    def track(self):
+        publisher = self._bus.publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
+        state = DeformationState(header=self._headers.now(0), status=DeformationState.STATUS_TRACKING)
+        publisher.put(state.SerializeToString())
+
     def wait_for(self, condition):
         while not condition(health := self.health.get(timeout=20)):
             pass
@@ -83,6 +89,20 @@ class Stream:
             header = self._headers.at(t_ns, seq)
             publisher.put(codec.encode_image(frame, self._clock.wall(t_ns)), codec.encode_info(frame, header))
             seq += 1
+
+
+TRACKER = """
+[sensors.tof.noise]
+type = "constant"
+sigma = 0.01
+[trackers.sheet]
+sensors = ["tof"]
+reference = "tof/depth"
+model.type = "rigid"
+region.type = "nearest"
+objective.type = "likelihood"
+optimizer.type = "hybrid"
+"""
 
 
 def frames(path):
@@ -165,3 +185,20 @@ def test_a_rig_that_does_not_run_is_explained(rig, launch):
     recorder = launch("record", rig)
     assert recorder.wait(20) == 2
     assert "nothing answers there" in recorder.stderr.read()
+
+
+def test_the_recorder_says_that_nothing_is_tracked_and_begins_with_it_if_told_to(rig, endpoint, launch):
+    text = rig.read_text() + TRACKER
+    for begin, remark in (("start", "nothing is tracked yet"), ("tracking", "begins when something is tracked")):
+        rig.write_text(text.replace("[record]", f'[record]\nbegin = "{begin}"'))
+        with Stream(endpoint) as stream:
+            recorder = launch("record", rig)
+            health = stream.wait_for(lambda health, said=remark: health.labels["tracking"] == said)
+            assert bool(health.labels["file"]) == (begin == "start")
+            stream.track()
+            tracked_s = time.time()
+            stream.wait_for(lambda health: is_recording(health) and not health.labels["tracking"])
+            recorder.send_signal(signal.SIGTERM)
+            assert recorder.wait(5) == 0
+        path = max(rig.parent.glob("kept/*.mcap"))
+        assert (frames(path)[0][1] < tracked_s) == (begin == "start")

@@ -186,7 +186,7 @@ def test_streams_are_those_that_the_noise_models_need():
 
 
 def test_warming_up_leaves_nothing_to_compile_and_no_trace():
-    warm_up({name: sensor.noise for name, sensor in RIG.sensors.items()}, default_plan())
+    warm_up(RIG, default_plan())
     (step,) = drive(tracking(), SHEET, range(1))
     assert step.estimate.status == Status.TRACKING
 

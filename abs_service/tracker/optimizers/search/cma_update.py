@@ -108,7 +108,8 @@ def update_distribution(
     population, n = costs.size, mean.size
     ranked = np.empty((population + 1, n), np.float32)  # and in the end the path
     for rank, k in enumerate(np.argsort(costs, kind="mergesort")):
-        ranked[rank] = z[k]
+        for i in range(n):
+            ranked[rank, i] = z[k, i]
     p_sigma, p_c, z_mean = paths[0], paths[1], np.zeros(n)
     for rank in range(population // 2):
         w, step = weights[rank], ranked[rank]
@@ -127,8 +128,8 @@ def update_distribution(
     gain = np.sqrt(c_c * (2 - c_c) * mu_eff) if usual else 0.0
     for i in range(n):
         p_c[i] = (1 - c_c) * p_c[i] + gain * z_mean[i]
+        ranked[population, i] = p_c[i]
     decay = 1 - c_1 - c_mu * weights.sum() + (0.0 if usual else c_1 * c_c * (2 - c_c))
-    ranked[population] = p_c
     _learn(ranked, weights, decay, c_1, c_mu, learnt)
     return sigma * np.exp(min(1.0, c_sigma / d_sigma * (length - 1)))
 
@@ -184,9 +185,10 @@ def update_factor(
         root[:] = 0
         for i in range(n):
             root[i, i] = np.sqrt(abs(learnt[i, i]))
-    factor[:] = np.dot(factor, root)
-    axes[:] = np.dot(root.astype(np.float32).T, axes)
+    new_factor, new_axes = np.dot(factor, root), np.dot(root.astype(np.float32).T, axes)
     for i in range(n):
+        for j in range(n):  # an assignment between arrays contains a message about their shapes: 2 s of compiling
+            factor[i, j], axes[i, j] = new_factor[i, j], new_axes[i, j]
         for j in range(i):
             path[i] -= root[i, j] * path[j]
         path[i] /= root[i, i]

@@ -92,7 +92,7 @@ class Toy:
         synchroniser = wiring.synchroniser(self._settings, TRACKER, self._rig.sensors.values())
         sets = list(synchroniser.group(images.frames()))
         # As the service does before its first image; compiling is no part of a frame's time.
-        warm_up(wiring.noises(self._settings, TRACKER), wiring.plan(self._settings, TRACKER))
+        warm_up(self._rig, wiring.plan(self._settings, TRACKER))
         self.references = [_reference_frame(one, _mask(mask.path)) for one, mask in zip(sets, masks, strict=True)]
 
     @cached_property

@@ -4,13 +4,17 @@ import json
 import os
 import subprocess
 import sys
+import time
 from math import inf
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from abs_service.tracking.warmup.ahead import Progress
+from abs_service.tracking.warmup.pool import Pool
+from calib.jit import Kernel
 
 KERNELS = """
 import numpy as np
@@ -77,9 +81,13 @@ def test_kernels_of_modules_are_compiled_elsewhere_and_others_here(tmp_path: Pat
     path = os.pathsep.join([str(tmp_path), *sys.path])
     environment = os.environ | {"PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
+    (elsewhere := tmp_path / "elsewhere").mkdir()
+    (elsewhere / "kernels.py").write_text("")  # another copy, in the folder where the program runs, is not the one
+
     def run() -> dict[str, Any]:
         command = [sys.executable, str(tmp_path / "main.py")]
-        return json.loads(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
+        done = subprocess.run(command, env=environment, cwd=elsewhere, check=True, capture_output=True)
+        return json.loads(done.stdout)
 
     first, second = run(), run()
     each = [["float", 3.0, [3.0, 4.0]], ["float", 0.75, [0.75, 1.0]], ["int", 2, [4.5, 6.0]]]
@@ -93,5 +101,20 @@ def test_kernels_of_modules_are_compiled_elsewhere_and_others_here(tmp_path: Pat
 
 
 def test_progress_says_how_many_and_how_long() -> None:
-    assert str(Progress(0, 31, 0.4)) == "0 of 31"
-    assert str(Progress(12, 31, 6.0)) == "12 of 31, about 10 s"
+    assert str(Progress(0, 31, inf)) == "0 of 31"
+    assert str(Progress(12, 31, 9.5)) == "12 of 31, about 10 s"
+    assert str(Progress(30, 31, 0.2)) == "30 of 31, about 1 s"
+
+
+def test_the_largest_kernel_is_compiled_first_and_the_rest_is_judged_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Pool, "_work", lambda self: None)  # nobody takes them but we
+    with Pool(1) as pool:
+        for size in (1, 4, 15):
+            pool.submit(cast(Kernel, SimpleNamespace(size=size, digest=str(size))), ())
+        assert pool.left_s == inf
+        taken = [cast(Any, pool._take())[0] for _ in range(3)]
+        assert [kernel.size for kernel in taken] == [15, 4, 1]
+        monkeypatch.setattr(pool, "_began_s", time.monotonic() - 30)
+        pool._finish(taken[0])
+        assert pool.left_s == pytest.approx(10, abs=1)
+        assert (pool.done, pool.total) == (1, 3)
