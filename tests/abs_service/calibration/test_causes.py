@@ -1,0 +1,105 @@
+"""What `calibrate verify` says has changed: distances and not a motion, and what these shots cannot tell apart."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from abs_service import cli
+from abs_service.calibration.cameras import verification
+from abs_service.calibration.files import rig_file, target_file
+from abs_service.calibration.shots.corner_extraction import BoardObservations
+from abs_service.commands.calibrate import calibrations
+from abs_service.report.content import Level, Report
+from abs_service.report.provenance import Provenance
+from calib.board.target import Chessboard
+from calib.camera import Camera
+from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+
+ORIGIN = Provenance("x", "2026-11-21")
+
+
+def verified(
+    stored: dict[str, Head], now: dict[str, Head], seed: int = 1, near: float = 0.6, far: float = 1.6
+) -> Report:
+    """Report on a calibration that knows `stored` heads, by ten shots of the heads as they are now."""
+    random = np.random.default_rng(seed)
+    seen = look(now, random_boards(10, random, near, far), random)
+    sensors = {
+        name: rig_file.SensorCalibration(
+            head.camera, residuals=rig_file.Residuals(corners_px=head.corner_sigma * np.sqrt(2))
+        )
+        for name, head in stored.items()
+    }
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    return verification.verify(known, BoardObservations(tuple(seen.corners), tuple(seen.planes)), ORIGIN)
+
+
+def aligned() -> dict[str, Head]:
+    color = three_heads()["color"]
+    return {"color": color, "depth": Head(color.camera, depth_sigma=0.004)}
+
+
+def test_an_aligned_depth_image_that_is_too_long_is_said_to_measure_wrongly() -> None:
+    heads = aligned()
+    report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)})
+    worst = report.verdicts[0]
+    assert (worst.level, worst.about) == (Level.BAD, "depth")
+    assert worst.text.startswith("measures distances wrongly, by +0.9")
+    assert "warm up" in worst.advice
+    assert not any("moved" in one.text or "no longer stand" in one.text for one in report.verdicts)
+
+
+def test_what_cannot_be_told_apart_is_said_with_the_shots_that_would() -> None:
+    heads = aligned()
+    report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)}, 0, 0.95, 1.05)
+    worst = report.verdicts[0]
+    assert "cannot tell that from this: depth measures distances wrongly, by +" in worst.text
+    assert worst.advice.startswith("To tell, show depth the board much nearer than 1.00 m")
+
+
+def test_a_rig_that_is_as_it_was_has_no_cause_named() -> None:
+    assert {one.level for one in verified(three_heads(), three_heads()).verdicts} == {Level.GOOD}
+
+
+def test_images_of_different_moments_are_told_from_a_sensor_that_moved() -> None:
+    random = np.random.default_rng(3)
+    heads = {name: head for name, head in three_heads().items() if name != "tof"}
+    boards = random_boards(10, random)
+    first = look({"light": heads["light"]}, boards, random)
+    for T_rb in boards.values():
+        T_rb[:3, 3] += random.normal(0, 0.006, 3)
+    late = look({"color": heads["color"]}, boards, random)
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    seen = BoardObservations((*first.corners, *late.corners), ())
+    report = verification.verify(rig_file.RigCalibration("lab", sensors, ORIGIN), seen, ORIGIN)
+    said = " ".join(one.text for one in report.verdicts)
+    assert "were not taken at the same moment" in said
+    assert "has moved" not in said
+    assert report.verdicts[0].level > Level.GOOD
+
+
+def test_a_realsense_board_is_measured_too_long_and_has_not_moved(
+    data_set: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Five views of a board in an aligned depth image that reads 0.6 to 1.5 % longer than the corners say."""
+    folder = data_set("realsense_checkerboard")
+    camera = Camera(848, 480, 617.0289198, 617.010437011, 422.6674499, 248.56015)
+    keys = "\n".join(f"{key} = {getattr(camera, key)}" for key in ("width", "height", "fx", "fy", "cx", "cy"))
+    (tmp_path / "camera.toml").write_text(f"[depth]\n{keys}\n[color]\n{keys}\n", encoding="utf-8")
+    target_file.write(Chessboard(9, 6, 0.02315), tmp_path / "board.toml")
+    take, stored = tmp_path / "take.mcap", tmp_path / "lab.toml"
+    options = f"--layout pairs --camera {tmp_path}/camera.toml --rate 1 --out {take}"
+    assert cli.main(["import", str(folder), *options.split()]) == 0
+    sensors = {name: rig_file.SensorCalibration(camera) for name in ("depth", "color")}
+    rig_file.write(rig_file.RigCalibration("lab", sensors, ORIGIN), stored)
+    capsys.readouterr()
+    code = cli.main(["calibrate", "verify", str(stored), str(take), "--target", str(tmp_path / "board.toml")])
+    said = capsys.readouterr().out
+    assert code == 2
+    assert "depth: measures distances wrongly, by +0.9" in said
+    assert "These shots cannot tell that from this: depth measures distances wrongly, by +4." in said
+    assert "no longer stand" not in said
+    assert calibrations.load(stored).sensors["depth"].depth_scale == 0
