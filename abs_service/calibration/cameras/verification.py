@@ -92,12 +92,16 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
 def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
     motion = max((_level(change) for change in found.changes if change.is_significant), default=Level.GOOD)
-    lasting = causes.verdicts(found.comparison, motion, found.reaches)
-    named = {one.about for one in lasting}
     fits = [_of_fit(name, fit, found.expected_px[name]) for name, fit in found.fits.items()]
-    said = [*lasting, *fits, *_of_scatter(found, max(one.level for one in fits))]
+    scatter = _of_scatter(found, max(one.level for one in fits))
+    # Shots that do not agree with each other say nothing of a change that lasts.
+    disagree = any(one.level == Level.BAD for one in scatter)
+    lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
+    named = {one.about for one in lasting}
+    said = [*lasting, *scatter, *fits]
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
-    said += [_of_pair(change, found.comparison) for change in found.changes if not _is_explained(change, found)]
+    changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
+    said += [_of_pair(change, found.comparison) for change in changes]
     said += [
         Verdict(Level.DOUBTFUL, "did not see the board, so nothing can be said of it.", "Show it the board too.", name)
         for name in found.unseen
