@@ -46,6 +46,11 @@ def pairs(changes: Sequence[PairChange], comparison: Comparison) -> list[Section
         for one in changes
     )  # fmt: skip
     text = "Motion of the second sensor of a pair relative to the first, and the uncertainty of both calibrations."
+    table = Table("Changes since the calibration, if they are motion", columns, rows)
+    return [Section("Pairs of sensors", (text, table)), _explanations(comparison)]
+
+
+def _explanations(comparison: Comparison) -> Section:
     best = comparison.explanations[0]
     explained = Table(
         "Explanations, the best first",
@@ -68,10 +73,7 @@ def pairs(changes: Sequence[PairChange], comparison: Comparison) -> list[Section
         f"to shot, corners scatter by {comparison.corners_m * 1e3:.2g} mm and distances by "
         f"{comparison.distances_m * 1e3:.2g} mm beyond their noise."
     )
-    return [
-        Section("Pairs of sensors", (text, Table("Changes since the calibration, if they are motion", columns, rows))),
-        Section("What has changed", (how, explained)),
-    ]
+    return Section("What has changed", (how, explained))
 
 
 def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
