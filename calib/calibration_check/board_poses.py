@@ -4,16 +4,14 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from calib import pose
 from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle import robust
-from calib.solve.bundle.adjustment import Adjustment, adjust, search
+from calib.solve.bundle.adjustment import Adjustment, adjust
 from calib.solve.bundle.formulation import Formulation, formulate, groups_of
-from calib.solve.bundle.layout import FreeParameters, Layout
+from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters, Layout
 from calib.solve.bundle.lens_parameters import kind_of
 from calib.solve.bundle.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
@@ -22,29 +20,20 @@ from calib.solve.start.board_poses import pose_candidates
 
 def solve(stored: Stored, views: Views, moving: Collection[str]) -> Adjustment:
     """Board poses and the poses of `moving` sensors, with estimated deviations."""
-    formulation = _formulation(stored, views, moving)
-    count = len(groups_of(formulation.task))
-    return adjust(formulation, _start(stored, views), count, lambda _: None)
+    equations = formulation(stored, views, moving)
+    count = len(groups_of(equations.task))
+    return adjust(equations, _start(stored, views), count, lambda _: None)
 
 
-def cost(stored: Stored, views: Views, moving: Collection[str], factors: tuple[float, ...]) -> float:
-    """Minimum robust cost with free poses of `moving` sensors and given deviation factors."""
-    formulation = _formulation(stored, views, moving)
-    found = search(formulation(_start(stored, views), factors))
-    equations = formulation(found, factors)
-    return float(np.sum(loss(equations.residuals(np.zeros(equations.layout.size)))))
-
-
-def loss(residuals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Soft-L1 loss, as in the optimisation."""
-    return 2 * robust.SOFT_L1_SCALE**2 * (np.sqrt(1 + (residuals / robust.SOFT_L1_SCALE) ** 2) - 1)
-
-
-def _formulation(stored: Stored, views: Views, moving: Collection[str]) -> Formulation:
+def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = ()) -> Formulation:
+    """Equations with free boards, free poses of `moving` sensors, and free depth terms of `depth` sensors."""
     names = list(views.shots)
     sensors = {name: _task(stored.sensors[name].camera) for name in names}
     whole = formulate(Task(sensors, views.corners, views.planes, names[0]))
-    free_parameters = {name: FreeParameters(sensors[name].lens, (), name in moving) for name in names}
+    free_parameters = {
+        name: FreeParameters(sensors[name].lens, (), name in moving, DEPTH_TERMS if name in depth else ())
+        for name in names
+    }
     return replace(whole, layout=Layout(free_parameters, whole.layout.shots))
 
 

@@ -1,120 +1,105 @@
-"""Fit of each stored camera to its own corners, and hypotheses about a sensor that moved."""
+"""What may have happened to a rig since its calibration, as directions of change of its sensors."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 
-from calib.calibration_check.board_poses import cost, loss, solve
-from calib.calibration_check.changes import MIN_SHOTS
-from calib.calibration_check.stored import Stored, Views
-from calib.solve.bundle import robust
-from calib.solve.start.board_poses import pose_candidates
+from calib.calibration_check.stored import Stored
+from calib.camera import Camera
+from calib.solve.bundle.layout import DEPTH_TERMS, POSE
 
-#: A sensor is a suspect if its motion explains this share of the excess cost …
-EXPLAINS = 0.9
-
-#: … and the remaining cost is at most this many times that of the best hypothesis.
-RIVAL = 4.0
+#: Deviations of what happens to a sensor: moved by 0.1 rad and 0.1 m, distances changed by 5 cm and 5 %.
+PRIOR: Mapping[str, float] = dict(zip((*POSE, *DEPTH_TERMS), (0.1,) * 6 + (0.05, 0.05), strict=True))
 
 
-@dataclass(frozen=True)
-class CornerFit:
-    """Residuals of a stored camera on its own corners, with free board poses.
+class Kind(Enum):
+    """Kinds of change."""
 
-    Attributes:
-        pixels, residuals: of the corners (n, 2) [px]; predicted minus measured.
-        views: number of views.
-    """
-
-    pixels: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    views: int
-
-    @property
-    def rms(self) -> float:
-        """Root mean square reprojection error [px] without gross errors."""
-        squares = np.sum(self.residuals**2, axis=1)
-        return float(np.sqrt(np.mean(squares[squares <= robust.OUTLIER**2 * np.median(squares)])))
+    UNCHANGED = "unchanged"
+    MOVED = "moved"
+    ALIGNMENT = "alignment"
+    SCALE = "depth scale"
+    OFFSET = "depth offset"
+    BOTH = "depth scale and offset"
+    SEVERAL = "several changes"
 
 
-def corner_fit(stored: Stored, views: Views, sensor: str) -> CornerFit:
-    """Residuals of one sensor that detects corners."""
-    own = Views([view for view in views.corners if view.sensor == sensor], ())
-    adjusted = solve(stored, own, ())
-    group = adjusted.equations.groups[0]
-    residuals = (adjusted.residuals.reshape(-1, 2)) * group.measured.sigmas[:, None]
-    return CornerFit(group.measured.pixels, residuals, len(own.corners))
+#: Terms of distances that each kind changes.
+TERMS = {
+    Kind.SCALE: ("depth_scale",),
+    Kind.OFFSET: ("depth_offset",),
+    Kind.BOTH: ("depth_scale", "depth_offset"),
+}
 
 
 @dataclass(frozen=True)
-class DistanceBias:
-    """Mean difference between a sensor's measured distances and those derived from its corners.
+class Hypothesis:
+    """One thing that may have happened.
 
     Attributes:
-        mean: over the views [m].
-        sigma: standard error of the mean, from the scatter of the views [m].
-        views: number of views.
+        kind: what.
+        sensors: to which; several that move together, or none.
+        columns: changes that it allows, by position in the names of all changes; those of sensors that move together
+            are rows, otherwise there is one row.
     """
 
-    mean: float
-    sigma: float
-    views: int
+    kind: Kind
+    sensors: tuple[str, ...] = ()
+    columns: tuple[tuple[int, ...], ...] = ()
+
+    def basis(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Changes (n, k) of all names by one prior deviation of each of its parameters."""
+        found = np.zeros((len(names), len(self.columns[0]) if self.columns else 0))
+        for own in self.columns:
+            for parameter, column in enumerate(own):
+                found[column, parameter] = PRIOR[names[column].rpartition(".")[2]]
+        return found
 
 
-def distance_bias(stored: Stored, views: Views, sensor: str) -> DistanceBias | None:
-    """Bias of a sensor with corners and distances in the same shots; None with fewer than three."""
-    corners = [view for view in views.corners if view.sensor == sensor]
-    boards = {view.shot: pose_candidates(stored.sensors[sensor].camera, view) for view in corners}
-    state = stored.sensors[sensor]
-    excesses: list[float] = []
-    for view in views.planes:
-        if view.sensor == sensor and boards.get(view.shot):
-            T_sb = boards[view.shot][0].T_sb
-            directions = replace(state.camera, T_rs=np.eye(4)).directions(view.pixels)
-            true = (T_sb[:3, 2] @ T_sb[:3, 3]) / (directions @ T_sb[:3, 2])
-            predicted = (1 + state.depth_scale) * true + state.depth_offset
-            excesses.append(float(np.median(view.distances - predicted)))
-    if len(excesses) < MIN_SHOTS:
-        return None
-    return DistanceBias(
-        float(np.mean(excesses)), float(np.std(excesses, ddof=1) / np.sqrt(len(excesses))), len(excesses)
+def hypotheses(stored: Stored, names: Sequence[str]) -> list[Hypothesis]:
+    """All hypotheses, from nothing changed to everything.
+
+    A depth image that was aligned to another sensor's image has the camera of that sensor: the two cannot move apart,
+    but the alignment may be wrong, and they move together.
+
+    Args:
+        stored: the calibration.
+        names: of the changes that the views can show, such as `tof.x`.
+    """
+    sensors = [*dict.fromkeys(name.rpartition(".")[0] for name in names)]
+    found = [Hypothesis(Kind.UNCHANGED)]
+    bodies = _bodies(stored, sensors)
+    if len(bodies) > 1:
+        found += [_hypothesis(Kind.MOVED, body, POSE, names) for body in bodies]
+    for body in bodies:
+        found += [_hypothesis(Kind.ALIGNMENT, (name,), POSE, names) for name in body[1:]]
+    for name in sensors:
+        if f"{name}.depth_scale" in names:
+            found += [_hypothesis(kind, (name,), terms, names) for kind, terms in TERMS.items()]
+    return [*found, Hypothesis(Kind.SEVERAL, tuple(sensors), (tuple(range(len(names))),))]
+
+
+def _hypothesis(kind: Kind, sensors: tuple[str, ...], terms: Sequence[str], names: Sequence[str]) -> Hypothesis:
+    return Hypothesis(kind, sensors, tuple(tuple(names.index(f"{name}.{term}") for term in terms) for name in sensors))
+
+
+def _bodies(stored: Stored, sensors: Sequence[str]) -> list[tuple[str, ...]]:
+    """Sensors that share a camera and a pose, together; first those with corners, as in the names."""
+    bodies: list[tuple[str, ...]] = []
+    for name in sensors:
+        same = [body for body in bodies if _is_same(stored.sensors[body[0]].camera, stored.sensors[name].camera)]
+        if same:
+            bodies[bodies.index(same[0])] = (*same[0], name)
+        else:
+            bodies.append((name,))
+    return bodies
+
+
+def _is_same(one: Camera, other: Camera) -> bool:
+    keys = ("width", "height", "fx", "fy", "cx", "cy")
+    return all(getattr(one, key) == getattr(other, key) for key in keys) and np.allclose(
+        one.T_rs, other.T_rs, atol=1e-6
     )
-
-
-@dataclass(frozen=True)
-class MotionHypothesis:
-    """Result of the hypothesis that one sensor moved.
-
-    Attributes:
-        share: motion_hypotheses share of the excess cost, 0…1.
-        left: remaining cost, in squared deviations; chi-squared with 6 degrees of freedom for each sensor but two, if
-            this sensor is the only one that moved and the others are exactly as stored.
-    """
-
-    share: float
-    left: float
-
-
-def motion_hypotheses(stored: Stored, views: Views) -> dict[str, MotionHypothesis]:
-    """Result of each hypothesis, by sensor.
-
-    All hypotheses are compared with the same deviations: those estimated with all poses free.
-    """
-    names = list(views.shots)
-    everything = solve(stored, views, names[1:])
-    least = float(np.sum(loss(everything.residuals)))
-    gap = max(cost(stored, views, (), everything.factors) - least, 1e-12)
-    left = {name: max(cost(stored, views, (name,), everything.factors) - least, 0.0) for name in names}
-    return {name: MotionHypothesis(float(np.clip(1 - one / gap, 0, 1)), one) for name, one in left.items()}
-
-
-def moved_candidates(explanations: Mapping[str, MotionHypothesis]) -> list[str]:
-    """Sensors that may be the one that moved; none if no single motion explains the residuals."""
-    if not explanations:
-        return []
-    chance = float(stats.chi2.ppf(0.999, 6 * max(len(explanations) - 2, 1)))
-    best = min(one.left for one in explanations.values())
-    return [name for name, one in explanations.items() if one.share >= EXPLAINS and one.left <= RIVAL * best + chance]

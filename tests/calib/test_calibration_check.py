@@ -6,14 +6,10 @@ import numpy as np
 import pytest
 
 from calib import pose
+from calib.calibration_check.alone import corner_fit, distance_bias
 from calib.calibration_check.changes import pair_changes
-from calib.calibration_check.hypotheses import (
-    MotionHypothesis,
-    corner_fit,
-    distance_bias,
-    motion_hypotheses,
-    moved_candidates,
-)
+from calib.calibration_check.comparison import Comparison, compare
+from calib.calibration_check.hypotheses import Kind
 from calib.calibration_check.stored import CalibrationCheckError, Stored, Views, usable
 from calib.camera import Camera
 from calib.solve.bundle.layout import POSE
@@ -63,17 +59,101 @@ def test_the_sensor_that_moved_is_named_with_how_far(sensor: str) -> None:
         if one.second == sensor:
             np.testing.assert_allclose(one.turn, turn, atol=6e-4)
             np.testing.assert_allclose(one.move, move, atol=1e-3)
-    explanations = motion_hypotheses(before, views)
-    assert moved_candidates(explanations) == [sensor]
-    assert explanations[sensor].share > 0.95
+    found = compare(before, views)
+    assert named(found) == (Kind.MOVED, (sensor,))
+    assert found.rivals == []
+    np.testing.assert_allclose(found.chosen.values, (*turn, *move), atol=1e-3)
 
 
 def test_two_sensors_cannot_tell_which_of_them_moved() -> None:
     heads = {name: head for name, head in three_heads().items() if name != "tof"}
     before = Stored({name: SensorState(head.camera) for name, head in heads.items()})
     heads["color"] = replace(heads["color"], camera=moved(heads["color"].camera, (0, 0, 0), (0.01, 0, 0)))
-    assert moved_candidates(motion_hypotheses(before, seen(heads, 12))) == ["light", "color"]
-    assert moved_candidates({"a": MotionHypothesis(0.5, 1e4), "b": MotionHypothesis(0.6, 9e3)}) == []
+    found = compare(before, seen(heads, 12))
+    assert {named(found), *rivals(found)} == {(Kind.MOVED, ("light",)), (Kind.MOVED, ("color",))}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_that_changed_is_named_as_nothing(seed: int) -> None:
+    heads = three_heads()
+    assert named(compare(stored(heads), seen(heads, seed))) == (Kind.UNCHANGED, ())
+
+
+@pytest.mark.parametrize(
+    ("terms", "kind", "value"),
+    [({"depth_scale": 0.01}, Kind.SCALE, 0.01), ({"depth_offset": 0.008}, Kind.OFFSET, 0.008)],
+)
+def test_distances_that_changed_are_no_motion(terms: dict[str, float], kind: Kind, value: float) -> None:
+    heads = three_heads()
+    before = stored(heads)
+    heads["tof"] = replace(heads["tof"], **terms)
+    found = compare(before, seen(heads, 3, 10))
+    assert named(found) == (kind, ("tof",))
+    assert abs(found.chosen.values[0] - value) < 4 * found.chosen.sigmas[0] < 0.1 * value
+
+
+def aligned() -> dict[str, Head]:
+    """A colour camera, and a depth image that was aligned to it: a sensor with its camera and no image of its own."""
+    color = three_heads()["color"]
+    return {"color": color, "depth": Head(color.camera, depth_sigma=0.004)}
+
+
+def test_an_aligned_depth_image_that_is_too_long_has_not_moved() -> None:
+    heads = aligned()
+    before = Stored({name: SensorState(head.camera) for name, head in heads.items()})
+    heads["depth"] = replace(heads["depth"], depth_scale=0.01)
+    found = compare(before, seen(heads, 1, 10))
+    assert named(found) == (Kind.SCALE, ("depth",))
+    assert found.chosen.values[0] == pytest.approx(0.01, abs=5e-4)
+
+
+def test_shots_at_one_distance_cannot_tell_a_scale_from_an_offset() -> None:
+    random = np.random.default_rng(0)
+    heads = aligned()
+    before = Stored({name: SensorState(head.camera) for name, head in heads.items()})
+    heads["depth"] = replace(heads["depth"], depth_scale=0.01)
+    near = look(heads, random_boards(10, random, 0.95, 1.05), random)
+    found = compare(before, Views(near.corners, near.planes))
+    assert {named(found), *rivals(found)} == {(Kind.SCALE, ("depth",)), (Kind.OFFSET, ("depth",))}
+
+
+def test_a_wrong_alignment_is_told_from_wrong_distances() -> None:
+    heads = aligned()
+    before = Stored({name: SensorState(head.camera) for name, head in heads.items()})
+    heads["depth"] = replace(heads["depth"], camera=moved(heads["depth"].camera, (0.004, -0.003, 0), (0.003, 0, 0)))
+    found = compare(before, seen(heads, 1, 10))
+    assert named(found) == (Kind.ALIGNMENT, ("depth",))
+
+
+def test_two_changes_are_no_single_one() -> None:
+    heads = three_heads()
+    before = stored(heads)
+    for name in ("light", "color"):
+        heads[name] = replace(heads[name], camera=moved(heads[name].camera, (0.003, 0, 0), (0.004, 0, 0)))
+    heads["tof"] = replace(heads["tof"], depth_scale=0.02)
+    found = compare(before, seen(heads, 2, 10))
+    assert found.chosen.hypothesis.kind == Kind.SEVERAL
+
+
+def test_shots_that_were_not_taken_at_the_same_moment_are_scatter_and_no_motion() -> None:
+    random = np.random.default_rng(0)
+    heads = three_heads()
+    boards = random_boards(10, random)
+    first = look({name: heads[name] for name in ("tof", "light")}, boards, random)
+    for T_rb in boards.values():
+        T_rb[:3, 3] += random.normal(0, 0.005, 3)
+    late = look({"color": heads["color"]}, boards, random)
+    found = compare(stored(heads), Views([*first.corners, *late.corners], first.planes))
+    assert named(found) == (Kind.UNCHANGED, ())
+    assert found.corners_m > 1e-3
+
+
+def named(found: Comparison) -> tuple[Kind, tuple[str, ...]]:
+    return found.chosen.hypothesis.kind, found.chosen.hypothesis.sensors
+
+
+def rivals(found: Comparison) -> list[tuple[Kind, tuple[str, ...]]]:
+    return [(each.hypothesis.kind, each.hypothesis.sensors) for each in found.rivals]
 
 
 def test_a_stored_calibration_that_was_uncertain_does_not_count_as_moved() -> None:

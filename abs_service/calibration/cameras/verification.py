@@ -1,26 +1,22 @@
 """Verification of a stored calibration against new views of a board, as a report in plain words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from abs_service.calibration.cameras import causes
 from abs_service.calibration.cameras import verification_tables as tables
+from abs_service.calibration.cameras.causes import UNNOTICED_M, WRONG_M, Reach
 from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
 from calib.board.views import PlaneView
+from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
 from calib.calibration_check.changes import PairChange, pair_changes
-from calib.calibration_check.hypotheses import (
-    CornerFit,
-    DistanceBias,
-    MotionHypothesis,
-    corner_fit,
-    distance_bias,
-    motion_hypotheses,
-    moved_candidates,
-)
+from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
+from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.state import SensorState
 
@@ -42,8 +38,8 @@ UNNOTICED_PX, SPOILT_PX = 0.3, 1.0
 #: Insignificant shift that is too large for a verdict: too few views [px].
 BLIND_PX = 2.0
 
-#: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
-UNNOTICED_M, WRONG_M = 0.002, 0.01
+#: Scatter of images from shot to shot that is more than lenses leave, and that is unacceptable [px].
+SCATTERS_PX, SPOILS_PX = 1.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -52,18 +48,22 @@ class Verification:
 
     Attributes:
         fits: residuals of sensors with corners, by sensor.
+        focal_px: their focal lengths.
         expected_px: their reprojection errors at calibration.
         biases: distance bias of sensors with corners and distances.
         changes: relative motion of all pairs.
-        explanations: hypotheses about a moved sensor; empty if nothing moved.
+        comparison: explanations of the shots; `NOT_COMPARED` without two sensors that saw the board together.
+        reaches: distances of the boards that sensors measured.
         unseen: sensors without views.
     """
 
     fits: Mapping[str, CornerFit]
+    focal_px: Mapping[str, float]
     expected_px: Mapping[str, float]
     biases: Mapping[str, DistanceBias]
     changes: tuple[PairChange, ...]
-    explanations: Mapping[str, MotionHypothesis]
+    comparison: Comparison
+    reaches: Mapping[str, Reach]
     unseen: tuple[str, ...]
 
 
@@ -82,19 +82,26 @@ def verify(known: RigCalibration, seen: BoardObservations, provenance: Provenanc
     found = _found(known, seen)
     sections = [
         tables.sensors(found.fits, found.expected_px, found.biases),
-        *tables.pairs(found.changes, found.explanations),
+        *tables.pairs(found.changes, found.comparison),
     ]
     sections += [tables.fields(known, found.fits), *tables.refusals(seen)]
-    values = tables.values(found.fits, found.biases, found.changes, found.explanations)
+    values = tables.values(found.fits, found.biases, found.changes, found.comparison)
     return Report(f"Verification of {known.name}", provenance, tuple(verdicts(found)), tuple(sections), values)
 
 
 def verdicts(found: Verification) -> list[Verdict]:
     """Verdicts, the worst first."""
-    said = [_moved(found)] if found.explanations else []
-    said += [_of_fit(name, fit, found.expected_px[name]) for name, fit in found.fits.items()]
-    said += [_of_bias(name, bias) for name, bias in found.biases.items()]
-    said += [_of_pair(change) for change in found.changes]
+    motion = max((_level(change) for change in found.changes if change.is_significant), default=Level.GOOD)
+    fits = [_of_fit(name, fit, found.expected_px[name]) for name, fit in found.fits.items()]
+    scatter = _of_scatter(found, max(one.level for one in fits))
+    # Shots that do not agree with each other say nothing of a change that lasts.
+    disagree = any(one.level == Level.BAD for one in scatter)
+    lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
+    named = {one.about for one in lasting}
+    said = [*lasting, *scatter, *fits]
+    said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
+    changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
+    said += [_of_pair(change, found.comparison) for change in changes]
     said += [
         Verdict(Level.DOUBTFUL, "did not see the board, so nothing can be said of it.", "Show it the board too.", name)
         for name in found.unseen
@@ -116,16 +123,35 @@ def _found(known: RigCalibration, seen: BoardObservations) -> Verification:
     seeing = dict.fromkeys(view.sensor for view in views.corners)
     biases = {name: distance_bias(stored, views, name) for name in seeing}
     changes = tuple(pair_changes(stored, views))
-    is_alarming = any(_level(change) > Level.GOOD and change.is_significant for change in changes)
     usual = {name: known.sensors[name].residuals.corners_px for name in seeing}
     return Verification(
         {name: corner_fit(stored, views, name) for name in seeing},
+        {name: sensors[name].camera.fx for name in seeing},
         {name: USUAL_PX if px is None else px for name, px in usual.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
         changes,
-        motion_hypotheses(stored, views) if is_alarming else {},
+        _compared(stored, views, changes),
+        _reaches(views),
         tuple(name for name in sensors if name not in views.shots),
     )
+
+
+def _compared(stored: Stored, views: Views, changes: Sequence[PairChange]) -> Comparison:
+    """Explanations of the sensors that saw the board together, from the first pair on."""
+    together: set[str] = set()
+    for _ in changes:
+        for change in changes:
+            if not together or together & {change.first, change.second}:
+                together |= {change.first, change.second}
+    shots = [number for name in together for number in views.shots[name]]
+    return compare(stored, views.of(together, shots)) if together else NOT_COMPARED
+
+
+def _reaches(views: Views) -> dict[str, Reach]:
+    found: dict[str, list[float]] = {}
+    for view in views.planes:
+        found.setdefault(view.sensor, []).append(float(np.median(view.distances)))
+    return {name: Reach(min(distances), max(distances)) for name, distances in found.items()}
 
 
 def _ours(seen: BoardObservations, sensors: Mapping[str, SensorState]) -> Views:
@@ -175,7 +201,7 @@ def _level(change: PairChange) -> Level:
     return Level.BAD if change.shift_px > SPOILT_PX else Level.DOUBTFUL
 
 
-def _of_pair(change: PairChange) -> Verdict:
+def _of_pair(change: PairChange, comparison: Comparison) -> Verdict:
     about, level = f"{change.first} and {change.second}", _level(change)
     said = (
         f"{_how_far(change)}, which shifts pictures by {change.shift_px:.2f} px; {change.sigma_px:.2f} px are chance."
@@ -185,27 +211,32 @@ def _of_pair(change: PairChange) -> Verdict:
         return Verdict(level, f"could not be compared well enough: {said}", advice, about)
     if level == Level.GOOD:
         return Verdict(level, f"stand as they were calibrated: {said}", about=about)
+    if comparison.chosen.hypothesis.kind == Kind.UNCHANGED:
+        text = f"contradict each other, though no change of a sensor predicts the shots better than none: {said}"
+        return Verdict(Level.DOUBTFUL, text, "Take more shots, each with the board held still.", about)
     return Verdict(level, f"no longer stand as they were calibrated: {said}", "Calibrate the rig again.", about)
+
+
+def _is_explained(change: PairChange, found: Verification) -> bool:
+    """True if a pair contradicts itself because the distances of one of them changed."""
+    chosen = found.comparison.chosen.hypothesis
+    return change.is_significant and chosen.kind in TERMS and bool({*chosen.sensors} & {change.first, change.second})
+
+
+def _of_scatter(found: Verification, worst_fit: Level) -> list[Verdict]:
+    """Verdict on images that fit alone and, from shot to shot, not together; at most one."""
+    seeing = [name for name in found.fits if any(name in {one.first, one.second} for one in found.changes)]
+    scatter_m = np.sqrt(2) * found.comparison.corners_m
+    shift_px = max((found.focal_px[name] for name in seeing), default=0.0) * scatter_m / found.comparison.distance_m
+    if len(seeing) < 2 or worst_fit > Level.GOOD or shift_px < SCATTERS_PX:
+        return []
+    text = (
+        f"{', '.join(seeing)}: each fits its own corners, but they see the board {scatter_m * 1e3:.1f} mm apart "
+        f"({shift_px:.1f} px), elsewhere in each shot: the images of a shot were not taken at the same moment."
+    )
+    level = Level.BAD if shift_px > SPOILS_PX else Level.DOUBTFUL
+    return [Verdict(level, text, "Hold the board still in every shot, or synchronise the sensors.")]
 
 
 def _how_far(change: PairChange) -> str:
     return f"{np.linalg.norm(change.move) * 1e3:.1f} mm and {np.rad2deg(np.linalg.norm(change.turn)):.2f}°"
-
-
-def _moved(found: Verification) -> Verdict:
-    """Verdict on the sensor that moved."""
-    worst = max(found.changes, key=lambda change: _level(change) * change.is_significant)
-    level = _level(worst)
-    able = moved_candidates(found.explanations)
-    if len(able) == 1:
-        (name,) = able
-        mine = max((one for one in found.changes if name in {one.first, one.second}), key=lambda one: one.squared)
-        share = found.explanations[name].share
-        text = f"has moved, by {_how_far(mine)}: that alone explains {share:.0%} of what no longer fits."
-        return Verdict(level, text, "Put it back and fix it, or calibrate the rig again.", name)
-    if len(able) > 1:
-        text = f"One of {', '.join(able)} has moved; these views cannot tell which, since each would explain them."
-        advice = "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
-        return Verdict(level, text, advice)
-    text = "More than one sensor has moved, or a camera has changed: no single one explains what no longer fits."
-    return Verdict(level, text, "Calibrate the rig again.")

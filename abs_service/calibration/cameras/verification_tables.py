@@ -10,8 +10,9 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report import figures
 from abs_service.report.content import Column, Section, Table, drawing
+from calib.calibration_check.alone import CornerFit, DistanceBias
 from calib.calibration_check.changes import PairChange
-from calib.calibration_check.hypotheses import CornerFit, DistanceBias, MotionHypothesis
+from calib.calibration_check.comparison import Comparison
 
 
 def sensors(
@@ -29,8 +30,8 @@ def sensors(
     return Section("Each sensor alone", (text, Table("Reprojection errors of the stored cameras", columns, rows)))
 
 
-def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypothesis]) -> list[Section]:
-    """Tables of relative motion and of hypotheses; empty without pairs."""
+def pairs(changes: Sequence[PairChange], comparison: Comparison) -> list[Section]:
+    """Tables of relative motion and of explanations; empty without pairs."""
     if not changes:
         return []
     columns = (
@@ -45,15 +46,34 @@ def pairs(changes: Sequence[PairChange], explanations: Mapping[str, MotionHypoth
         for one in changes
     )  # fmt: skip
     text = "Motion of the second sensor of a pair relative to the first, and the uncertainty of both calibrations."
-    found = [Section("Pairs of sensors", (text, Table("Changes since the calibration", columns, rows)))]
-    if explanations:
-        freed = Table(
-            "Share of the contradictions that go away",
-            (Column("sensor set free"), Column("explains", "%", ".1f"), Column("left", "σ²", ".4g")),
-            tuple((name, 100 * one.share, one.left) for name, one in explanations.items()),
-        )
-        found.append(Section("Sensor that moved", ("One sensor at a time may move, all others stay as stored.", freed)))
-    return found
+    table = Table("Changes since the calibration, if they are motion", columns, rows)
+    return [Section("Pairs of sensors", (text, table)), _explanations(comparison)]
+
+
+def _explanations(comparison: Comparison) -> Section:
+    best = comparison.explanations[0]
+    explained = Table(
+        "Explanations, the best first",
+        (
+            Column("what"), Column("sensor"), Column("parameters"), Column("predicts worse by", "nats", ".1f"),
+            Column("out"),
+        ),
+        tuple(
+            (
+                one.hypothesis.kind.value, ", ".join(one.hypothesis.sensors), len(one.values),
+                float(best.scores.sum() + best.stored - one.scores.sum() - one.stored),
+                "yes" if best.beats(one) else "no",
+            )
+            for one in comparison.explanations
+        ),
+    )  # fmt: skip
+    how = (
+        "Each shot is predicted from all others; an explanation that predicts worse by more than 3 nats and by two "
+        "standard errors over the shots is out. Of the others the one with the fewest parameters is named. From shot "
+        f"to shot, corners scatter by {comparison.corners_m * 1e3:.2g} mm and distances by "
+        f"{comparison.distances_m * 1e3:.2g} mm beyond their noise."
+    )
+    return Section("What has changed", (how, explained))
 
 
 def fields(known: RigCalibration, fits: Mapping[str, CornerFit]) -> Section:
@@ -82,7 +102,7 @@ def values(
     fits: Mapping[str, CornerFit],
     biases: Mapping[str, DistanceBias],
     changes: Sequence[PairChange],
-    explanations: Mapping[str, MotionHypothesis],
+    comparison: Comparison,
 ) -> dict[str, Any]:
     """Machine-readable values."""
     return {
@@ -96,7 +116,15 @@ def values(
             }
             for one in changes
         ],
-        "explained_by": {name: one.share for name, one in explanations.items()},
+        "explanations": [
+            {
+                "kind": one.hypothesis.kind.value, "sensors": list(one.hypothesis.sensors), "values": one.values,
+                "sigmas": one.sigmas, "score": float(one.scores.sum() + one.stored),
+                "possible": not comparison.explanations[0].beats(one),
+            }
+            for one in comparison.explanations
+        ],
+        "scatter_m": {"corners": comparison.corners_m, "distances": comparison.distances_m},
     }  # fmt: skip
 
 

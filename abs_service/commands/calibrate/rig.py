@@ -2,12 +2,15 @@
 
   abs-service calibrate rig take.mcap --target target.toml --out lab.calibration.toml
   abs-service calibrate rig take.mcap --target target.toml --keep tof --depth-terms tof=offset --out l.toml
+  abs-service calibrate rig take.mcap --target target.toml --keep color --reference color --fixed-pose depth \
+      --depth-terms depth=scale --out l.toml                                                  aligned depth
   abs-service calibrate rig rig.toml --target target.toml --out lab.calibration.toml          live, 30 different views
   abs-service calibrate rig --images left='l*.png' --images right='r*.png' --target target.toml --out p.toml
 
 Corners in colour, infrared and amplitude images and the distances that depth sensors measure on the board are explained
-together. Sensors named with --keep keep the intrinsics of the device or of --start. With --depth-terms an offset, a
-scale or both of a sensor's distances are found; with --free-running the offset of its clock, which needs a board that
+together. Sensors named with --keep keep the intrinsics of the device or of --start, those named with --fixed-pose their
+pose to the reference, such as a depth image that the device aligned to its colour image. With --depth-terms an offset,
+a scale or both of a sensor's distances are found; with --free-running the offset of its clock, which needs a board that
 moves.
 Beside the calibration FILE its covariances are written, and a report as FILE.html and FILE.json.
 
@@ -32,6 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     solving.add_arguments(parser)
     parser.add_argument("--keep", metavar="NAME", action="append", default=[], help="keep its intrinsics; repeatable")
     parser.add_argument(
+        "--fixed-pose", metavar="NAME", action="append", default=[], help="keep its pose to the reference; repeatable"
+    )
+    parser.add_argument(
         "--depth-terms", metavar="NAME=TERMS", action="append", default=[], help=f"{', '.join(TERMS)}; repeatable"
     )
     parser.add_argument(
@@ -53,6 +59,7 @@ def _solve(arguments: argparse.Namespace) -> int:
     terms = solving.named(arguments.depth_terms, "--depth-terms")
     for option, names in (
         ("--keep", arguments.keep),
+        ("--fixed-pose", arguments.fixed_pose),
         ("--free-running", arguments.free_running),
         ("--depth-terms", terms),
         ("--reference", [arguments.reference] if arguments.reference else []),
@@ -68,6 +75,7 @@ def _solve(arguments: argparse.Namespace) -> int:
             arguments,
             found,
             keeps=name in arguments.keep or name not in with_corners,
+            fixed_pose=name in arguments.fixed_pose,
             depth_terms=TERMS[terms[name]] if name in terms else (),
             free_running=name in arguments.free_running,
         )

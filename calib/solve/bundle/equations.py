@@ -13,7 +13,7 @@ from calib.lenses.lens import LensError
 from calib.solve.bundle import motion, rotations
 from calib.solve.bundle.blocks import Corners, JacobianBlocks, Planes
 from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Layout
-from calib.solve.bundle.lens_parameters import MATRIX, PRIOR_SIGMA
+from calib.solve.bundle.lens_parameters import MATRIX
 from calib.solve.bundle.motion import ShotPoses, ViewPoses
 from calib.solve.bundle.state import State
 
@@ -81,7 +81,7 @@ class Equations:
         boards = self._boards(increments)
         blocks = [self._rows(group, state, boards, increments) for group in self.groups]
         count = len(self._regularized_columns)
-        regularized = (np.full(count, 1 / PRIOR_SIGMA), (np.arange(count), self._regularized_columns))
+        regularized = (1 / self._prior_sigmas, (np.arange(count), self._regularized_columns))
         return sparse.csr_array(
             sparse.vstack([*blocks, sparse.csr_array(regularized, shape=(count, self.layout.size))])
         )
@@ -94,19 +94,23 @@ class Equations:
     @cached_property
     def _regularized_columns(self) -> NDArray[np.intp]:
         """Columns of the regularised parameters."""
-        regularized = [
-            self.layout.columns(name, free.regularized) for name, free in self.layout.free_parameters.items()
-        ]
-        return np.concatenate(regularized)
+        columns = [self.layout.columns(name, [*free.priors]) for name, free in self.layout.free_parameters.items()]
+        return np.concatenate(columns)
+
+    @cached_property
+    def _prior_sigmas(self) -> NDArray[np.float64]:
+        return np.array([sigma for free in self.layout.free_parameters.values() for sigma in free.priors.values()])
 
     def _regularized(self, state: State) -> NDArray[np.float64]:
         """Normalised values of the regularised parameters; appended to the residuals of the groups."""
         values = [
-            state.sensors[name].camera.lens.coefficients[free.kind.every.index(each)]
+            getattr(state.sensors[name], each)
+            if each in DEPTH_TERMS
+            else state.sensors[name].camera.lens.coefficients[free.kind.every.index(each)]
             for name, free in self.layout.free_parameters.items()
-            for each in free.regularized
+            for each in free.priors
         ]
-        return np.array(values) / PRIOR_SIGMA
+        return np.array(values) / self._prior_sigmas
 
     def slices(self) -> list[slice]:
         """Rows of every group."""

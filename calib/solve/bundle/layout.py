@@ -14,11 +14,15 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle.lens_parameters import MATRIX, LensKind
+from calib.solve.bundle.lens_parameters import MATRIX, PRIOR_SIGMA, LensKind
 from calib.solve.bundle.state import SensorState, State
 
 POSE = ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
 DEPTH_TERMS = ("depth_offset", "depth_scale")
+
+#: Deviations of depth terms from zero [m, 1]: far more than a working depth camera's, so that they only hold what the
+#: shots do not.
+DEPTH_PRIORS: Mapping[str, float] = {"depth_offset": 0.05, "depth_scale": 0.05}
 
 
 @dataclass(frozen=True)
@@ -40,9 +44,10 @@ class FreeParameters:
     free_running: bool = False
 
     @property
-    def regularized(self) -> tuple[str, ...]:
-        """Free parameters with a prior around zero."""
-        return tuple(name for name in self.kind.regularized if name in self.intrinsics)
+    def priors(self) -> Mapping[str, float]:
+        """Standard deviations of the free parameters that have a prior around zero."""
+        lens = {name: PRIOR_SIGMA for name in self.kind.regularized if name in self.intrinsics}
+        return lens | {name: DEPTH_PRIORS[name] for name in self.depth}
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ class SensorTask:
         lens: kind of lens to fit.
         factory: initial or fixed camera; empty if unknown, otherwise one.
         fixed_intrinsics: True if the intrinsics are fixed.
+        fixed_pose: True if the pose in the rig is, as of a depth image that was aligned to another sensor's image.
         depth_terms: those of `DEPTH_TERMS` that are estimated.
         free_running: True if its clock has an unknown offset (free-running sensor).
     """
@@ -31,12 +32,13 @@ class SensorTask:
     lens: LensKind = BROWN_CONRADY
     factory: tuple[Camera, ...] = ()
     fixed_intrinsics: bool = False
+    fixed_pose: bool = False
     depth_terms: tuple[str, ...] = ()
     free_running: bool = False
 
     def __post_init__(self) -> None:
-        if self.fixed_intrinsics and not self.factory:
-            raise TaskError("intrinsics can be kept only where a calibration to keep is given")
+        if (self.fixed_intrinsics or self.fixed_pose) and not self.factory:
+            raise TaskError("intrinsics and poses can be kept only where a calibration to keep is given")
         unknown = set(self.depth_terms) - set(DEPTH_TERMS)
         if unknown:
             raise TaskError(f"depth terms must be of {', '.join(DEPTH_TERMS)}, not {', '.join(sorted(unknown))}")
@@ -50,7 +52,7 @@ class SensorTask:
     def free_parameters(self, moves: bool) -> FreeParameters:
         """Free parameters of the sensor."""
         intrinsics = () if self.fixed_intrinsics else (*MATRIX, *self.lens.coefficients)
-        return FreeParameters(self.lens, intrinsics, moves, self.depth_terms, self.free_running)
+        return FreeParameters(self.lens, intrinsics, moves and not self.fixed_pose, self.depth_terms, self.free_running)
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,9 @@ class Task:
             raise TaskError(f"views of {', '.join(sorted(strangers))}, which are no sensors of this calibration")
         if self.sensors[self.reference].free_running:
             raise TaskError(f'the reference "{self.reference}" keeps the time: another sensor has to run freely')
+        fixed = [name for name, sensor in self.sensors.items() if sensor.fixed_pose]
+        if fixed and not self.sensors[self.reference].factory:
+            raise TaskError(f"{', '.join(fixed)}: poses can be kept only with one of the reference, {self.reference}")
         if not self.corners:
             raise TaskError("no view shows any corner of the board")
 

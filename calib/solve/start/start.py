@@ -67,7 +67,7 @@ def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first
     boards = {view.shot: found[0].T_sb for view in views if (found := pose_candidates(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
-    free = replace(sensor, fixed_intrinsics=False, free_running=False, depth_terms=())
+    free = replace(sensor, fixed_intrinsics=False, fixed_pose=False, free_running=False, depth_terms=())
     task = Task({name: free}, views, (), name).of_shots([*boards])
     state = State({name: SensorState(replace(first, T_rs=pose.identity()))}, boards)
     return search(formulate(task)(state, (1.0,))).sensors[name].camera
@@ -79,6 +79,7 @@ def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.Po
         T_r0 = task.sensors[task.reference].factory[0].T_rs
     root = task.reference if task.reference in seen else next(iter(seen))
     poses = extrinsics_graph.poses(seen, root)
+    poses |= _known(task, poses)
     boards = {shot: _board(shot, task, cameras, poses, seen) for shot in _shots(seen)}
     for name in task.sensors:
         if name not in poses:
@@ -88,6 +89,18 @@ def _placed(task: Task, cameras: Mapping[str, Camera], seen: extrinsics_graph.Po
     T_rx = T_r0 @ pose.inverse(poses[task.reference])
     sensors = {name: SensorState(replace(cameras[name], T_rs=T_rx @ poses[name])) for name in task.sensors}
     return State(sensors, {shot: T_rx @ board for shot, board in boards.items()})
+
+
+def _known(task: Task, poses: Mapping[str, Pose]) -> dict[str, Pose]:
+    """Fixed poses, and that of the reference with them, in the frame of the given poses."""
+    fixed = [name for name, sensor in task.sensors.items() if sensor.fixed_pose]
+    given = {name: task.sensors[name].factory[0].T_rs for name in ([task.reference, *fixed] if fixed else [])}
+    anchor = next((name for name in given if name in poses), None)
+    return (
+        {}
+        if anchor is None
+        else {name: poses[anchor] @ pose.inverse(given[anchor]) @ T_rs for name, T_rs in given.items()}
+    )
 
 
 def _board(

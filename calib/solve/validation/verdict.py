@@ -9,6 +9,7 @@ from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
+from calib.solve.validation.weak_directions import weak_directions
 
 #: Largest ratio of observed to predicted difference of the halves; exceeded by chance in about 1 % of the cases.
 MAX_RATIO = 2.0
@@ -66,7 +67,7 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    reasons = [*_outliers(solution), *_uncertain({**images, **pairs}, needed_px)]
+    reasons = [*weak_directions(solution, distance), *_outliers(solution), *_uncertain({**images, **pairs}, needed_px)]
     try:
         agreements = cross_validate(solution, distance, note)
         reasons += _disagreeing(agreements, needed_px)

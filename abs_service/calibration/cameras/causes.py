@@ -1,0 +1,101 @@
+"""Verdict on what has changed since a calibration, in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from abs_service.report.content import Level, Verdict
+from calib.calibration_check.comparison import Comparison, Explanation
+from calib.calibration_check.hypotheses import TERMS, Kind
+
+#: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
+UNNOTICED_M, WRONG_M = 0.002, 0.01
+
+_ADVICE = {
+    Kind.MOVED: "Put it back and fix it, or calibrate the rig again.",
+    Kind.ALIGNMENT: "Calibrate the device again, or use its depth image before alignment.",
+    Kind.SEVERAL: "Calibrate the rig again.",
+}
+_WARM = "Let it warm up for half an hour and look again; if it stays, calibrate its depth terms."
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Distances of the boards that a sensor measured [m]."""
+
+    near: float
+    far: float
+
+
+def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> list[Verdict]:
+    """Verdict on a change that all shots share; none if there is none, or none that matters.
+
+    Args:
+        found: explanations of the shots.
+        motion: level of what the pairs of sensors show, if it is motion.
+        reaches: of the sensors that measure distances.
+    """
+    chosen, rivals = found.chosen, found.rivals
+    level = max(_level(each, motion, reaches) for each in (chosen, *rivals))
+    if level == Level.GOOD:
+        return []
+    kind = chosen.hypothesis.kind
+    if kind == Kind.SEVERAL:
+        text = "No single change explains what no longer fits: more than one sensor has moved, or a camera has changed."
+        return [Verdict(level, text, _ADVICE[kind])]
+    if rivals and all(each.hypothesis.kind == Kind.MOVED for each in (chosen, *rivals)):
+        names = ", ".join(sorted(_names(each) for each in (chosen, *rivals)))
+        text = f"One of {names} has moved; these views cannot tell which, since each would explain them."
+        advice = "Calibrate the rig again. A third sensor that sees the board at the same time could tell."
+        return [Verdict(level, text, advice)]
+    text = f"{_said(chosen)}."
+    if rivals:
+        text += f" These shots cannot tell that from this: {'; '.join(f'{_names(r)} {_said(r)}' for r in rivals)}."
+    advice = _telling(chosen, rivals, reaches) if rivals else _ADVICE.get(kind, _WARM)
+    return [Verdict(level, text, advice, _names(chosen))]
+
+
+def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:
+    """Level of a change by what it does to images, or to distances in the middle of the boards."""
+    kind = explanation.hypothesis.kind
+    if kind == Kind.UNCHANGED:
+        return Level.GOOD
+    if kind not in TERMS:
+        return motion
+    terms = dict(zip(TERMS[kind], explanation.values.tolist(), strict=True))
+    reach = reaches[explanation.hypothesis.sensors[0]]
+    middle = (reach.near + reach.far) / 2
+    miss = abs(terms.get("depth_scale", 0.0) * middle + terms.get("depth_offset", 0.0))
+    return Level.GOOD if miss < UNNOTICED_M else Level.BAD if miss > WRONG_M else Level.DOUBTFUL
+
+
+def _names(explanation: Explanation) -> str:
+    return " with ".join(explanation.hypothesis.sensors)
+
+
+def _said(explanation: Explanation) -> str:
+    """What happened to the sensor, as a clause without its name."""
+    kind, values = explanation.hypothesis.kind, explanation.values
+    if kind in TERMS:
+        pairs = zip(TERMS[kind], values.tolist(), explanation.sigmas.tolist(), strict=True)
+        return f"measures distances wrongly, by {' and '.join(_term(*each) for each in pairs)}"
+    verb = "is aligned wrongly" if kind == Kind.ALIGNMENT else "has moved"
+    return f"{verb}, by {np.linalg.norm(values[3:]) * 1e3:.1f} mm and {np.rad2deg(np.linalg.norm(values[:3])):.2f}°"
+
+
+def _term(name: str, value: float, sigma: float) -> str:
+    if name == "depth_scale":
+        return f"{100 * value:+.2f} ± {100 * sigma:.2f} %"
+    return f"{1e3 * value:+.1f} ± {1e3 * sigma:.1f} mm"
+
+
+def _telling(chosen: Explanation, rivals: list[Explanation], reaches: Mapping[str, Reach]) -> str:
+    """Shots that would tell explanations apart, of which at least one is of distances."""
+    every = (chosen, *rivals)
+    sensor = next(each.hypothesis.sensors[0] for each in every if each.hypothesis.kind in TERMS)
+    reach = reaches[sensor]
+    board = f"the board much nearer than {reach.near:.2f} m and much further than {reach.far:.2f} m"
+    if all(each.hypothesis.kind in TERMS for each in every):
+        return f"To tell, show {sensor} {board}."
+    return f"To tell, show {sensor} {board}, on all sides of its image and tilted every way."

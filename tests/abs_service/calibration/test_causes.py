@@ -1,0 +1,80 @@
+"""What `calibrate verify` says has changed: distances and not a motion, and what these shots cannot tell apart."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from abs_service.calibration.cameras import verification
+from abs_service.calibration.files import rig_file
+from abs_service.calibration.shots.corner_extraction import BoardObservations
+from abs_service.report.content import Level, Report
+from abs_service.report.provenance import Provenance
+from calib import pose
+from calib.pose import Pose
+from tests.calib.solve.board_views import Head, look, random_boards, three_heads
+
+ORIGIN = Provenance("x", "2026-11-21")
+
+
+def verified(
+    stored: dict[str, Head], now: dict[str, Head], seed: int = 1, near: float = 0.6, far: float = 1.6
+) -> Report:
+    """Report on a calibration that knows `stored` heads, by ten shots of the heads as they are now."""
+    random = np.random.default_rng(seed)
+    seen = look(now, random_boards(10, random, near, far), random)
+    sensors = {
+        name: rig_file.SensorCalibration(
+            head.camera, residuals=rig_file.Residuals(corners_px=head.corner_sigma * np.sqrt(2))
+        )
+        for name, head in stored.items()
+    }
+    known = rig_file.RigCalibration("lab", sensors, ORIGIN, "good")
+    return verification.verify(known, BoardObservations(tuple(seen.corners), tuple(seen.planes)), ORIGIN)
+
+
+def aligned() -> dict[str, Head]:
+    color = three_heads()["color"]
+    return {"color": color, "depth": Head(color.camera, depth_sigma=0.004)}
+
+
+def test_an_aligned_depth_image_that_is_too_long_is_said_to_measure_wrongly() -> None:
+    heads = aligned()
+    report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)})
+    worst = report.verdicts[0]
+    assert (worst.level, worst.about) == (Level.BAD, "depth")
+    assert worst.text.startswith("measures distances wrongly, by +0.9")
+    assert "warm up" in worst.advice
+    assert not any("moved" in one.text or "no longer stand" in one.text for one in report.verdicts)
+
+
+def test_what_cannot_be_told_apart_is_said_with_the_shots_that_would() -> None:
+    heads = aligned()
+    report = verified(heads, {**heads, "depth": replace(heads["depth"], depth_scale=0.01)}, 0, 0.95, 1.05)
+    worst = report.verdicts[0]
+    assert "cannot tell that from this: depth measures distances wrongly, by +" in worst.text
+    assert worst.advice.startswith("To tell, show depth the board much nearer than 1.00 m")
+
+
+def test_a_rig_that_is_as_it_was_has_no_cause_named() -> None:
+    assert {one.level for one in verified(three_heads(), three_heads()).verdicts} == {Level.GOOD}
+
+
+def nudged(boards: Mapping[int, Pose], random: np.random.Generator) -> dict[int, Pose]:
+    """Boards in a hand, a moment later."""
+    return {shot: pose.from_rotation_vector((0, 0, 0), random.normal(0, 0.006, 3)) @ T for shot, T in boards.items()}
+
+
+def test_images_of_different_moments_are_told_from_a_sensor_that_moved() -> None:
+    random = np.random.default_rng(3)
+    heads = {name: head for name, head in three_heads().items() if name != "tof"}
+    boards = random_boards(10, random)
+    first = look({"light": heads["light"]}, boards, random)
+    late = look({"color": heads["color"]}, nudged(boards, random), random)
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    seen = BoardObservations((*first.corners, *late.corners), ())
+    report = verification.verify(rig_file.RigCalibration("lab", sensors, ORIGIN), seen, ORIGIN)
+    said = " ".join(one.text for one in report.verdicts)
+    assert "were not taken at the same moment" in said
+    assert "moved" not in said
+    assert report.verdicts[0].level > Level.GOOD
