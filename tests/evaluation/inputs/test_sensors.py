@@ -16,6 +16,6 @@ def test_another_sensor_does_no_harm() -> None:
     assert all(goal.met for goal in found.goals), found.goals
     assert all("of 7 ratios" in goal.name for goal in found.goals)
     errors = found.values["errors_mm"]
-    # One that is twice as good is worth it, although offsets are averaged over the frames and unpredicted motion is
-    # smooth, both of which help the single one more.
-    assert np.all(errors["color + structured_light + tof"].mean(axis=0) < 0.9 * errors[TOF].mean(axis=0))
+    # One that is twice as good is worth it, although the priors (averaged offsets, smooth motion, little stretch) help
+    # the single one more.
+    assert np.all(errors["color + structured_light + tof"].mean(axis=0) < 0.95 * errors[TOF].mean(axis=0))
