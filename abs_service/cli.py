@@ -61,8 +61,8 @@ def program() -> None:
     """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
     try:
         code = main()
-    except Exception:
-        sys.excepthook(*sys.exc_info())
+    except Exception as error:
+        sys.excepthook(type(error), error, error.__traceback__)
         code = Exit.FAILED
     deadline_s = time.monotonic() + THREADS_END_S
     others = [one for one in threading.enumerate() if one is not threading.main_thread() and not one.daemon]

@@ -1,5 +1,6 @@
 """Records all messages of a rig, images as the settings say; reports losses and failures in its health."""
 
+import logging
 import shutil
 import threading
 from collections.abc import Callable
@@ -15,6 +16,8 @@ from abs_service.recording.recording_file import RecordingFile, open_for_writing
 from abs_service.recording.sample_writer import SampleWriter
 from drivers.encoding.encoded_image import ImageEncoder, unchanged
 from drivers.encoding.mcap_file import CHUNK_SIZE, Compression
+
+_log = logging.getLogger(__name__)
 
 #: Timeout of the queries at the start [s].
 QUERY_S = 1.0
@@ -95,7 +98,9 @@ class Recorder:
         self._failed = ""
         self._is_short_of_space = False
         self._slow_drops = self._failure_drops = 0
+        self._finished_bytes = 0
         self.failures = 0
+        self.written_bytes = 0  # to all files
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
     @property
@@ -182,6 +187,7 @@ class Recorder:
             settings.chunk_bytes,
             self._open_file,
         )
+        self._finished_bytes = self.written_bytes
         self._health.label("file", file.path.name)
         self._health.count("files")
         try:
@@ -228,12 +234,16 @@ class Recorder:
         file.flush()
         self._writer.saved()
         self._health.gauge("file_bytes", file.size)
+        self.written_bytes = self._finished_bytes + file.size
         if self._failed:
+            _log.warning("recording again, to %s", file.path.name)
             self._failed = ""
             self._health.report("record", Level.OK)
 
     def _fail(self, reason: str) -> None:
-        self.failures += not self._failed
+        if not self._failed:
+            self.failures += 1
+            _log.error("RECORD_FAILED %s", reason)
         self._failed = reason
         self._health.count_up_to({"failures": self.failures})
         self._health.label("last_failure", reason)

@@ -14,13 +14,14 @@ from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
 ACTIVE = ".active"
 
 
-#: Recordings show people: their owner and the group may read them, nobody else.
-MODE = 0o640
+def private(path: str, flags: int) -> int:
+    """Opener of a recording, which shows people: its owner and, to read, the group may open it, nobody else."""
+    return os.open(path, flags, 0o640)
 
 
 def open_for_writing(path: Path) -> BinaryIO:
-    """Creates a file that must not exist yet, for its owner and, to read, for the group."""
-    return open(path, "xb", opener=lambda name, flags: os.open(name, flags, MODE))
+    """Creates a file that must not exist yet."""
+    return open(path, "xb", opener=private)
 
 
 class RecordingFile:

@@ -78,4 +78,6 @@ def recordings(directory):
 
 def sequences(directory):
     """Numbers of all depth images in the recordings of a folder, in their order."""
-    return sorted(m.message.sequence for p in recordings(directory) for m in read(p)[0] if m.channel.topic == f"/{DEPTH}")
+    return sorted(
+        m.message.sequence for p in recordings(directory) for m in read(p)[0] if m.channel.topic == f"/{DEPTH}"
+    )

@@ -5,6 +5,7 @@ import threading
 
 import pytest
 from absmsg.v1 import frame_info_pb2
+from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys
@@ -112,6 +113,16 @@ def test_absurd_stamps_are_replaced_by_the_present(tmp_path, seconds):
     rig.recorder.stop(5)
     image, _ = read(recordings(tmp_path)[0])[0]
     assert before <= image.message.log_time <= before + 10**10 or image.message.log_time == seconds * 10**9
+
+
+def test_a_sensor_whose_name_is_a_path_is_refused(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    model = SensorModel(sensor="../../x", calib_id="1")
+    rig.bus.deliver(Sample(keys.model("tof"), message_header.MODEL, model.SerializeToString()))
+    rig.recorder.stop(5)
+    assert rig.said.counters["refused"] == 1
+    assert read(recordings(tmp_path)[0])[1].keys() == {"rig.toml"}
 
 
 def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):

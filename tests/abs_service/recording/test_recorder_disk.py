@@ -8,7 +8,7 @@ import pytest
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.recording.recovery import recover
-from tests.abs_service.recording.recorder_rig import RETRY_S, DEPTH, Rig, depth, metadata, read, recordings, sequences
+from tests.abs_service.recording.recorder_rig import DEPTH, RETRY_S, Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually
 
 
@@ -93,8 +93,9 @@ class Full(SlowFile):
 
 
 def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered_while_recording_goes_on(tmp_path):
-    disks = iter([Full])
-    rig = Rig(tmp_path, open_file=lambda path: next(disks, SlowFile)(path), flush_s=0.005)
+    rig = Rig(
+        tmp_path, open_file=lambda path: SlowFile(path) if list(tmp_path.iterdir()) else Full(path), flush_s=0.005
+    )
     rig.recorder.start()
     seq = 0
     while not rig.recorder.failed:
