@@ -3,7 +3,8 @@
   abs-service record rig.toml                                  of the rig that `abs-service run rig.toml` drives
   abs-service record rig.toml --connect tcp/192.168.1.7:7447   of the same rig on another host
 
-A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start.
+A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start. Exit code 1 if
+recording failed at any time (docs/reliability.md).
 """
 
 import argparse

@@ -139,19 +139,13 @@ class Recorder:
         self._health.report("queue", Level.WARNING if message else Level.OK, message)
 
     def _run(self) -> None:
-        try:
-            while not self._queue.is_drained:
-                if self._attempt():
-                    continue
-                if self._stopping.is_set():
-                    break
-                self._stopping.wait(self._retry_s)
-        except Exception as error:
-            self._fail(f"{type(error).__name__}: {error}")  # our own mistake, but it must not go unnoticed
-            raise
-        finally:
-            self._queue.close()
-            self._queue.drop_all()
+        while not self._queue.is_drained:
+            if self._attempt():
+                continue
+            if self._stopping.is_set():
+                break
+            self._stopping.wait(self._retry_s)
+        self._queue.drop_all()
 
     def _attempt(self) -> bool:
         """Records one file; False if the disk is to be left alone for a while."""
@@ -161,6 +155,10 @@ class Recorder:
             self._record_one_file()
         except OSError as error:
             self._fail(str(error))
+            return False
+        except Exception as error:  # our own mistake, which must neither go unnoticed nor end recording
+            _log.exception("the recorder failed")
+            self._fail(f"{type(error).__name__}: {error}")
             return False
         return True
 

@@ -4,16 +4,15 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from absmsg.v1.sensor_model_pb2 import SensorModel
+from google.protobuf.json_format import Error as JsonError
 from google.protobuf.json_format import MessageToJson
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health
-from abs_service.bus.keys import KeyNameError
 from abs_service.bus.stamps import WallClock
 from abs_service.recording.recording_file import RecordingFile
 from abs_service.wire import message_header as header
-from abs_service.wire.message_header import MessageHeaderError
 from drivers.encoding.encoded_image import ImageEncoder
 from drivers.encoding.mcap_file import McapFileError
 from drivers.encoding.parsing import CodecError
@@ -78,7 +77,7 @@ class SampleWriter:
             file.write(sample.topic, message, payload, stamp_ns, about.seq)
             if keys.is_image(sample.topic) and sample.attachment:
                 file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
-        except (MessageHeaderError, CodecError, McapFileError, KeyNameError) as error:
+        except (CodecError, McapFileError, JsonError, ValueError) as error:
             # Other programs can publish below our keys; that must not end the recording.
             self._health.count("refused")
             self._health.label("refused", str(error))

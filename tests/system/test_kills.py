@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
 from mcap.reader import make_reader
 
 from evaluation.service.live.proc import children
@@ -108,10 +109,29 @@ def test_a_killed_recorder_leaves_a_gap_of_a_second_and_a_half_at_most(run, tmp_
     assert gap_s < 1.5
 
 
+def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for_good(run, tmp_path):
+    process, listener = run
+    (tmp_path / "takes").rename(tmp_path / "moved")
+    (tmp_path / "takes").write_text("in the way")
+    kill(min(recorders(process.pid)))
+    killed_ns = time.monotonic_ns()
+
+    def says(level, text):
+        return lambda: (last := listener.health("record")[-1]).level == level and text in last.message
+
+    wait_until(says(Health.LEVEL_ERROR, "RECORD_FAILED [Errno 17] File exists"), 30, "the failure in health")
+    wait_until(listener.tracks_since(killed_ns, 30), 10, "estimates meanwhile")
+    (tmp_path / "takes").unlink()
+    wait_until(says(Health.LEVEL_OK, ""), 5, "recording again")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 1, "the recording has a gap"
+    assert [path.suffix for path in (tmp_path / "takes").iterdir()] == [".mcap"]
+
+
 def test_nothing_survives_a_killed_run(run):
     process, _ = run
     wait_until(lambda: len(recorders(process.pid)) == 2, 30, "the second recorder, which waits")
-    alive = children(process.pid) | {"waiting": max(recorders(process.pid))}
+    alive = {**children(process.pid), "waiting": max(recorders(process.pid))}
     assert alive.keys() == {"capture", "track", "record", "waiting"}
     begin_ns = kill(process.pid)
     wait_until(lambda: not any(map(is_running, alive.values())), 5, "the end of the children")

@@ -36,9 +36,9 @@ def test_a_forecast(rate, room, used, retain_s, retain_bytes, expected):
 def test_the_rate_is_that_of_the_last_minute():
     meter = forecast.RateMeter()
     assert meter.add(0, 0) == 0
-    for second in range(1, 101):
-        rate = meter.add(second * 10**9, second * 5.0 if second <= 30 else 150.0 + (second - 30) * 2.0)
-    assert rate == 2.0
+    totals = [5.0 * second if second <= 30 else 150.0 + 2.0 * (second - 30) for second in range(1, 101)]
+    rates = [meter.add(second * 10**9, total) for second, total in enumerate(totals, 1)]
+    assert rates[-1] == 2.0
 
 
 class Watch:

@@ -196,6 +196,15 @@ def test_the_queue_is_as_large_as_the_configuration_says(rig, endpoint, launch):
         recorder.kill()
 
 
+def test_the_oldest_recordings_are_deleted_as_the_configuration_says(rig, endpoint, launch):
+    rig.write_text(rig.read_text() + "rotate_bytes = 100_000\nretain_bytes = 1_000_000\n")
+    launch("record", rig)
+    with Stream(endpoint) as stream:
+        health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
+        assert health.labels["forecast"].startswith("the last ")
+        assert not (rig.parent / "kept" / health.labels["deleted"]).exists()
+
+
 def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, launch):
     recorder = launch("record", rig)
     with Stream(endpoint) as stream:
