@@ -1,7 +1,5 @@
 """`python -m abs_service` is `abs-service`."""
 
-import sys
+from abs_service.cli import program
 
-from abs_service.cli import main
-
-sys.exit(main())
+program()

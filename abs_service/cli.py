@@ -8,6 +8,8 @@ Such a module has a docstring (its help; examples after the first paragraph), `a
 import argparse
 import os
 import sys
+import threading
+import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import import_module
@@ -41,6 +43,9 @@ MODULES = {"import": "images.import_images"}
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
+#: Time that threads have to end after their command [s].
+THREADS_END_S = 1.0
+
 EPILOG = """\
 examples:
   abs-service run                        a simulated sheet of paper, nothing to connect or configure
@@ -50,6 +55,24 @@ examples:
 
 abs-service COMMAND --help describes each command.
 """
+
+
+def program() -> None:
+    """Runs the command line as a process, which ends even if a thread does not, such as a callback that waits."""
+    try:
+        code = main()
+    except Exception as error:
+        sys.excepthook(type(error), error, error.__traceback__)
+        code = Exit.FAILED
+    deadline_s = time.monotonic() + THREADS_END_S
+    others = [one for one in threading.enumerate() if one is not threading.main_thread() and not one.daemon]
+    for thread in others:
+        thread.join(max(0.0, deadline_s - time.monotonic()))
+    if stuck := [thread.name for thread in others if thread.is_alive()]:
+        print(f"abs-service: left behind, since they do not end: {', '.join(stuck)}", file=sys.stderr, flush=True)
+        sys.stdout.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -106,5 +106,5 @@ class Bus(Protocol):
         ...
 
     def close(self) -> None:
-        """Ends the session; must happen before the interpreter exits."""
+        """Ends the session, in a second whatever a callback does; must happen before the interpreter exits."""
         ...

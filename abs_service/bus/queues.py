@@ -120,6 +120,13 @@ class BoundedQueue(Generic[T]):
             self._size -= size
             return item
 
+    def drop_all(self) -> None:
+        """Drops and counts all items."""
+        with self._changed:
+            self._dropped.update(key for key, _, _ in self._items)
+            self._items.clear()
+            self._size = 0
+
     def close(self) -> None:
         """Ignores further items and wakes waiting threads; queued items can still be taken."""
         with self._changed:

@@ -1,6 +1,7 @@
 """The bus between processes: zenoh."""
 
 import logging
+import threading
 from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
@@ -18,6 +19,8 @@ _log = logging.getLogger(__name__)
 ENCODING = "application/protobuf"
 #: Period in which the last state's number is repeated, so that a subscriber notices a loss [s].
 HEARTBEAT_S = 0.5
+#: Time that a session has to close; zenoh waits ten seconds for some callbacks [s].
+CLOSE_S = 1.0
 
 _PRIORITIES = {
     Priority.REAL_TIME: zenoh.Priority.REAL_TIME,
@@ -111,13 +114,24 @@ class ZenohBus:
         return self._keep(from_non_daemon_thread(lambda: tokens.declare_subscriber(key, on_token, history=True)))
 
     def close(self) -> None:
-        """Ends the session; may be called again. A callback that does not return is left behind after ten seconds."""
+        """Ends the session; may be called again. A callback that does not return is left behind after a second."""
         if self._session.is_closed():
             return
+        # Not a daemon: it may return from Rust, which a finalized interpreter does not survive.
+        closing = threading.Thread(target=self._close_session, name="close bus", daemon=False)
+        closing.start()
+        closing.join(CLOSE_S)
+        if closing.is_alive():
+            self._warn_of_callback(f"no answer within {CLOSE_S:g} s")
+
+    def _close_session(self) -> None:
         try:
             self._session.close()
         except zenoh.ZError as error:
-            _log.warning("rig %s: the session did not close, a callback has not returned: %s", self._rig, error)
+            self._warn_of_callback(error)
+
+    def _warn_of_callback(self, reason: object) -> None:
+        _log.warning("rig %s: the session did not close, a callback has not returned: %s", self._rig, reason)
 
     def __enter__(self) -> Self:
         return self

@@ -21,7 +21,7 @@ from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.commands.parts import data_rates, harmless_devices, preview_option, rig_process
+from abs_service.commands.parts import data_rates, disk, harmless_devices, preview_option, rig_process
 from abs_service.commands.parts.harmless_devices import HARMLESS, HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
 from abs_service.config import plugins
@@ -97,6 +97,7 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
             tracker.template.build(tracker.mesh.vertices)
     if problems:
         raise CheckError("\n".join([f"{source}: cannot work", *(f"  {problem}" for problem in problems)]))
+    images = data_rates.describe({name: streams.get(name, []) for name in rig.sensors}, rig.record)
     return {
         "ok": True,
         "config": source,
@@ -107,8 +108,9 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         "sensors": {name: _sensor(rig, name, streams) for name in rig.sensors},
         "trackers": {name: _tracker(rig, name) for name in rig.trackers},
         "publishes": [keys.key(rig.name, keys.state(name)) for name in rig.trackers],
-        "images": data_rates.describe({name: streams.get(name, []) for name in rig.sensors}, rig.record),
+        "images": images,
         "records": str(rig.record.directory) if rig.record.enabled else None,
+        "disk": disk.lasts(rig, 1e6 * images["recorded_mb_s"][1]),
     }
 
 
@@ -130,7 +132,12 @@ def text(found: dict[str, Any]) -> str:
         lines.append(f"  tracker  {name}: {what}; {how}")
     lines += [f"  publishes {key} …" for key in found["publishes"]]
     lines.append(f"  {data_rates.text(found['images'])}")
-    lines += ["", f"  applications connect to {found['endpoint']}", f"  records to {found['records'] or 'nowhere'}"]
+    lasts = f": {found['disk']}" if found["disk"] else ""
+    lines += [
+        "",
+        f"  applications connect to {found['endpoint']}",
+        f"  records to {found['records'] or 'nowhere'}{lasts}",
+    ]
     return "\n".join(lines)
 
 

@@ -3,25 +3,25 @@
   abs-service record rig.toml                                  of the rig that `abs-service run rig.toml` drives
   abs-service record rig.toml --connect tcp/192.168.1.7:7447   of the same rig on another host
 
-A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start.
+A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start. Exit code 1 if
+recording failed at any time (docs/reliability.md).
 """
 
 import argparse
 import errno
 import os
 import shutil
-import sys
-import tempfile
 import threading
 
 from abs_service import config
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands.parts import rig_process
+from abs_service.commands.parts import disk, rig_process
+from abs_service.recording.disk_watch import DiskWatch
 from abs_service.recording.first_tracking import FirstTracking
 from abs_service.recording.recorder import Recorder, RecorderSettings
-from abs_service.recording.recovery import RecoveryError, leftovers, recover
-from abs_service.supervision import gc_tuning
+from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
+from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.exit_codes import Exit
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec
@@ -33,10 +33,6 @@ DRAIN_S = 2.5
 NICE = 5
 
 
-class DirectoryError(Exception):
-    """The folder for recordings cannot be used."""
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service record`."""
     rig_process.add_arguments(parser)
@@ -46,6 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Records until SIGTERM or SIGINT."""
     rig = rig_process.load_config(arguments)
     settings = _settings(rig)
+    parent_watchdog.wait_until_needed()
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(rig.name, clock)
@@ -63,18 +60,18 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         recorder.start()
         gc_tuning.freeze_loaded_objects()
+        watch = DiskWatch(disk.retention(rig), settings.minimum_free_bytes, health, clock)
         while not stop.wait(0.2):
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()
                 recorder.report()
+                watch.look(recorder.written_bytes)
                 health.tick()
         recorder.stop(DRAIN_S)
         recorder.report()
         health.publish()
-    if recorder.failed:
-        print(f"abs-service: RECORD_FAILED {recorder.failed}", file=sys.stderr)
-    return Exit.FAILED if recorder.failed else Exit.OK
+    return Exit.FAILED if recorder.failures else Exit.OK
 
 
 def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.Event) -> None:
@@ -85,14 +82,6 @@ def _wait_for_tracking(tracking: FirstTracking, health: Health, stop: threading.
 
 def _settings(rig: config.ServiceConfig) -> RecorderSettings:
     table = rig.record
-    try:
-        table.directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DirectoryError(f'record.directory = "{table.directory}": cannot be made: {error.strerror}') from None
-    try:
-        tempfile.TemporaryFile(dir=table.directory).close()  # permissions do not show read-only file systems
-    except OSError as error:
-        raise DirectoryError(f'record.directory = "{table.directory}": cannot be written: {error.strerror}') from None
     return RecorderSettings(
         directory=table.directory,
         name=rig.name,
@@ -104,10 +93,12 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
         rotate_bytes=table.rotate_bytes,
         rotate_s=table.rotate_s,
         minimum_free_bytes=table.minimum_free_bytes,
+        queue_bytes=table.queue_bytes,
     )
 
 
 def _recover_leftovers(settings: RecorderSettings, health: Health) -> None:
+    remove_interrupted(settings.directory)
     for path in leftovers(settings.directory):
         try:
             if shutil.disk_usage(settings.directory).free < path.stat().st_size + settings.minimum_free_bytes:

@@ -2,6 +2,7 @@
 
   abs-service recover recordings/x.mcap.active   what a crash left; becomes recordings/x.mcap
   abs-service recover recordings/x.mcap          a damaged file; the result is recordings/x.recovered.mcap
+  abs-service recover *.active --out saved       the results go to saved/ and the originals stay
 
 Nothing is thrown away: unless all of a file was saved, it is kept.
 """
@@ -17,6 +18,9 @@ from abs_service.supervision.exit_codes import Exit
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service recover`."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="recordings to recover")
+    parser.add_argument(
+        "--out", metavar="DIR", type=Path, help="folder of the results instead of that of the originals"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -24,7 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
     exit_code = Exit.OK
     for path in arguments.files:
         try:
-            print(recover(path))
+            if arguments.out:
+                arguments.out.mkdir(parents=True, exist_ok=True)
+            print(recover(path, arguments.out))
         except (RecoveryError, OSError) as error:
             print(f"abs-service: error: {error}", file=sys.stderr)
             exit_code = Exit.USER

@@ -10,11 +10,11 @@ Applications connect to bus.endpoint; the keys are abs/<rig>/<tracker>/state and
 
 import argparse
 import logging
+import os
 import sys
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -29,11 +29,13 @@ from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts import rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
-from abs_service.supervision import gc_tuning
+from abs_service.recording import folder
+from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
+from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
 
 
@@ -55,6 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until SIGTERM or SIGINT, the end of its devices, or a failure."""
     rig = effective(rig_process.load_config(arguments), arguments)
+    if rig.record.enabled:
+        folder.check(rig.record.directory)
     stop = rig_process.stop_on_signals()
     gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
     with (
@@ -62,8 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
         _logging_to(display),
+        closing(Standby("record", partial(spawn, display), partial(prepare, display))) as starts,
     ):
-        starts = partial(spawn, display, path, config.to_toml(rig))
         supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
@@ -77,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
         # The child has read a temporary file of ours.
         reason = refused.reason.rpartition("abs-service: error: ")[2]
         raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
-    return supervisor.exit_code() or Exit.OK
+    return supervisor.exit_code() or recording_code(supervisor.children.values())
 
 
 def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> config.ServiceConfig:
@@ -121,15 +125,11 @@ def children(rig: config.ServiceConfig, path: Path) -> list[Child]:
 
 @contextmanager
 def file(rig: config.ServiceConfig) -> Iterator[Path]:
-    """A configuration as a temporary file that may be gone before the end."""
-    descriptor, name = tempfile.mkstemp(prefix=f"{rig.name}-", suffix=".toml", text=True)
-    with open(descriptor, "w", encoding="utf-8") as stream:
+    """A configuration as a file in memory, of which nothing is left when this process ends, however it ends."""
+    with open(os.memfd_create(rig.name), "w", encoding="utf-8") as stream:
         stream.write(config.to_toml(rig))
-    path = Path(name)
-    try:
-        yield path
-    finally:
-        path.unlink(missing_ok=True)
+        stream.flush()
+        yield Path(f"/proc/{os.getpid()}/fd/{stream.fileno()}")
 
 
 def limits(rig: config.ServiceConfig) -> Limits:
@@ -139,12 +139,19 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
-def spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:
-    """Starts a child process; first writes its configuration again if the file at `path` is gone."""
-    # A child may start again after weeks, and many systems clear old files out of their temporary folder.
-    with suppress(FileExistsError), path.open("x", encoding="utf-8") as stream:
-        stream.write(toml)
+def spawn(display: Display, component: str, arguments: Sequence[str]) -> Process:
+    """Starts a child process."""
     return ChildProcess(component, arguments, partial(_pass_on, display))
+
+
+def prepare(display: Display, component: str, arguments: Sequence[str]) -> ChildProcess:
+    """Starts a child process that waits until it is woken."""
+    return ChildProcess(component, arguments, partial(_pass_on, display), environment={parent_watchdog.STANDBY: "1"})
+
+
+def recording_code(ended: Iterable[Child]) -> Exit:
+    """FAILED if the recorder says that something is missing, though all else went well."""
+    return Exit.FAILED if any(child.component == "record" and child.exit_code for child in ended) else Exit.OK
 
 
 def _pass_on(display: Display, component: str, line: str) -> None:

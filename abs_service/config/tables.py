@@ -142,7 +142,10 @@ class RecordTable(Table):
         flush_s: longest time until a message is on disk, and so the most that a crash can lose [s].
         rotate_bytes: size of a file at which a new one begins [bytes].
         rotate_s: age of a file at which a new one begins [s].
-        minimum_free_bytes: free space on the disk at which recording ends [bytes].
+        retain_s: age at which a recording is deleted [s]; without it, none is. Those beside which there is a file
+            `*.keep` (`touch x.mcap.keep`) are never deleted.
+        retain_bytes: size of all recordings together beyond which the oldest are deleted [bytes]; without it, none is.
+        minimum_free_bytes: free space on the disk at which recording stops [bytes]; it resumes with half as much again.
         queue_bytes: size of the messages that may wait for a slow disk [bytes]; more are dropped and counted.
     """
 
@@ -156,6 +159,8 @@ class RecordTable(Table):
     flush_s: Positive = 1.0
     rotate_bytes: Annotated[int, Field(ge=1 << 16)] = 4_000_000_000
     rotate_s: Positive = 3600.0
+    retain_s: Positive | None = None
+    retain_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
     minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
     queue_bytes: Annotated[int, Field(ge=1 << 20)] = 256 << 20
 

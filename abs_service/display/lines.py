@@ -92,7 +92,8 @@ def line(view: RigView) -> str:
         reasons = f" ({'; '.join(last.reasons)})" if last.reasons else ""
         parts.append(f"{name} {last.status}{reasons}{error} {last.solve_ms:.1f} ms, {tracker.estimates} estimates")
     if recording := view.recording:
-        parts.append(f"{recording.file.name} {size(recording.size)}, {recording.dropped} dropped")
+        forecast = f", {recording.forecast}" if recording.forecast else ""
+        parts.append(f"{recording.file.name} {size(recording.size)}, {recording.dropped} dropped{forecast}")
     parts += [f"recording: {view.recording_remark}"] if view.recording_remark else []
     parts += [f"{component}: {message}" for component, _, message in view.troubles]
     return " | ".join([*parts, view.activity] if view.activity else parts)

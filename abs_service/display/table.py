@@ -145,6 +145,7 @@ def _recording(view: RigView) -> Text:
     text.append(f" recording {recording.file.name}  {size(recording.size)}  {size(recording.rate)}/s  ")
     text.append(f"{recording.dropped} dropped", style="yellow" if recording.dropped else "")
     text.append(f"  {view.recording_remark}", style="dim")
+    text.append(f"  {recording.forecast}", style="dim")
     return text
 
 

@@ -14,9 +14,14 @@ from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
 ACTIVE = ".active"
 
 
+def private(path: str, flags: int) -> int:
+    """Opener of a recording, which shows people: its owner and, to read, the group may open it, nobody else."""
+    return os.open(path, flags, 0o640)
+
+
 def open_for_writing(path: Path) -> BinaryIO:
     """Creates a file that must not exist yet."""
-    return path.open("xb")
+    return open(path, "xb", opener=private)
 
 
 class RecordingFile:
@@ -56,13 +61,25 @@ class RecordingFile:
                 self._file.attach(attachment, "text/toml", text.encode(), wall_ns)
             self.flush()
         except OSError:
-            self.abandon()
+            self.abandon().unlink(missing_ok=True)  # it holds no message
             raise
 
     @property
     def size(self) -> int:
         """Bytes written so far, but for the open chunk."""
         return self._stream.tell()
+
+    @property
+    def fate(self) -> str:
+        """What somebody did to the unfinished file, "deleted" or "moved"; "" if it is in its place."""
+        mine = os.fstat(self._stream.fileno())
+        if mine.st_nlink == 0:
+            return "deleted"
+        try:
+            there = os.stat(self._active)
+        except OSError:
+            return "moved"
+        return "" if os.path.samestat(mine, there) else "moved"
 
     def write(self, topic: str, message: str, payload: bytes, stamp_ns: int, seq: int) -> None:
         """Appends one message; see `McapFile.write`. After an `OSError` only `abandon` makes sense."""
@@ -78,12 +95,17 @@ class RecordingFile:
         os.fdatasync(self._stream.fileno())
 
     def finish(self, summary: Mapping[str, str]) -> Path:
-        """Writes `summary` as metadata and the index, closes the file and gives it its final name, which it returns."""
+        """Writes `summary` as metadata and the index, closes the file and gives it its final name, which it returns.
+
+        Where it or its folder was moved, it gets that name there.
+        """
         self._file.describe("abs.recording", summary)
         self._file.finish()
         os.fsync(self._stream.fileno())
+        now = Path(os.readlink(f"/proc/self/fd/{self._stream.fileno()}"))
         self._stream.close()
-        os.rename(self._active, self.path)
+        with contextlib.suppress(FileNotFoundError):  # it was deleted
+            os.rename(now, now.with_name(self.path.name))
         return self.path
 
     def abandon(self) -> Path:

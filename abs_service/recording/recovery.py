@@ -12,7 +12,7 @@ from typing import BinaryIO
 from mcap.writer import MCAP0_MAGIC
 
 from abs_service.recording.mcap_scan import find_chunk
-from abs_service.recording.recording_file import ACTIVE
+from abs_service.recording.recording_file import ACTIVE, private
 from abs_service.recording.salvage import Salvage
 
 BROKEN = ".broken"
@@ -53,12 +53,12 @@ class RecoveryReport:
         return f"{saved}; {lost}; the original is {self.source}"
 
 
-def recover(source: Path) -> RecoveryReport:
-    """Copies all readable records of `source` to a new indexed file in the same folder.
+def recover(source: Path, directory: Path | None = None) -> RecoveryReport:
+    """Copies all readable records of `source` to a new indexed file in the same folder, or in `directory`.
 
     `x.mcap.active` becomes `x.mcap`, and itself `x.mcap.broken` unless all of it was saved. Of any other file, `x.mcap`
-    say, the result is `x.recovered.mcap` and the original stays. The new file has its name only when it is complete; to
-    recover again after an interruption is safe.
+    say, the result is `x.recovered.mcap` and the original stays, as it always does with a `directory`. The new file has
+    its name only when it is complete; to recover again after an interruption is safe.
 
     Raises:
         RecoveryError: the file cannot be read, is no MCAP file, or another process is writing it.
@@ -66,11 +66,12 @@ def recover(source: Path) -> RecoveryReport:
     """
     was_active = source.name.endswith(ACTIVE)
     name = source.name.removesuffix(ACTIVE) if was_active else f"{source.name.removesuffix('.mcap')}.recovered.mcap"
-    target = source.with_name(name)
+    target = (directory or source.parent) / name
     unfinished = target.with_name(target.name + RECOVERING)
     with _locked(source) as stream, _mapped(source, stream) as data:
         try:
-            with unfinished.open("wb") as output:
+            with open(unfinished, "wb", opener=private) as output:
+                fcntl.flock(output, fcntl.LOCK_EX)  # for `remove_interrupted`
                 salvage = Salvage(data, output)
                 salvage.run()
                 output.flush()
@@ -80,7 +81,7 @@ def recover(source: Path) -> RecoveryReport:
             raise
         os.replace(unfinished, target)
         lossless = not (salvage.damaged or salvage.orphans or salvage.skipped_bytes)
-        kept = _retire(source, lossless) if was_active else source
+        kept = _retire(source, lossless) if was_active and directory is None else source
     return RecoveryReport(
         kept,
         target,
@@ -95,6 +96,14 @@ def recover(source: Path) -> RecoveryReport:
 def leftovers(directory: Path) -> list[Path]:
     """Recordings in `directory` that were not finished, oldest first; some may still be written by another process."""
     return sorted(directory.glob(f"*.mcap{ACTIVE}"), key=lambda path: path.stat().st_mtime)
+
+
+def remove_interrupted(directory: Path) -> None:
+    """Removes what a killed recovery left; the next one begins with the original again."""
+    for path in directory.glob(f"*{RECOVERING}"):
+        with contextlib.suppress(OSError), path.open("rb") as stream:  # somebody else's, or locked by a living one
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            path.unlink()
 
 
 def _retire(source: Path, lossless: bool) -> Path | None:

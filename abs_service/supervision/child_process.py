@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Protocol
 
 from abs_service.supervision import parent_watchdog
@@ -94,6 +95,7 @@ class ChildProcess:
         arguments: the command line after `abs-service`.
         on_line: called with the component and each line that the child writes, from a thread.
         program: what runs the arguments.
+        environment: added to the environment of this process.
     """
 
     def __init__(
@@ -102,6 +104,7 @@ class ChildProcess:
         arguments: Sequence[str],
         on_line: Callable[[str, str], None],
         program: Sequence[str] = (sys.executable, "-m", "abs_service"),
+        environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         self._lines: deque[str] = deque(maxlen=TAIL_LINES)
         # Its own process group: Ctrl-C in the terminal reaches only the supervisor, which stops the children in order.
@@ -110,7 +113,7 @@ class ChildProcess:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            env=os.environ | {parent_watchdog.VARIABLE: "1", "PYTHONUNBUFFERED": "1"},
+            env=os.environ | {parent_watchdog.VARIABLE: "1", "PYTHONUNBUFFERED": "1"} | dict(environment),
             process_group=0,
             text=True,
             errors="replace",
@@ -149,6 +152,11 @@ class ChildProcess:
             os.killpg(self.pid, signal.SIGKILL)
             with contextlib.suppress(subprocess.TimeoutExpired):  # stuck in the kernel, say in a driver
                 self._process.wait(1.0)
+
+    def wake(self) -> None:
+        """Wakes a process that waits, see `parent_watchdog.wait_until_needed`; no effect if it has ended."""
+        with contextlib.suppress(BrokenPipeError, ValueError):  # which is closed after its end
+            print(file=self._process.stdin, flush=True)
 
     def output_tail(self) -> str:
         """See `Process`; waits until all that an ended process wrote has been read."""

@@ -1,7 +1,8 @@
 """Ends a child process when its supervisor has died, so that no orphans remain.
 
-The supervisor holds the writing end of the child's standard input and never writes. When the supervisor dies, even by
-`kill -9`, the kernel closes that end and the child reads the end of the file.
+The supervisor holds the writing end of the child's standard input. When the supervisor dies, even by `kill -9`, the
+kernel closes that end and the child reads the end of the file. All that is ever written there is one line, which wakes
+a child that was started before it is needed (`standby`).
 """
 
 import os
@@ -13,6 +14,11 @@ import time
 #: Set in the environment of children whose standard input is such a pipe.
 VARIABLE = "ABS_SERVICE_PARENT_WATCHDOG"
 
+#: Set beside it for a child that waits until it is needed.
+STANDBY = "ABS_SERVICE_STANDBY"
+
+_needed = threading.Event()
+
 #: Time from SIGTERM to SIGKILL for an orphan [s].
 GRACE_S = 3.0
 
@@ -23,9 +29,15 @@ def start() -> None:
         threading.Thread(target=_watch, args=(sys.stdin.fileno(), GRACE_S), name="parent watchdog", daemon=True).start()
 
 
+def wait_until_needed() -> None:
+    """Returns when the supervisor needs this process: at once, unless it was started as one that waits."""
+    if os.environ.pop(STANDBY, ""):
+        _needed.wait()
+
+
 def _watch(descriptor: int, grace_s: float) -> None:
     while os.read(descriptor, 64):
-        pass
+        _needed.set()
     os.kill(os.getpid(), signal.SIGTERM)
     time.sleep(grace_s)
     os.kill(os.getpid(), signal.SIGKILL)

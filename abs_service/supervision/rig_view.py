@@ -26,13 +26,17 @@ class Stream:
 
 @dataclass(frozen=True)
 class Recording:
-    """The recorder: file being written, its size, bytes written per second, what was recorded and what was lost."""
+    """The recorder: file being written, its size, bytes written per second, what was recorded and what was lost.
+
+    `forecast` says how long the disk lasts; "" in the first seconds.
+    """
 
     file: Path
     size: int
     rate: float
     recorded: int
     dropped: int
+    forecast: str
 
 
 @dataclass(frozen=True)
@@ -83,11 +87,12 @@ class RigView:
         if not health.labels.get("file"):
             return None
         return Recording(
-            file=self.directory / health.labels["file"].removesuffix(".active"),
+            file=self.directory / Path(health.labels["file"]).name.removesuffix(".active"),
             size=int(health.gauges.get("file_bytes", 0)),
             rate=self.live.received["record"].rate("file_bytes"),
             recorded=health.counters.get("recorded", 0),
             dropped=_sum(health, "dropped."),
+            forecast=health.labels.get("forecast", ""),
         )
 
     @property
@@ -127,9 +132,10 @@ class RigView:
         for name, tracker in self.live.trackers.items():
             lines += [f"{name}: {line}" for line in tracker.summary()]
         if recording:
-            lines.append(
-                f"{recording.file}: {size(recording.size)}, {recording.recorded} messages, {recording.dropped} dropped"
-            )
+            numbers = f"{size(recording.size)}, {recording.recorded} messages, {recording.dropped} dropped"
+            lines.append(f"{_on_disk(recording.file)}: {numbers}")
+        if failures := self.live.health("record").counters.get("failures", 0):
+            lines.append(f"recording failed {failures}×, last: {self.live.health('record').labels['last_failure']}")
         restarts = {child.component: child.restarts for child in self.children if child.restarts}
         if restarts:
             lines.append("restarts: " + ", ".join(f"{name} {number}" for name, number in restarts.items()))
@@ -176,6 +182,14 @@ def size(number: float) -> str:
             return f"{number:.0f} {unit}" if unit == "B" else f"{number:.1f} {unit}"
         number /= 1000
     return f"{number:.2f} GB"
+
+
+def _on_disk(path: Path) -> str:
+    """What there is of a recording whose recorder has ended."""
+    active = path.with_name(path.name + ".active")
+    if active.exists():
+        return f"{active} (unfinished: `abs-service recover` completes it)"
+    return str(path) if path.exists() else f"{path} (is gone)"
 
 
 def _sum(health: Health, prefix: str) -> int:

@@ -1,10 +1,14 @@
 """`kill -9` on a running rig: the process is restarted, the others go on, and no recording is lost."""
 
+import itertools
+import signal
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import pytest
 from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
 from mcap.reader import make_reader
 
 from evaluation.service.live.proc import children
@@ -43,6 +47,12 @@ def test_a_killed_tracker_comes_back_and_capture_goes_on(run):
     assert lost(frames) <= not_published(listener) + 0.05 * len(frames)
 
 
+def recorders(pid):
+    """Process numbers of the recorder and of the one that waits."""
+    listed = map(int, Path(f"/proc/{pid}/task/{pid}/children").read_text().split())
+    return [child for child in listed if b"\0record\0" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
 def newest_image_ns(path) -> int:
     with path.open("rb") as stream:
         last = next(make_reader(stream).iter_messages(topics=f"/{DEPTH}", reverse=True))
@@ -74,10 +84,55 @@ def test_a_killed_recorder_comes_back_and_its_file_is_saved_up_to_the_last_secon
     assert len({state.header.boot_id for _, state in listener.states()}) == 1, "the tracker was not restarted"
 
 
+def image_times_s(folder):
+    """Times of all images of the finished recordings of a folder [s]."""
+    found = []
+    for path in folder.glob("*.mcap"):
+        with path.open("rb") as stream:
+            found += [message.log_time * 1e-9 for *_, message in make_reader(stream).iter_messages(topics=f"/{DEPTH}")]
+    return sorted(found)
+
+
+def test_a_killed_recorder_leaves_a_gap_of_a_second_and_a_half_at_most(run, tmp_path):
+    process, listener = run
+    wait_until(lambda: len(recorders(process.pid)) == 2, 30, "the second recorder, which waits")
+    time.sleep(8)  # until it is loaded
+    kill(min(recorders(process.pid)))
+    files = listener.health("record")[-1].header.boot_id
+    wait_until(lambda: listener.health("record")[-1].header.boot_id != files, 10, "health of the second one")
+    wait_until(lambda: listener.health("record")[-1].counters["recovered"] == 1, 30, "recovery")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 0
+    times = image_times_s(tmp_path / "takes")
+    gap_s = max(b - a for a, b in itertools.pairwise(times))
+    print(f"kill -9 of the recorder left a gap of {gap_s:.2f} s")
+    assert gap_s < 1.5
+
+
+def test_a_folder_that_cannot_be_written_ends_neither_tracking_nor_recording_for_good(run, tmp_path):
+    process, listener = run
+    (tmp_path / "takes").rename(tmp_path / "moved")
+    (tmp_path / "takes").write_text("in the way")
+    kill(min(recorders(process.pid)))
+    killed_ns = time.monotonic_ns()
+
+    def says(level, text):
+        return lambda: (last := listener.health("record")[-1]).level == level and text in last.message
+
+    wait_until(says(Health.LEVEL_ERROR, "RECORD_FAILED [Errno 17] File exists"), 30, "the failure in health")
+    wait_until(listener.tracks_since(killed_ns, 30), 10, "estimates meanwhile")
+    (tmp_path / "takes").unlink()
+    wait_until(says(Health.LEVEL_OK, ""), 5, "recording again")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(10) == 1, "the recording has a gap"
+    assert [path.suffix for path in (tmp_path / "takes").iterdir()] == [".mcap"]
+
+
 def test_nothing_survives_a_killed_run(run):
     process, _ = run
-    alive = children(process.pid)
-    assert alive.keys() == {"capture", "track", "record"}
+    wait_until(lambda: len(recorders(process.pid)) == 2, 30, "the second recorder, which waits")
+    alive = {**children(process.pid), "waiting": max(recorders(process.pid))}
+    assert alive.keys() == {"capture", "track", "record", "waiting"}
     begin_ns = kill(process.pid)
     wait_until(lambda: not any(map(is_running, alive.values())), 5, "the end of the children")
     print(f"the children ended {(time.monotonic_ns() - begin_ns) * 1e-9:.1f} s after kill -9 of run")

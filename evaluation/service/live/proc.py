@@ -59,13 +59,16 @@ def machine() -> Machine:
 
 
 def children(pid: int) -> Mapping[str, int]:
-    """Process numbers of the commands of `abs-service` that a process has started, by command."""
+    """Process numbers of the commands of `abs-service` that a process has started, by command: the oldest of each.
+
+    A younger one is a recorder that waits.
+    """
     listed = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8").split()
     found: dict[str, int] = {}
     for child in map(int, listed):
         command = _command(Path(f"/proc/{child}/cmdline").read_bytes().decode().split("\0"))
         if command:
-            found[command] = child
+            found.setdefault(command, child)
     return found
 
 

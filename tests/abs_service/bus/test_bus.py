@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import zenoh
 
+from abs_service.bus import zenoh_bus
 from abs_service.bus.contract import EVENTS, IMAGES, STATE, Sample
 from abs_service.bus.session import BusError, Role, check_endpoint, open_session
 from abs_service.bus.zenoh_bus import ZenohBus
@@ -238,6 +239,54 @@ def test_a_callback_that_does_not_return_is_left_behind_with_a_warning(caplog):
     session: Any = Session()
     ZenohBus(session, "demo").close()
     assert "rig demo: the session did not close, a callback has not returned" in caplog.text
+
+
+def test_closing_ends_within_a_second_whatever_a_callback_does(caplog, monkeypatch):
+    monkeypatch.setattr(zenoh_bus, "CLOSE_S", 0.05)
+    returns = threading.Event()
+
+    class Session:
+        def is_closed(self) -> bool:
+            return False
+
+        def close(self):
+            returns.wait()
+
+    session: Any = Session()
+    ZenohBus(session, "demo").close()
+    assert not returns.is_set()
+    assert "a callback has not returned: no answer within" in caplog.text
+    returns.set()
+
+
+@pytest.mark.slow
+def test_a_process_ends_though_a_callback_waits_for_ever(endpoint):
+    program = f"""
+import threading
+from abs_service import cli
+from abs_service.bus.contract import EVENTS
+from abs_service.bus.session import Role
+from abs_service.bus.zenoh_bus import ZenohBus
+
+def main():
+    entered = threading.Event()
+    def wait_for_ever(sample):
+        entered.set()
+        threading.Event().wait()
+    with ZenohBus.open("demo", "{endpoint}", Role.ROUTER) as bus:
+        bus.subscribe("x", wait_for_ever)
+        publisher = bus.publisher("x", "m", EVENTS)
+        while not entered.wait(0.02):
+            publisher.put(b"")
+    print("done")
+    return 7
+
+cli.main = main
+cli.program()
+"""
+    ended = subprocess.run([sys.executable, "-c", program], check=False, timeout=20, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout) == (7, "done\n")
+    assert "left behind, since they do not end: " in ended.stderr
 
 
 def test_the_interpreter_waits_for_callbacks_that_a_daemon_declared(open_bus):

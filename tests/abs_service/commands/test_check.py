@@ -46,7 +46,8 @@ def test_what_a_configuration_describes(checked, tmp_path):
         "publishes abs/bench/sheet/state",
         "images: 3 MB/s sent, recorded 3",
         "connect to tcp/127.0.0.1:7447",
-        f"records to {tmp_path / 'recordings'}",
+        f"records to {tmp_path / 'recordings'}: ",
+        " on this disk",
     ):
         assert part in out
 

@@ -212,14 +212,35 @@ def test_the_table_leaves_notes_above_and_the_summary_below(live):
     assert "vertex error mean 2.35 mm" in text
 
 
-def test_the_summary_lists_images_estimates_errors_losses_file_and_restarts(live):
-    assert view(live).summary() == [
+def test_the_summary_lists_images_estimates_errors_losses_file_and_restarts(live, tmp_path):
+    (tmp_path / "demo_2026.mcap").touch()
+    assert view(live, directory=tmp_path).summary() == [
         "83.4 s, 60 images, 4 dropped",
         "sheet: 12 estimates, 3 frame sets skipped, 17.3 ms each, 12 TRACKING",
         "sheet: vertex error mean 2.35 mm, max 2.35 mm; surface error mean 0.99 mm, max 0.99 mm",
-        "/takes/demo_2026.mcap: 2.0 MB, 500 messages, 3 dropped",
+        f"{tmp_path}/demo_2026.mcap: 2.0 MB, 500 messages, 3 dropped",
         "restarts: record 2",
     ]
+
+
+def test_the_summary_says_what_there_is_of_a_recording_that_failed(live, tmp_path):
+    failed = recorder(2_000_000)
+    failed.counters["failures"], failed.labels["last_failure"] = 2, "No space left on device"
+    take_health(live, failed)
+    assert f"{tmp_path}/demo_2026.mcap (is gone): 2.0 MB" in "\n".join(view(live, directory=tmp_path).summary())
+    (tmp_path / "demo_2026.mcap.active").touch()
+    summary = "\n".join(view(live, directory=tmp_path).summary())
+    assert f"{tmp_path}/demo_2026.mcap.active (unfinished: `abs-service recover` completes it): 2.0 MB" in summary
+    assert "recording failed 2×, last: No space left on device" in summary
+
+
+def test_a_file_name_from_the_network_stays_in_the_folder_and_the_forecast_is_shown(live):
+    odd = recorder(2_000_000)
+    odd.labels["file"], odd.labels["forecast"] = "../../etc/passwd", "2.6 days on this disk"
+    take_health(live, odd)
+    assert (shown := view(live).recording)
+    assert shown.file == Path("/takes/passwd")
+    assert "2.6 days on this disk" in drawn(view(live), width=120)
 
 
 def test_plain_output_is_one_line_a_second(live):

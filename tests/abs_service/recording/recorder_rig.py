@@ -14,6 +14,8 @@ from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 
+#: Time between two attempts to record after a failure [s].
+RETRY_S = 0.02
 DEPTH = keys.image("tof", "depth")
 
 
@@ -26,7 +28,7 @@ class Rig:
         self.headers = HeaderFactory("demo", self.clock)
         self.health = Health(self.bus, "record", self.headers)
         settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)
-        self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes)
+        self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes, RETRY_S)
 
     def publish_image(self, frame):
         header = self.headers.at(frame.t_host_ns, frame.seq)
@@ -34,6 +36,10 @@ class Rig:
         info = codec.encode_info(frame, header)
         self.bus.publisher(keys.image(frame.sensor, frame.stream), codec.IMAGE_SCHEMA, IMAGES).put(image, info)
         return image, info
+
+    def written(self, count):
+        """Whether so many messages have been recorded."""
+        return self.said.counters["recorded"] >= count
 
     @property
     def said(self):
@@ -68,3 +74,10 @@ def metadata(path, name="abs.recording"):
 
 def recordings(directory):
     return sorted(directory.glob("*.mcap"))
+
+
+def sequences(directory):
+    """Numbers of all depth images in the recordings of a folder, in their order."""
+    return sorted(
+        m.message.sequence for p in recordings(directory) for m in read(p)[0] if m.channel.topic == f"/{DEPTH}"
+    )

@@ -5,6 +5,7 @@ import threading
 
 import pytest
 from absmsg.v1 import frame_info_pb2
+from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from abs_service.bus import keys
@@ -14,7 +15,8 @@ from abs_service.wire import message_header
 from calib.camera import Camera
 from drivers.encoding import codec, encoded_image
 from drivers.encoding.encoded_image import ImageCodec
-from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
+from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings, sequences
+from tests.waiting import eventually
 
 
 def test_a_recording_holds_what_was_published_byte_for_byte(tmp_path):
@@ -112,6 +114,45 @@ def test_absurd_stamps_are_replaced_by_the_present(tmp_path, seconds):
     rig.recorder.stop(5)
     image, _ = read(recordings(tmp_path)[0])[0]
     assert before <= image.message.log_time <= before + 10**10 or image.message.log_time == seconds * 10**9
+
+
+def test_a_sensor_whose_name_is_a_path_is_refused(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    model = SensorModel(sensor="../../x", calib_id="1")
+    rig.bus.deliver(Sample(keys.model("tof"), message_header.MODEL, model.SerializeToString()))
+    rig.recorder.stop(5)
+    assert rig.said.counters["refused"] == 1
+    assert read(recordings(tmp_path)[0])[1].keys() == {"rig.toml"}
+
+
+def test_a_sensor_whose_stamp_is_absurd_does_not_end_the_recording(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    model = SensorModel(sensor="tof", calib_id="1")
+    model.header.stamp.seconds = 1 << 62
+    rig.bus.deliver(Sample(keys.model("tof"), message_header.MODEL, model.SerializeToString()))
+    rig.publish_image(depth(1))
+    rig.recorder.stop(5)
+    assert (rig.said.counters["refused"], rig.recorder.failures) == (1, 0)
+    assert sequences(tmp_path) == [1]
+
+
+def test_a_mistake_of_ours_costs_a_message_and_is_said_but_does_not_end_the_recording(tmp_path, caplog):
+    def encode(payload):
+        if rig.recorder.failures == 0:
+            raise ZeroDivisionError("a mistake")
+        return codec.IMAGE_SCHEMA, payload
+
+    rig = Rig(tmp_path, encode_image=encode, flush_s=0.005)
+    rig.recorder.start()
+    rig.publish_image(depth(1))
+    rig.publish_image(depth(2))
+    assert eventually(lambda: rig.recorder.failures == 1 and not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert rig.said.labels["last_failure"] == "ZeroDivisionError: a mistake"
+    assert "a mistake" in caplog.text
+    assert sequences(tmp_path) == [2]
 
 
 def test_gaps_in_the_numbers_are_counted_by_topic(tmp_path):

@@ -1,9 +1,14 @@
 """The recorder with a disk that is slow, nearly full, full or missing."""
 
 import queue
+import stat
 import threading
 
-from tests.abs_service.recording.recorder_rig import DEPTH, Rig, depth, metadata, read, recordings
+import pytest
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.recording.recovery import recover
+from tests.abs_service.recording.recorder_rig import DEPTH, RETRY_S, Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually
 
 
@@ -54,43 +59,138 @@ def test_a_slow_disk_costs_a_bounded_queue_and_every_drop_is_counted(tmp_path):
     assert metadata(path)[f"dropped.{DEPTH}"] == str(dropped)
 
 
-def test_it_stops_before_the_disk_is_full_with_a_complete_file(tmp_path):
-    free = iter([10**9, 10**9, 999])
-    rig = Rig(tmp_path, free_bytes=lambda folder: next(free, 999), minimum_free_bytes=1000, flush_s=0.005)
+def test_it_stops_before_the_disk_is_full_with_a_complete_file_and_resumes_when_there_is_room(tmp_path):
+    free = [10**9]
+    rig = Rig(tmp_path, free_bytes=lambda folder: free[0], minimum_free_bytes=1000, flush_s=0.005)
     rig.recorder.start()
     rig.publish_image(depth(1))
+    assert eventually(lambda: rig.written(1))
+    free[0] = 999
     assert eventually(lambda: rig.recorder.failed)
-    rig.recorder.stop(5)
-    assert rig.recorder.failed.startswith("only 0 MB free in")
+    assert rig.recorder.failed == f"only 0 MB free in {tmp_path}; recording resumes with 0 MB"
     assert rig.said.message.startswith("RECORD_FAILED only 0 MB free")
     (path,) = recordings(tmp_path)
     assert metadata(path)["ended"] == "low space"
+    free[0] = 1400  # not enough: it would be full again at once
+    threading.Event().wait(3 * RETRY_S)
+    assert rig.recorder.failed
+    rig.publish_image(depth(2))  # waits in the queue
+    free[0] = 2000
+    assert eventually(lambda: not rig.recorder.failed)
+    assert rig.said.level == Health.LEVEL_OK
+    rig.recorder.stop(5)
+    assert [rig.recorder.failures, rig.said.counters["failures"]] == [1, 1]
+    assert sequences(tmp_path) == [1, 2]
 
 
-def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered(tmp_path):
-    class Full(SlowFile):
-        def write(self, data):
-            if self._file.tell() > 5000:
-                raise OSError(28, "No space left on device")
-            return self._file.write(data)
+class Full(SlowFile):
+    """A disk that is full after 5 kB."""
 
-    rig = Rig(tmp_path, open_file=Full, flush_s=0.005)
+    def write(self, data):
+        if self._file.tell() > 5000:
+            raise OSError(28, "No space left on device")
+        return self._file.write(data)
+
+
+def test_a_disk_error_is_reported_at_once_and_the_file_can_be_recovered_while_recording_goes_on(tmp_path):
+    rig = Rig(
+        tmp_path, open_file=lambda path: SlowFile(path) if list(tmp_path.iterdir()) else Full(path), flush_s=0.005
+    )
     rig.recorder.start()
     seq = 0
     while not rig.recorder.failed:
         rig.publish_image(depth(seq := seq + 1))
         threading.Event().wait(0.001)
     assert rig.recorder.failed == "[Errno 28] No space left on device"
-    rig.publish_image(depth(0))  # harmless
-    rig.recorder.stop(5)
     assert rig.said.message == "RECORD_FAILED [Errno 28] No space left on device"
-    assert recordings(tmp_path) == []
-    assert len(list(tmp_path.glob("*.mcap.active"))) == 1
+    for _ in range(10):
+        rig.publish_image(depth(seq := seq + 1))
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert rig.said.labels["last_failure"] == "[Errno 28] No space left on device"
+    (left,) = tmp_path.glob("*.mcap.active")
+    recover(left)
+    saved = sequences(tmp_path)
+    assert saved[-10:] == list(range(seq - 9, seq + 1)), "what waited in the queue"
+    assert len(set(range(1, seq + 1)) - set(saved)) <= rig.said.counters["unsaved"]
 
 
-def test_a_folder_that_is_gone_is_an_error_like_any_other(tmp_path):
-    rig = Rig(tmp_path / "nowhere")
+def test_a_folder_that_cannot_be_written_is_said_leaves_no_scraps_and_is_tried_again(tmp_path):
+    folder = tmp_path / "kept"
+    folder.write_text("in the way of the folder")
+    rig = Rig(folder, flush_s=0.005)
     rig.recorder.start()
     assert eventually(lambda: rig.recorder.failed)
+    assert "File exists" in rig.said.message
+    rig.publish_image(depth(1))
+    folder.unlink()
+    assert eventually(lambda: not rig.recorder.failed)
     rig.recorder.stop(5)
-    assert "No such file or directory" in rig.recorder.failed
+    assert [path.suffix for path in folder.iterdir()] == [".mcap"]
+    assert sequences(folder) == [1]
+
+
+def test_a_disk_that_takes_no_beginning_of_a_file_is_not_littered(tmp_path):
+    class Refusing(SlowFile):
+        def write(self, data):
+            raise OSError(5, "Input/output error")
+
+    rig = Rig(tmp_path, open_file=Refusing)
+    rig.recorder.start()
+    assert eventually(lambda: rig.recorder.failed)
+    threading.Event().wait(3 * RETRY_S)
+    rig.publish_image(depth(1))
+    rig.recorder.stop(5)
+    assert not list(tmp_path.iterdir())
+    rig.recorder.report()
+    assert rig.said.counters[f"dropped.{DEPTH}"] == 1
+
+
+@pytest.mark.parametrize("event", ["deleted", "moved"])
+def test_an_open_file_that_is_taken_away_is_noticed_and_another_one_begun(tmp_path, event):
+    folder, elsewhere = tmp_path / "kept", tmp_path / "elsewhere"
+    rig = Rig(folder, flush_s=0.005)
+    rig.recorder.start()
+    rig.publish_image(depth(1))
+    assert eventually(lambda: rig.written(1))
+    (active,) = folder.glob("*.active")
+    if event == "deleted":
+        active.unlink()
+    else:
+        folder.rename(elsewhere)
+    assert eventually(lambda: rig.recorder.failures == 1)
+    name = active.name.removesuffix(".active")
+    assert rig.said.labels["last_failure"] == f"{name} was {event} while it was written"
+    rig.publish_image(depth(2))
+    assert eventually(lambda: not rig.recorder.failed)
+    rig.recorder.stop(5)
+    assert sequences(folder) == [2]
+    if event == "moved":  # complete where it is now
+        assert metadata(elsewhere / name)["ended"] == "gone"
+        assert sequences(elsewhere) == [1]
+
+
+def test_what_the_disk_does_not_take_in_time_at_the_end_is_a_failure(tmp_path):
+    files = []
+
+    def slow(path):
+        files.append(SlowFile(path))
+        return files[-1]
+
+    rig = Rig(tmp_path, open_file=slow, flush_s=0.005)
+    rig.recorder.start()
+    assert eventually(lambda: files)
+    files[0].release.clear()
+    rig.publish_image(depth(1))
+    files[0].entered.get(timeout=5)
+    rig.recorder.stop(0.01)
+    files[0].release.set()
+    assert rig.said.labels["last_failure"] == "the disk did not take within 0.01 s what waited"
+
+
+def test_recordings_can_be_read_by_their_owner_and_group_only(tmp_path):
+    rig = Rig(tmp_path)
+    rig.recorder.start()
+    rig.recorder.stop(5)
+    (path,) = recordings(tmp_path)
+    assert stat.filemode(path.stat().st_mode) == "-rw-r-----"

@@ -2,6 +2,7 @@
 
 import fcntl
 import random
+import stat
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import recover as command
-from abs_service.recording.recovery import RecoveryError, leftovers, recover
+from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import Compression, McapFile
@@ -172,6 +173,28 @@ def test_an_interrupted_recovery_is_repeated(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap.active"]
     assert recover(source).messages == 2 * FRAMES
+
+
+def test_what_a_killed_recovery_left_is_removed_and_what_a_living_one_writes_is_not(tmp_path):
+    (tmp_path / "dead.mcap.recovering").touch()
+    with (tmp_path / "alive.mcap.recovering").open("wb") as writer:
+        fcntl.flock(writer, fcntl.LOCK_EX)
+        remove_interrupted(tmp_path)
+        assert [path.name for path in tmp_path.iterdir()] == ["alive.mcap.recovering"]
+
+
+def test_results_go_to_another_folder_and_the_originals_stay(tmp_path, capsys):
+    import argparse
+
+    source = write(tmp_path / "a.mcap.active", finish=False)
+    parser = argparse.ArgumentParser()
+    command.add_arguments(parser)
+    assert command.run(parser.parse_args([str(source), "--out", str(tmp_path / "saved" / "here")])) == 0
+    assert source.exists()
+    target = tmp_path / "saved" / "here" / "a.mcap"
+    assert len(read(target)[0]) == 2 * FRAMES
+    assert stat.filemode(target.stat().st_mode) == "-rw-r-----"
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.mcap.active"]
 
 
 def test_the_command_reports_each_file_and_continues_after_an_error(tmp_path, capsys):

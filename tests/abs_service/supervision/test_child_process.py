@@ -78,8 +78,8 @@ from abs_service.supervision.child_process import ChildProcess, ThreadTimes
 from tests.waiting import eventually
 code = '''
 import signal, time
-from abs_service import lifeline
-lifeline.GRACE_S = 0.2
+from abs_service.supervision import parent_watchdog
+parent_watchdog.GRACE_S = 0.2
 signal.signal(signal.SIGTERM, {handler})
 parent_watchdog.start()
 print("ready", flush=True)

@@ -1,6 +1,7 @@
 import argparse
 import io
 import signal
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -19,7 +20,7 @@ from abs_service.commands import run
 from abs_service.display.lines import PlainDisplay
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
-from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import estimate_messages
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -92,21 +93,22 @@ def test_a_rig_has_one_process_per_tracker_and_stops_its_recorder_last(tmp_path)
     assert "record" not in [child.component for child in run.children(off, tmp_path / "x.toml")]
 
 
-class TestTheFileOfTheChildren:
-    def test_it_says_the_same_and_is_gone_at_the_end(self, rig_file):
-        rig = config.load(rig_file)
-        with run.file(rig) as path:
-            assert config.load(path) == rig
-        assert not path.exists()
+def test_the_file_of_the_children_says_the_same_and_leaves_nothing_behind(rig_file, tmp_path, monkeypatch):
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    rig = config.load(rig_file)
+    with run.file(rig) as path:
+        assert config.load(path) == rig
+        assert not list(folder.iterdir()), "which would stay after a kill"
+    assert not path.exists()
 
-    def test_its_removal_by_others_does_no_harm(self, rig_file, monkeypatch):
-        rig = config.load(rig_file)
-        monkeypatch.setattr(run, "ChildProcess", lambda component, arguments, on_line: Idle(component))
-        with run.file(rig) as path:
-            path.unlink()
-            run.spawn(PlainDisplay(io.StringIO(), io.StringIO()), path, config.to_toml(rig), "capture", ())
-            assert config.load(path) == rig
-            path.unlink()
+
+@pytest.mark.parametrize(("code", "expected"), [(0, Exit.OK), (1, Exit.FAILED), (-9, Exit.FAILED)])
+def test_a_run_says_by_its_exit_code_whether_the_recording_is_complete(code, expected):
+    ended = Child("record", (), 0, State.STOPPED, exit_code=code)
+    assert run.recording_code([ended]) is expected
+    assert run.recording_code([]) is Exit.OK
 
 
 class Bench:

@@ -1,0 +1,116 @@
+"""Writes the messages of a rig to one file after the other, and counts them."""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from absmsg.v1.sensor_model_pb2 import SensorModel
+from google.protobuf.json_format import Error as JsonError
+from google.protobuf.json_format import MessageToJson
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Sample
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import WallClock
+from abs_service.recording.recording_file import RecordingFile
+from abs_service.wire import message_header as header
+from drivers.encoding.encoded_image import ImageEncoder
+from drivers.encoding.mcap_file import McapFileError
+from drivers.encoding.parsing import CodecError
+
+#: Messages repeated at the start of each file, so that every file is self-contained.
+_LATCHED = frozenset({header.CALIBRATION, header.CONFIG, header.MODEL, header.TOPOLOGY, header.TRANSFORMS})
+
+
+class SampleWriter:
+    """Writes samples to a file, images as the encoder says, and refuses what is no message of ours.
+
+    Args:
+        encode_image: makes the recorded message of an image.
+        health: of the recorder; has the counters.
+        clock: stamps what has no stamp.
+    """
+
+    def __init__(self, encode_image: ImageEncoder, health: Health, clock: WallClock) -> None:
+        self._encode_image = encode_image
+        self._health = health
+        self._clock = clock
+        self._latched: dict[str, Sample] = {}
+        self._last_seq: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()  # of the open file
+        self._attached: dict[str, str] = {}  # to the open file: calib_id by sensor
+        self._reported_drops: Counter[str] = Counter()  # drops in the metadata of finished files
+        self.unsaved = 0  # messages written since `saved` was called
+
+    def latch(self, samples: Iterable[Sample]) -> None:
+        """Remembers those of the samples that each file begins with."""
+        self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
+
+    def begin(self, file: RecordingFile) -> None:
+        """Begins a file with what makes it self-contained. Raises as `write`."""
+        self._counts = Counter()
+        self._attached = {}
+        self.unsaved = 0
+        for sample in self._latched.values():
+            self.write(file, sample, is_repeated=True)
+
+    def saved(self) -> None:
+        """All that was written is on disk."""
+        self.unsaved = 0
+
+    def write(self, file: RecordingFile, sample: Sample, is_repeated: bool = False) -> None:
+        """Writes one message and counts it.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        if sample.topic == keys.SCHEMA:
+            return
+        self.unsaved += 1
+        try:
+            about = header.parse(sample)
+            stamp_ns = self._stamp_ns(about.stamp_ns, is_repeated)
+            message, payload = sample.message, sample.payload
+            if message == header.IMAGE:
+                message, payload = self._encode_image(payload)
+            if sample.message == header.MODEL:
+                self._attach_calibration(file, sample, stamp_ns)
+            file.write(sample.topic, message, payload, stamp_ns, about.seq)
+            if keys.is_image(sample.topic) and sample.attachment:
+                file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
+        except (CodecError, McapFileError, JsonError, ValueError) as error:
+            # Other programs can publish below our keys; that must not end the recording.
+            self._health.count("refused")
+            self._health.label("refused", str(error))
+            return
+        self._count(sample.topic, about.seq)
+        self.latch([sample])
+
+    def summary(self, dropped: Mapping[str, int]) -> dict[str, str]:
+        """Counts of messages in the file, and of lost ones, where `dropped` has the totals of the queue by topic."""
+        total = Counter(dropped)
+        for topic, number in (total - self._reported_drops).items():
+            self._counts[f"dropped.{topic}"] = number
+        self._reported_drops = total
+        return {name: str(number) for name, number in sorted(self._counts.items())}
+
+    def _attach_calibration(self, file: RecordingFile, sample: Sample, stamp_ns: int) -> None:
+        """Attaches what a sensor is, when the file does not hold it yet, to be had without reading messages."""
+        model = SensorModel.FromString(sample.payload)
+        keys.check_name(model.sensor)  # a program that saves attachments as files must not leave its folder
+        if self._attached.get(model.sensor) != model.calib_id:
+            text = MessageToJson(model, preserving_proto_field_name=True)
+            file.attach(f"calibration/{model.sensor}.json", "application/json", text, stamp_ns)
+            self._attached[model.sensor] = model.calib_id
+
+    def _stamp_ns(self, stamp_ns: int, is_repeated: bool) -> int:
+        is_usable = 0 < stamp_ns < 1 << 63
+        return stamp_ns if is_usable and not is_repeated else self._clock.wall(self._clock.monotonic())
+
+    def _count(self, topic: str, seq: int) -> None:
+        self._counts[f"messages.{topic}"] += 1
+        self._health.count("recorded")
+        gap = seq - self._last_seq.get(topic, seq) - 1
+        if gap > 0:  # lost before they came here
+            self._counts[f"missing.{topic}"] += gap
+            self._health.count(f"missing.{topic}", gap)
+        self._last_seq[topic] = seq

@@ -1,0 +1,29 @@
+import errno
+import tempfile
+
+import pytest
+
+from abs_service.recording import folder
+from abs_service.recording.folder import FolderError
+
+
+def test_a_folder_is_made_and_left_empty(tmp_path):
+    folder.check(tmp_path / "a" / "b")
+    assert not list((tmp_path / "a" / "b").iterdir())
+
+
+def test_a_mistake_is_explained(tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(FolderError, match='taken/below": cannot be made: Not a directory'):
+        folder.check(tmp_path / "taken" / "below")
+    with pytest.raises(FolderError, match='"/proc": cannot be written: '):
+        folder.check(folder.Path("/proc"))
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.ENOSPC, errno.EIO])
+def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp_path, monkeypatch):
+    def refuse(dir):  # noqa: A002 - the library's name
+        raise OSError(number, "of the disk")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    folder.check(tmp_path)
