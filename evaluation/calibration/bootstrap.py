@@ -9,7 +9,6 @@ from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.observability import UndeterminedError
 from calib.solve.bundle.state import State
-from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 
 

@@ -17,6 +17,7 @@ from abs_service.calibration.shots.guide import LineGuide, coverage_map, draw
 from abs_service.calibration.shots.shot_sources import RecordingShots
 from abs_service.supervision.exit_codes import Exit
 from calib.board.corners.errors import BlurredError, MovedError
+from calib.board.distinct import counts_of, distinct_poses
 from drivers.replay.recording import Recording
 from drivers.simulated.shapes.printed import TARGETS
 from tests.calib.board.test_coverage import SIZES, many, view
