@@ -18,9 +18,12 @@ from calib.solve.bundle.equations import Equations
 #: Minimum number of distinct poses whose scatter says anything; with fewer, noise has to be taken for the only error.
 MIN_POSES = 4
 
-#: Weight of the noise's covariance, enlarged as the scatter is on average. A dozen poses cannot say how forty
-#: parameters vary together: without it the covariance would be singular.
-SHRINKAGE = 0.25
+#: Weight of the noise's covariance, enlarged as the scatter is on average: a dozen poses do not say how forty
+#: parameters vary together.
+SHRINKAGE = 0.35
+
+#: Least variance in any direction relative to the noise's: where a dozen poses agree by chance, nothing is certain.
+MIN_GROWTH = 0.7
 
 #: Share of the knowledge of a parameter that one pose may have; beyond it nothing contradicts that pose.
 MAX_SHARE = 0.95
@@ -85,9 +88,17 @@ def pose_covariance(said: Pulls, noise: NDArray[np.float64]) -> NDArray[np.float
         pull = axes.T @ white @ score / (said.efficiency * np.sqrt(1 - np.where(alone, 0, shares)))
         pull = axes @ np.where(alone, 0, pull)
         scatter += np.outer(pull, pull) + repeats * (axes * np.where(alone, shares, 0)) @ axes.T
-    found = white.T @ scatter @ white
-    growth = max(float(np.trace(linalg.solve(noise, found, assume_a="pos"))) / len(noise), 1.0)
-    return (1 - SHRINKAGE) * found + SHRINKAGE * growth * noise
+    return _shrunk(white.T @ scatter @ white, noise)
+
+
+def _shrunk(found: NDArray[np.float64], noise: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance (k, k) between the estimated one and the noise's, and nowhere much below the noise's."""
+    lower = linalg.cholesky(noise, lower=True)
+    white = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
+    growths, axes = linalg.eigh(white @ found @ white.T)
+    growths = np.maximum((1 - SHRINKAGE) * growths + SHRINKAGE * growths.mean(), MIN_GROWTH)
+    colored = lower @ axes
+    return (colored * growths) @ colored.T
 
 
 def with_boards(independent: NDArray[np.float64], sensors: NDArray[np.float64]) -> NDArray[np.float64]:
