@@ -20,7 +20,7 @@ MIN_POSES = 4
 
 #: Weight of the noise's covariance, enlarged as the scatter is on average: a dozen poses do not say how forty
 #: parameters vary together.
-SHRINKAGE = 0.35
+SHRINKAGE = 0.25
 
 #: Least variance in any direction relative to the noise's: where a dozen poses agree by chance, nothing is certain.
 MIN_GROWTH = 0.7

@@ -63,8 +63,8 @@ def require_views(task: Task) -> None:
         if count < least:
             why = "to be placed in the rig" if sensor.fixed_intrinsics else "to find its intrinsics"
             raise ViewsError(
-                f"{name}: {len(shots)} views of {count} distinct poses of the board; at least {least} poses are needed "
-                f"{why}, better 30"
+                f"{name}: {len(shots)} views of {count} distinct pose{'s' * (count != 1)} of the board; at least {least} poses "
+                f"are needed {why}, better 30"
             )
 
 
