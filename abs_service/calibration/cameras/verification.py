@@ -1,5 +1,6 @@
 """Verification of a stored calibration against new views of a board, as a report in plain words."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -163,9 +164,11 @@ def _ours(seen: BoardObservations, sensors: Mapping[str, SensorState]) -> Views:
 
 
 def _thinned(views: Views) -> Views:
-    """At most a fixed number of evenly spread shots; of shots that repeat a pose of the board only the first."""
+    """At most a fixed number of evenly spread shots: of each distinct pose the one that most sensors saw."""
     poses = distinct_poses(views.corners)
-    shots = sorted({poses[view.shot] for view in views.corners})
+    seen = Counter(view.shot for view in views.corners)
+    best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}
+    shots = sorted(best.values())
     kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
     fewer = views.of(views.shots, kept)
     return Views(fewer.corners, [_sparse(view) for view in fewer.planes])

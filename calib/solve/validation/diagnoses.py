@@ -62,9 +62,10 @@ def require_views(task: Task) -> None:
         count = len({task.poses[shot] for shot in shots})
         if count < least:
             why = "to be placed in the rig" if sensor.fixed_intrinsics else "to find its intrinsics"
+            plural = "s" * (count != 1)
             raise ViewsError(
-                f"{name}: {len(shots)} views of {count} distinct pose{'s' * (count != 1)} of the board; at least {least} poses "
-                f"are needed {why}, better 30"
+                f"{name}: {len(shots)} views of {count} distinct pose{plural} of the board; at least {least} poses are "
+                f"needed {why}, better 30"
             )
 
 
