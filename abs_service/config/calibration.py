@@ -57,11 +57,13 @@ class ResidualsTable(Table):
         corners_px: of corners [px].
         distances: of distances on boards [m].
         views: number of images that showed the board.
+        poses: number of distinct poses of the board in them.
     """
 
     corners_px: FiniteFloat | None = None
     distances: FiniteFloat | None = None
     views: int | None = None
+    poses: int | None = None
 
 
 class SensorEvidence(Table):

@@ -9,8 +9,8 @@ import numpy as np
 from calib import pose
 from calib.board.views import CornerView
 
-#: Two poses differ if they are this far apart in position (of half the image), size (a factor), or an angle [rad].
-_PLACE, _SIZE, _ANGLE = 0.2, 1.2, np.deg2rad(8)
+#: A board has moved if it differs by this in position (of half the image), size (a factor), or roll [rad].
+_PLACE, _SIZE, _ROLL = 0.2, 1.2, np.deg2rad(16)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +52,12 @@ def board_pose_features(view: CornerView, size: tuple[int, int]) -> BoardPose:
     return BoardPose((float(place[0]), float(place[1])), share, (across, along), roll)
 
 
-def differs(a: BoardPose, b: BoardPose) -> bool:
-    """True if two poses are different enough to count as two views."""
+def moved(a: BoardPose, b: BoardPose) -> bool:
+    """True if two poses differ enough in place, size or roll to count as two; tilts are not certain enough."""
     place = max(abs(x - y) for x, y in zip(a.place, b.place))
-    tilt = max(abs(x - y) for x, y in zip(a.tilt, b.tilt))
     roll = abs((a.roll - b.roll + np.pi) % (2 * np.pi) - np.pi)
     ratio = max(a.size, b.size) / max(min(a.size, b.size), 1e-9)
-    return place > _PLACE or tilt > _ANGLE or roll > 2 * _ANGLE or ratio > _SIZE
+    return place > _PLACE or roll > _ROLL or ratio > _SIZE
 
 
 def extent(views: Sequence[CornerView]) -> tuple[int, int]:

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board import mirrored
-from calib.board.board_pose_features import BoardPose, board_pose_features, differs, extent
+from calib.board.board_pose_features import BoardPose, board_pose_features
+from calib.board.distinct import distinct_poses, is_repeated
 from calib.board.views import CornerView
 
-#: Minimum number of views of a sensor, and number for a reliable calibration.
+#: Minimum number of distinct poses before a sensor, and number for a reliable calibration.
 MIN_VIEWS, SUFFICIENT_VIEWS = 4, 12
-#: Number of common shots for a reliable relative pose of two sensors.
+#: Number of distinct poses before both for a reliable relative pose of two sensors.
 SUFFICIENT_SHARED = 6
 #: Required tilt of the board in each of the four directions [rad].
 SUFFICIENT_TILT = np.deg2rad(18)
@@ -59,16 +60,17 @@ def check(views: Iterable[CornerView]) -> None:
     """
     views = list(views)
     for sensor, seen in by_sensor(views).items():
-        if len(seen) < MIN_VIEWS:
-            raise TooFewViewsError(
-                f"{sensor}: {len(seen)} view{'s' * (len(seen) != 1)} of the board, but a calibration needs "
-                f"{MIN_VIEWS} at the very least and {SUFFICIENT_VIEWS} to be reliable"
-            )
-        features = [board_pose_features(view, extent(seen)) for view in seen]
-        if not any(differs(a, b) for a, b in combinations(features, 2)):
+        count = len(set(distinct_poses(seen).values()))
+        if count == 1 and len(seen) >= MIN_VIEWS:
             raise ViewsAlikeError(
                 f"{sensor}: all {len(seen)} views show the board in nearly the same pose, and so are as good as one. "
                 "Tilt it to all four sides by 20° to 40°, hold it near and far, and into the corners of the image"
+            )
+        if count < MIN_VIEWS:
+            raise TooFewViewsError(
+                f"{sensor}: {len(seen)} view{'s' * (len(seen) != 1)} of {count} distinct "
+                f"pose{'s' * (count != 1)} of the board, but a calibration needs {MIN_VIEWS} at the very least and "
+                f"{SUFFICIENT_VIEWS} to be reliable"
             )
     mirrored.check(views)
 
@@ -82,8 +84,10 @@ def missing_views(views: Sequence[CornerView], sizes: Mapping[str, tuple[int, in
     """
     seen = by_sensor(views)
     found = [view for sensor, size in sizes.items() for view in _of_sensor(sensor, size, seen.get(sensor, []))]
+    poses = distinct_poses(views, sizes)
     for first, second in combinations(sizes, 2):
-        shared = {v.shot for v in seen.get(first, [])} & {v.shot for v in seen.get(second, [])}
+        both = {v.shot for v in seen.get(first, [])} & {v.shot for v in seen.get(second, [])}
+        shared = {poses[shot] for shot in both}
         if seen.get(first) and seen.get(second) and len(shared) < SUFFICIENT_SHARED:
             text = (
                 f"show the board to {first} and {second} at the same time ({len(shared)} of {SUFFICIENT_SHARED} times)"
@@ -102,8 +106,7 @@ def counts(views: Sequence[CornerView], size: tuple[int, int], columns: int, row
 def adds_information(view: CornerView, kept: Sequence[CornerView], size: tuple[int, int]) -> bool:
     """True if a view adds a new pose, or covers a new part of the image."""
     own = [other for other in kept if other.sensor == view.sensor]
-    new = board_pose_features(view, size)
-    if all(differs(new, board_pose_features(other, size)) for other in own):
+    if not is_repeated(view, own, size):
         return True
     seen = counts(own, size, 3, 3)
     more = seen + counts([view], size, 3, 3)
@@ -123,8 +126,9 @@ def _of_sensor(sensor: str, size: tuple[int, int], views: Sequence[CornerView]) 
         return [MissingView(sensor, f"show the board to {sensor}: it has not seen it yet")]
     features = [board_pose_features(view, size) for view in views]
     texts = _tilts(features) + _distances(features) + _places(sensor, size, views)
-    if not texts and len(views) < SUFFICIENT_VIEWS:
-        texts = [f"show more poses to {sensor} ({len(views)} of {SUFFICIENT_VIEWS})"]
+    count = len(set(distinct_poses(views, {sensor: size}).values()))
+    if not texts and count < SUFFICIENT_VIEWS:
+        texts = [f"show more poses to {sensor} ({count} of {SUFFICIENT_VIEWS})"]
     return [MissingView(sensor, text) for text in texts]
 
 

@@ -9,6 +9,7 @@ from abs_service.calibration.files.rig_file import Covariance, Residuals, RigCal
 from abs_service.report import figures
 from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing
 from abs_service.report.provenance import Provenance
+from calib.board.distinct import counts_of
 from calib.solve.solution import Solution, ViewFit
 from calib.solve.validation.verdict import Assessment
 
@@ -26,9 +27,11 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
     verdicts += [Verdict(Level.DOUBTFUL, reason) for reason in found.reasons[1:]]
     sections = [_cross_validation(found), *(_sensor(name, solution, found) for name in solution.task.sensors)]
     sections += [Section("Images that were not used", tuple(notes))] if notes else []
+    poses = counts_of([*solution.task.corners, *solution.task.planes], solution.task.poses)
     values = {
         "trusted": found.trusted,
         "distance_m": found.distance,
+        "poses": poses,
         "parameters": {each.name: {"value": each.value, "sigma": each.sigma} for each in solution.parameters},
         "deviations": dict(solution.deviations),
         "halves": {
@@ -68,7 +71,7 @@ def calibration(
             before.noise,
             before.texture,
             before.factory or next(iter(task.factory), None),
-            _residuals([view for view in solution.views if view.sensor == sensor]),
+            _residuals([view for view in solution.views if view.sensor == sensor], solution.task.poses),
         )
     count = solution.adjustment.layout.board_start
     names = tuple(solution.adjustment.layout.names[:count])
@@ -76,13 +79,13 @@ def calibration(
     return RigCalibration(name, {**kept, **sensors}, origin, "good" if trusted else "doubtful", covariance)
 
 
-def _residuals(views: Sequence[ViewFit]) -> Residuals:
+def _residuals(views: Sequence[ViewFit], poses: Mapping[int, int]) -> Residuals:
     parts: dict[str, float | None] = {}
     for of in ("corners", "distances"):
         squares = [view.residuals.reshape(len(view.pixels), -1) for view in views if view.of == of]
         parts[of] = float(np.sqrt(np.mean(np.sum(np.concatenate(squares) ** 2, axis=1)))) if squares else None
     shots = {view.shot for view in views}
-    return Residuals(parts["corners"], parts["distances"], len(shots))
+    return Residuals(parts["corners"], parts["distances"], len(shots), len({poses[shot] for shot in shots}))
 
 
 def _cross_validation(found: Assessment) -> Section:
@@ -90,8 +93,8 @@ def _cross_validation(found: Assessment) -> Section:
     columns = (Column("projection"), Column("halves differ by", "px"), Column("predicted", "px"), Column("ratio"))
     known = tuple((of, field.rms, 2.45 * field.rms) for of, field in {**found.images, **found.pairs}.items())
     text = (
-        "The odd and the even shots were calibrated apart. If the halves differ by more than twice what their own "
-        "deviations say, something is wrong that residuals do not show. All numbers are root mean squares over the "
+        "Two halves of the distinct poses were calibrated apart. If they differ by more than twice what noise alone "
+        "predicts, something is wrong that residuals do not show. All numbers are root mean squares over the "
         f"part of the image in which boards were seen, at {found.distance:g} m. From one sensor to another nothing is "
         "compensated; within one image, a small motion of the camera is."
     )
@@ -120,7 +123,12 @@ def _sensor(name: str, solution: Solution, found: Assessment) -> Section:
         if each.name.startswith(f"{name}.")
     )
     columns = (Column("parameter"), Column("value", "px, rad, m, s", ".7g"), Column("deviation", "", ".2g"))
-    text = f"{_covered(name, solution)}The file keeps what was not free as it was."
+    shots = {view.shot for view in solution.views if view.sensor == name}
+    poses = len({solution.task.poses[shot] for shot in shots})
+    text = (
+        f"{len(shots)} shots show {poses} distinct poses of the board. {_covered(name, solution)}Deviations come from "
+        "how far the poses disagree. The file keeps what was not free as it was."
+    )
     blocks: list[str | Table | Picture] = [text, Table(f"Estimated parameters of {name}", columns, rows)]
     return Section(name, (*blocks, *_pictures(name, solution, found)))
 

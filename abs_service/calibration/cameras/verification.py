@@ -1,5 +1,6 @@
 """Verification of a stored calibration against new views of a board, as a report in plain words."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.report.provenance import Provenance
+from calib.board.distinct import distinct_poses
 from calib.board.views import PlaneView
 from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
 from calib.calibration_check.changes import PairChange, pair_changes
@@ -20,7 +22,7 @@ from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.state import SensorState
 
-#: Maximum number of shots.
+#: Maximum number of shots, each of another pose of the board.
 MOST_SHOTS = 40
 
 #: Maximum number of distances per view; errors of neighbours are correlated, so more add little.
@@ -162,8 +164,11 @@ def _ours(seen: BoardObservations, sensors: Mapping[str, SensorState]) -> Views:
 
 
 def _thinned(views: Views) -> Views:
-    """At most a fixed number of evenly spread shots."""
-    shots = sorted({view.shot for view in views.corners})
+    """At most a fixed number of evenly spread shots: of each distinct pose the one that most sensors saw."""
+    poses = distinct_poses(views.corners)
+    seen = Counter(view.shot for view in views.corners)
+    best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}
+    shots = sorted(best.values())
     kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
     fewer = views.of(views.shots, kept)
     return Views(fewer.corners, [_sparse(view) for view in fewer.planes])

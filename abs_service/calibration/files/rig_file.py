@@ -31,11 +31,13 @@ class Residuals:
         corners_px: of corners [px].
         distances: of distances on boards [m].
         views: number of images that showed the board.
+        poses: number of distinct poses of the board in them.
     """
 
     corners_px: float | None = None
     distances: float | None = None
     views: int | None = None
+    poses: int | None = None
 
 
 @dataclass(frozen=True)
@@ -199,7 +201,7 @@ def _sensor(key: tuple[str, ...], known: SensorCalibration, sigma: Mapping[str, 
         parts.append(toml_text.table((*key, "noise"), known.noise))
     if known.texture:
         parts.append(toml_text.table((*key, "texture"), known.texture))
-    rms = {key: getattr(known.residuals, key) for key in ("corners_px", "distances", "views")}
+    rms = {key: getattr(known.residuals, key) for key in ("corners_px", "distances", "views", "poses")}
     left = {name: value for name, value in rms.items() if value is not None}
     if left:
         parts.append(toml_text.table((*key, "residuals"), left, "root mean square residuals [px, m]"))

@@ -6,6 +6,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from calib.board import coverage
 from calib.board.corners.errors import MovedError
 from calib.board.coverage import MissingView
+from calib.board.distinct import counts_of, distinct_poses
 from calib.board.mirrored import MirroredSensorError
 from calib.board.views import CornerView
 
@@ -32,6 +33,12 @@ class Collector:
     def missing_views(self) -> Sequence[MissingView]:
         """Missing views, the most important first; empty if sufficient."""
         return coverage.missing_views(self.views, self.sizes)
+
+    @property
+    def poses(self) -> dict[str, int]:
+        """Number of distinct poses of the board that each sensor has seen."""
+        counts = counts_of(self.views, distinct_poses(self.views, self.sizes))
+        return {sensor: counts.get(sensor, 0) for sensor in self.sizes}
 
     def take(self, seen: BoardObservations) -> bool:
         """Keeps a shot if it adds information; returns True if kept.

@@ -109,7 +109,7 @@ def _panel(sensor: str, size: tuple[int, int], collector: Collector) -> Panel:
     level = np.ceil((len(_SIGNS) - 1) * np.minimum(counts / 8, 1)).astype(int)
     rows = ["".join(2 * _SIGNS[cell] for cell in row) for row in level]
     why = collector.latest.get(sensor, "")
-    state = Text(why or f"{len(views)} views", style="yellow" if why else "green", overflow="fold")
+    state = Text(why or f"{collector.poses[sensor]} poses", style="yellow" if why else "green", overflow="fold")
     return Panel(Group(*map(Text, rows), state), title=sensor, width=2 * _COLUMNS + 4)
 
 

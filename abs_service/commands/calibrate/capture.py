@@ -148,14 +148,14 @@ def _picture_path(out: Path, sensor: str) -> Path:
 def _conclude(collector: Collector, arguments: argparse.Namespace) -> int:
     problem, missing_views = collector.problem(), collector.missing_views
     level = Level.BAD if problem else Level.DOUBTFUL if missing_views else Level.GOOD
-    views = {s: sum(view.sensor == s for view in collector.views) for s in collector.sizes}
+    poses = collector.poses
     if arguments.json:
         missing = [{"sensor": missing.sensor, "text": missing.text} for missing in missing_views]
-        found = {"verdict": str(level), "exit_code": int(level), "shots": collector.kept, "views": views}
+        found = {"verdict": str(level), "exit_code": int(level), "shots": collector.kept, "poses": poses}
         print(json.dumps({**found, "problem": problem, "missing": missing, "recording": str(arguments.out)}))
         return int(level)
-    counts = ", ".join(f"{number} of {sensor}" for sensor, number in views.items())
-    print(f"{arguments.out}: {collector.kept} shots; views: {counts}")
+    counts = ", ".join(f"{number} of {sensor}" for sensor, number in poses.items())
+    print(f"{arguments.out}: {collector.kept} shots; distinct poses: {counts}")
     if problem:
         print(f"No calibration can be made of this. {problem}", file=sys.stderr)
     for missing in missing_views:

@@ -10,6 +10,7 @@ from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.live_shots import LiveShots
 from abs_service.commands.calibrate.capture import opened
 from calib.board import coverage
+from calib.board.distinct import distinct_poses
 from calib.camera import Camera
 
 
@@ -48,5 +49,5 @@ def adds(new: BoardObservations, seen: BoardObservations) -> bool:
 
 
 def views(seen: BoardObservations) -> int:
-    """Number of shots with a view of some sensor."""
-    return len({view.shot for view in seen.corners})
+    """Number of distinct poses of the board that some sensor saw."""
+    return len(set(distinct_poses(seen.corners, seen.sizes).values()))

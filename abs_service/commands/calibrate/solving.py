@@ -24,6 +24,7 @@ from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
 from calib.board import coverage
+from calib.board.distinct import counts_of, distinct_poses
 from calib.camera import Camera
 from calib.formats.plausibility import baselines
 from calib.solve.bundle.lens_parameters import KINDS, kind_of
@@ -134,6 +135,9 @@ def material(arguments: argparse.Namespace) -> Material:
         coverage.check(view for view in seen.corners)
     except coverage.TooFewViewsError as error:
         raise UnusableImagesError(f"{error}. {unseen.STILLS}" if unseen.mostly_moved(seen) else str(error)) from error
+    for sensor, count in counts_of(seen.corners, distinct_poses(seen.corners, seen.sizes)).items():
+        images = sum(view.sensor == sensor for view in seen.corners)
+        say(f"{sensor}: {count} distinct poses of the board in {images} images")
     return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
 
 

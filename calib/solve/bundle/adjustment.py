@@ -7,6 +7,7 @@ uncorrelated, and the inner solver needs a dozen products with the sparse Jacobi
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy import linalg, sparse
 from scipy.optimize import least_squares
 from scipy.sparse.linalg import aslinearoperator
 
-from calib.solve.bundle import robust
+from calib.solve.bundle import robust, uncertainty
 from calib.solve.bundle.blocks import Planes
 from calib.solve.bundle.equations import Equations, Group
 from calib.solve.bundle.layout import Layout
@@ -49,18 +50,18 @@ class NotSolvedError(ValueError):
 
 @dataclass(frozen=True)
 class Adjustment:
-    """Minimum of the cost with its covariance.
+    """Minimum of the cost with its covariances.
 
     Attributes:
         equations: at the minimum: `base` is the solution; deviations are the estimated ones.
         factors: estimated factor on the deviations of every group.
-        covariance: of increments of the parameters (size, size).
+        independent: covariance of increments of the parameters, if all errors were independent (size, size).
         residuals: normalised by the estimated deviations (n,).
     """
 
     equations: Equations
     factors: tuple[float, ...]
-    covariance: NDArray[np.float64]
+    independent: NDArray[np.float64]
     residuals: NDArray[np.float64]
 
     @property
@@ -72,6 +73,22 @@ class Adjustment:
     def layout(self) -> Layout:
         """Parameter vector."""
         return self.equations.layout
+
+    @cached_property
+    def noise(self) -> NDArray[np.float64]:
+        """Covariance of the sensors' parameters (k, k), if noise were the only error and no pose were repeated."""
+        return uncertainty.noise_covariance(self._pulls, _covariance_inflation(self.equations, self.residuals))
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree."""
+        if self.layout.board_start == 0:
+            return self.independent
+        return uncertainty.with_boards(self.independent, uncertainty.pose_covariance(self._pulls, self.noise))
+
+    @cached_property
+    def _pulls(self) -> uncertainty.Pulls:
+        return uncertainty.pulls(self.equations, self.residuals)
 
 
 def adjust(formulate: Formulate, start: State, groups: int, note: Callable[[str], None]) -> Adjustment:
@@ -181,7 +198,7 @@ def _updated_factors(solved: Adjustment) -> tuple[float, ...]:
     found = []
     for group, rows, factor in zip(equations.groups, equations.slices(), solved.factors, strict=True):
         own = solved.residuals[rows]
-        taken = float(np.sum(_normal(jacobian[rows]) * solved.covariance))
+        taken = float(np.sum(_normal(jacobian[rows]) * solved.independent))
         redundancy = own.size - taken
         grown = 1.0
         if redundancy > 0.2 * own.size:

@@ -58,12 +58,14 @@ class Equations:
         base: state to which increments are applied.
         groups: measurements; residuals are concatenated in this order.
         shot_times: times of the shots on the rig's clock (shots,) [s].
+        poses: number of the distinct board pose that each shot shows (shots,).
     """
 
     layout: Layout
     base: State
     groups: Sequence[Group]
     shot_times: NDArray[np.float64]
+    poses: NDArray[np.intp]
 
     def residuals(self, increments: NDArray[np.float64]) -> NDArray[np.float64]:
         """All residuals; infinite where the increments give an invalid camera or a board behind it."""
@@ -90,6 +92,13 @@ class Equations:
     def ends(self) -> NDArray[np.intp]:
         """First residual of every group, and the total number."""
         return np.cumsum([0, *(len(group.views_of_rows) for group in self.groups)])
+
+    @property
+    def shots_of_rows(self) -> NDArray[np.intp]:
+        """Row of the shot of every residual of the groups; of the first shot where poses are interpolated."""
+        return np.concatenate(
+            [group.shots.reshape(len(group.shots), -1)[group.views_of_rows, 0] for group in self.groups]
+        )
 
     @cached_property
     def _regularized_columns(self) -> NDArray[np.intp]:

@@ -24,16 +24,18 @@ class Formulation:
         task: the calibration task.
         layout: parameter vector.
         shot_times: times of the layout's shots on the rig's clock (shots,) [s].
+        poses: number of the distinct board pose that each of them shows (shots,).
     """
 
     task: Task
     layout: Layout
     shot_times: NDArray[np.float64]
+    poses: NDArray[np.intp]
 
     def __call__(self, state: State, factors: tuple[float, ...]) -> Equations:
         """Equations about a state, with the deviations of every group multiplied by its factor."""
         groups = [self._group(sensor, views, state) for sensor, views in groups_of(self.task)]
-        return rescale(Equations(self.layout, state, groups, self.shot_times), factors)
+        return rescale(Equations(self.layout, state, groups, self.shot_times, self.poses), factors)
 
     def _group(self, sensor: str, views: Sequence[CornerView | PlaneView], state: State) -> Group:
         shots = [view.shot for view in views]
@@ -59,7 +61,12 @@ def formulate(task: Task) -> Formulation:
     times = _shot_times(task)
     order = sorted(times, key=lambda shot: (times[shot], shot))
     free_parameters = {name: sensor.free_parameters(name != task.reference) for name, sensor in task.sensors.items()}
-    return Formulation(task, Layout(free_parameters, order), np.array([times[shot] for shot in order]))
+    return Formulation(
+        task,
+        Layout(free_parameters, order),
+        np.array([times[shot] for shot in order]),
+        np.array([task.poses[shot] for shot in order], np.intp),
+    )
 
 
 def groups_of(task: Task) -> list[tuple[str, Sequence[CornerView | PlaneView]]]:

@@ -21,8 +21,12 @@ def influence(residuals: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def covariance_inflation(residuals: NDArray[np.float64]) -> float:
     """κ = E[ψ²] / E[ψ′]²: variance of the estimate relative to least squares with unit deviations (Huber, 1981)."""
-    curvature = (1 + (residuals / SOFT_L1_SCALE) ** 2) ** -1.5
-    return float(np.mean(influence(residuals) ** 2) / np.mean(curvature) ** 2)
+    return float(np.mean(influence(residuals) ** 2)) / efficiency(residuals) ** 2
+
+
+def efficiency(residuals: NDArray[np.float64]) -> float:
+    """E[ψ′]: mean curvature of the robust loss relative to least squares."""
+    return float(np.mean((1 + (residuals / SOFT_L1_SCALE) ** 2) ** -1.5))
 
 
 def scale(residuals: NDArray[np.float64], redundancy: float) -> float:

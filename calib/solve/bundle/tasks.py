@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
+from calib.board.distinct import distinct_poses
 from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
 from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters
@@ -92,6 +94,12 @@ class Task:
     def shots(self) -> list[int]:
         """Numbers of all shots, ascending."""
         return sorted({view.shot for view in (*self.corners, *self.planes)})
+
+    @cached_property
+    def poses(self) -> Mapping[int, int]:
+        """Distinct board pose of every shot, named by its first shot; see `distinct_poses`."""
+        sizes = {name: (sensor.width, sensor.height) for name, sensor in self.sensors.items()}
+        return {shot: shot for shot in self.shots} | distinct_poses(self.corners, sizes)
 
     def of_shots(self, shots: Sequence[int]) -> "Task":
         """Task restricted to some shots."""

@@ -1,11 +1,12 @@
-"""Two-fold cross-validation: calibrations from odd and even shots, and their difference.
+"""Two-fold cross-validation: calibrations from every other pose of the board, and their difference.
 
 Small residuals are no evidence: a wrong lens model, a bent board or too few views do not show in them. Two halves of
-    the shots that differ by more than their covariances predict are evidence (J. Chen, mrcal). Each sensor's projection
-    is compared up to a small motion of the camera, and each pair of sensors from image to image.
+the shots that differ by more than noise predicts are evidence (J. Chen, mrcal). Shots that repeat a pose of the
+board stay in one half, as they share its errors. Each sensor's projection is compared up to a small motion of the
+camera, and each pair of sensors from image to image.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -20,8 +21,8 @@ from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
 from calib.solve.validation.support import supported
 
-#: Minimum number of shots in a half.
-MIN_SHOTS = 4
+#: Minimum number of distinct poses in a half.
+MIN_POSES = 4
 
 
 class TooFewToSplitError(ValueError):
@@ -35,7 +36,7 @@ class Agreement:
     Attributes:
         of: "tof" for a sensor alone, "tof → color" for a pair.
         difference_px: root mean square where boards were seen.
-        predicted_px: expected value by the halves' covariances.
+        predicted_px: expected value if noise were the only error.
         pixels, differences: over the image, for plots (rows, columns, 2) [px] both; NaN where no board was seen.
     """
 
@@ -52,7 +53,7 @@ class Agreement:
 
 
 def cross_validate(solution: Solution, distance: float, note: Callable[[str], None]) -> list[Agreement]:
-    """Calibrates odd and even shots separately and compares their projections at a distance [m].
+    """Calibrates halves of the shots separately and compares their projections at a distance [m].
 
     Raises:
         TooFewToSplitError: a half cannot be calibrated.
@@ -74,19 +75,30 @@ def cross_validate(solution: Solution, distance: float, note: Callable[[str], No
 
 
 def _split(task: Task) -> tuple[Sequence[int], Sequence[int]]:
-    """Alternating shots; blocks of consecutive shots of a moving board, because board poses are interpolated."""
-    shots = task.shots
-    if len(shots) < 2 * MIN_SHOTS:
+    """Shots of alternating poses."""
+    of_shots = _runs(task) if any(sensor.free_running for sensor in task.sensors.values()) else task.poses
+    poses = list(dict.fromkeys(of_shots[shot] for shot in task.shots))
+    if len(poses) < 2 * MIN_POSES:
         raise TooFewToSplitError(
-            f"{len(shots)} shots are too few for two halves; take {2 * MIN_SHOTS} or more, better 30"
+            f"{len(poses)} distinct poses of the board are too few for two halves; show {2 * MIN_POSES} or more, "
+            "better 30"
         )
-    length = 1
-    if any(sensor.free_running for sensor in task.sensors.values()):
-        length = max(3, len(shots) // 8)
+    first = set(poses[::2])
     return (
-        [shot for index, shot in enumerate(shots) if index // length % 2 == 0],
-        [shot for index, shot in enumerate(shots) if index // length % 2 == 1],
+        [shot for shot in task.shots if of_shots[shot] in first],
+        [shot for shot in task.shots if of_shots[shot] not in first],
     )
+
+
+def _runs(task: Task) -> Mapping[int, int]:
+    """Runs of consecutive shots, by shot, that end where the pose changes: poses of a moving board are interpolated."""
+    shots = task.shots
+    length, runs, began = max(3, len(shots) // 8), dict[int, int](), 0
+    for index, shot in enumerate(shots):
+        if index and task.poses[shot] != task.poses[shots[index - 1]] and index - began >= length:
+            began = index
+        runs[shot] = began
+    return runs
 
 
 def _half(solution: Solution, shots: Sequence[int], note: Callable[[str], None]) -> Solution:
@@ -144,7 +156,9 @@ def _agreement(
     halves: tuple[Solution, Solution],
     inside: NDArray[np.bool_],
 ) -> Agreement:
-    covariance = sum((half.covariance[np.ix_(columns, columns)] for half in halves), np.zeros((columns.size,) * 2))
+    covariance = sum(
+        (half.adjustment.noise[np.ix_(columns, columns)] for half in halves), np.zeros((columns.size,) * 2)
+    )
     expected = projection_uncertainty.total_deviation(changes, covariance)
     lengths = np.linalg.norm(differences, axis=1)
     both = inside & np.isfinite(lengths) & np.isfinite(expected)

@@ -17,7 +17,7 @@ from calib.solve.start.board_poses import pose_candidates
 from calib.solve.start.registration import fit_plane
 from calib.solve.start.start import fit_camera
 
-#: Minimum number of views of a sensor with free intrinsics.
+#: Minimum number of distinct poses of the board before a sensor with free intrinsics.
 MIN_VIEWS = 6
 
 #: Relative error of the square size that is reported.
@@ -49,19 +49,24 @@ class MixedUpError(ValueError):
 
 
 def require_views(task: Task) -> None:
-    """Checks that every sensor has enough views.
+    """Checks that every sensor saw enough distinct poses of the board.
 
     Raises:
-        ViewsError: a sensor has too few.
+        ViewsError: a sensor saw too few.
     """
     for name, sensor in task.sensors.items():
-        corners = sum(view.sensor == name for view in task.corners)
-        planes = sum(view.sensor == name for view in task.planes)
+        corners = [view.shot for view in task.corners if view.sensor == name]
+        planes = [view.shot for view in task.planes if view.sensor == name]
+        shots = planes if sensor.fixed_intrinsics and len(planes) > len(corners) else corners
         least = task.min_views_fixed if sensor.fixed_intrinsics else MIN_VIEWS
-        count = max(corners, planes) if sensor.fixed_intrinsics else corners
+        count = len({task.poses[shot] for shot in shots})
         if count < least:
             why = "to be placed in the rig" if sensor.fixed_intrinsics else "to find its intrinsics"
-            raise ViewsError(f"{name}: {count} views of the board; at least {least} are needed {why}, better 30")
+            plural = "s" * (count != 1)
+            raise ViewsError(
+                f"{name}: {len(shots)} views of {count} distinct pose{plural} of the board; at least {least} poses are "
+                f"needed {why}, better 30"
+            )
 
 
 def require_matching_sensors(task: Task) -> None:
@@ -174,7 +179,7 @@ def _scale(name: str, task: Task, state: State) -> float | None:
     views = [view for view in task.planes if view.sensor == name and view.shot in state.boards]
     own = {view.shot for view in task.corners if view.sensor == name}
     views = [view for view in views if view.shot in own]
-    if len(views) < MIN_VIEWS:
+    if len({task.poses[view.shot] for view in views}) < MIN_VIEWS:
         return None
     said, measured = np.empty(len(views)), np.empty(len(views))
     for index, view in enumerate(views):

@@ -40,7 +40,7 @@ CALIBRATION = RigCalibration(
     "bench",
     {
         "tof": SensorCalibration(
-            TOF, 0.004, -0.002, 0.0015, NOISE, factory=COLOR, residuals=Residuals(0.12, 0.0021, 14)
+            TOF, 0.004, -0.002, 0.0015, NOISE, factory=COLOR, residuals=Residuals(0.12, 0.0021, 14, 12)
         ),
         "color": SensorCalibration(COLOR),
     },
@@ -117,7 +117,7 @@ def test_everything_else_comes_back_too(rig: Path) -> None:
         tof = found.sensors["tof"]
         assert (found.name, found.verdict, found.provenance) == ("bench", "doubtful", PROVENANCE)
         assert (tof.depth_offset, tof.depth_scale, tof.time_offset) == (0.004, -0.002, 0.0015)
-        assert tof.residuals == Residuals(0.12, 0.0021, 14)
+        assert tof.residuals == Residuals(0.12, 0.0021, 14, 12)
         assert tof.noise.items() >= NOISE.items()
         assert found.covariance.names == COVARIANCE.names
         np.testing.assert_array_equal(found.covariance.matrix, COVARIANCE.matrix)

@@ -36,7 +36,9 @@ def many() -> list[CornerView]:
 
 
 def test_three_views_are_too_few() -> None:
-    with pytest.raises(coverage.TooFewViewsError, match=r"color: 3 views of the board, but .* 4 at the very least"):
+    with pytest.raises(
+        coverage.TooFewViewsError, match=r"color: 3 views of 3 distinct poses of the board, but .* 4 at the very least"
+    ):
         coverage.check(many()[:3])
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from calib import pose
 from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Parameter, Solution
@@ -63,9 +64,9 @@ def test_depth_terms_that_nothing_holds_stay_near_zero_with_the_deviation_of_the
     random = np.random.default_rng(6)
     color = three_heads()["color"]
     boards = random_boards(8, random)
-    for T_rb in boards.values():
-        T_rb[:3, :3] = np.eye(3)
-        T_rb[:3, 3] = (-0.16, -0.12, 1.0) + random.uniform(-0.02, 0.02, 3) * (1, 1, 0)
+    for number, T_rb in boards.items():  # rolled, so that each is another pose
+        T_rb[:3, :3] = pose.from_rotation_vector((0, 0, 0.35 * number), np.zeros(3))[:3, :3]
+        T_rb[:3, 3] = (0, 0, 1.0) - T_rb[:3, :3] @ (0.16, 0.12, 0) + random.uniform(-0.02, 0.02, 3) * (1, 1, 0)
     heads = {"color": color, "depth": Head(color.camera, depth_sigma=0.004, depth_offset=0.02)}
     seen = look(heads, boards, random, points=40)
     known = SensorTask(color.camera.width, color.camera.height, factory=(color.camera,), fixed_intrinsics=True)

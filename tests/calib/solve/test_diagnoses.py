@@ -58,7 +58,7 @@ def test_an_offset_of_distances_is_not_taken_for_a_wrong_size() -> None:
 
 def test_too_few_views_are_counted() -> None:
     _, task = scene(2)
-    with pytest.raises(ViewsError, match=r"tof: 2 views of the board; at least 3"):
+    with pytest.raises(ViewsError, match=r"tof: 2 views of 2 distinct poses of the board; at least 3"):
         calibrate(task)
 
 
