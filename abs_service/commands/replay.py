@@ -17,7 +17,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
 from urllib.parse import quote
 
 from rich.console import Console
@@ -63,7 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = configuration(recording, arguments.config)
     if arguments.picture:
-        _draw_previews(settings, recording, arguments.picture, sys.stderr if arguments.json else sys.stdout)
+        for line in draw_previews(settings, recording, arguments.picture):
+            print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
     if arguments.speed is not None:
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
@@ -115,6 +115,13 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     Raises:
         ReplayOptionError: the recording lacks images that the tracker needs.
     """
+    there = sorted({sensor for sensor, _ in recording.counts})
+    unknown = [sensor for sensor in settings.trackers[name].sensors if sensor not in there]
+    if unknown:
+        raise ReplayOptionError(
+            f'{recording.path}: tracker "{name}" needs sensor "{unknown[0]}", which is not there; '
+            f"the recording has: {', '.join(there)}"
+        )
     rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
     members = streams(rig.sensors.values())
     missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
@@ -123,12 +130,14 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     return rig, wiring.synchroniser(settings, name, rig.sensors.values())
 
 
-def _draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path, output: TextIO) -> None:
-    """Draws what each tracker will track."""
+def draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path) -> list[str]:
+    """Draws what each tracker will track; returns a line about each picture."""
+    lines: list[str] = []
     for name in settings.trackers:
         rig, synchroniser = recorded_rig(settings, name, recording)
         frame_sets = synchroniser.group(item for item in recording.frames() if isinstance(item, Frame))
-        print(preview_option.draw(settings, name, path, (rig, frame_sets)), file=output, flush=True)
+        lines.append(preview_option.draw(settings, name, path, (rig, frame_sets)))
+    return lines
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
