@@ -15,7 +15,7 @@ from types import ModuleType
 
 import abs_service
 from abs_service.supervision import parent_watchdog
-from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.supervision.exit_codes import Exit
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
@@ -68,13 +68,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         name, given = f"{name} {chosen}".strip(), given[1:]
         module = import_module(f"{module.__name__}.{MODULES.get(chosen, chosen)}")
         commands = getattr(module, "COMMANDS", {})
-    import logging  # noqa: PLC0415 - a third of the time of --help
+    from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
-    arguments = _command_parser(name, module).parse_args(given)
-    logging.basicConfig(
-        level=arguments.log_level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr
-    )
+    parser = _command_parser(name, module)
+    logs.add_arguments(parser)
+    arguments = parser.parse_args(given)
     try:
+        logs.set_up(arguments, name, given)
         return module.run(arguments)
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
@@ -83,10 +83,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.PIPE_CLOSED
     except Exception as error:
-        if not is_for_user(error):
-            raise
-        print(f"abs-service: error: {error}", file=sys.stderr)
-        return Exit.USER
+        return logs.end_with(error, arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -136,10 +133,4 @@ def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     module.add_arguments(parser)
-    parser.add_argument(
-        "--log-level",
-        choices=("debug", "info", "warning", "error"),
-        default="warning",
-        help="how much is logged to standard error (default: warning)",
-    )
     return parser

@@ -25,7 +25,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
-from abs_service.commands.parts import preview_option
+from abs_service.commands.parts import logs, preview_option
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
@@ -202,7 +202,8 @@ def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
         parser = argparse.ArgumentParser()
         run_command.add_arguments(parser)
-        return run_command.run(parser.parse_args([str(path), *options]))
+        logs.add_arguments(parser)
+        return run_command.run(parser.parse_args([str(path), *options, *logs.options(arguments)]))
 
 
 def _played(settings: config.ServiceConfig, uri: str) -> config.ServiceConfig:

@@ -13,8 +13,8 @@ import logging
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -26,10 +26,10 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands.parts import rig_process
+from abs_service.commands.parts import logs, rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
-from abs_service.supervision import gc_tuning
+from abs_service.supervision import gc_tuning, log_lines
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
@@ -61,9 +61,10 @@ def run(arguments: argparse.Namespace) -> int:
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
-        _logging_to(display),
+        _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
     ):
-        starts = partial(spawn, display, path, config.to_toml(rig))
+        pass_on = partial(_pass_on, display, logs.on_stderr(arguments))
+        starts = partial(spawn, pass_on, path, config.to_toml(rig), logs.options(arguments))
         supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
-        reason = refused.reason.rpartition("abs-service: error: ")[2]
+        reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
     return supervisor.exit_code() or Exit.OK
 
@@ -139,17 +140,28 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
-def spawn(display: Display, path: Path, toml: str, component: str, arguments: Sequence[str]) -> Process:
+def spawn(
+    pass_on: Callable[[str, str], None],
+    path: Path,
+    toml: str,
+    log_options: Sequence[str],
+    component: str,
+    arguments: Sequence[str],
+) -> Process:
     """Starts a child process; first writes its configuration again if the file at `path` is gone."""
     # A child may start again after weeks, and many systems clear old files out of their temporary folder.
     with suppress(FileExistsError), path.open("x", encoding="utf-8") as stream:
         stream.write(toml)
-    return ChildProcess(component, arguments, partial(_pass_on, display))
+    return ChildProcess(component, [*arguments, *log_options], pass_on)
 
 
-def _pass_on(display: Display, component: str, line: str) -> None:
+def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None:
     # An error that ends a child is what this process will end with, and say once.
-    if line and not line.startswith("abs-service: error: "):
+    if not line or log_lines.is_final(line):
+        return
+    if as_json:
+        display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
+    else:
         display.note(f"{component}: {line}")
 
 
@@ -161,20 +173,21 @@ def make_display(as_json: bool) -> Display:
 
 
 class _Notes(logging.Handler):
-    def __init__(self, display: Display) -> None:
+    def __init__(self, display: Display, formatter: logging.Formatter | None) -> None:
         super().__init__()
         self._display = display
+        self.setFormatter(formatter)
 
     def emit(self, record: logging.LogRecord) -> None:
         self._display.note(self.format(record))
 
 
 @contextmanager
-def _logging_to(display: Display) -> Iterator[None]:
+def _logging_to(display: Display, as_json: bool) -> Iterator[None]:
     """Log records as notes of the display, because lines written past it would tear a table apart."""
     root = logging.getLogger()
     before = root.handlers[:]
-    root.handlers[:] = [_Notes(display)]
+    root.handlers[:] = [_Notes(display, log_lines.JsonFormatter("run") if as_json else None)]
     try:
         yield
     finally:
