@@ -21,6 +21,7 @@ from abs_service.supervision.exit_codes import Exit
 COMMANDS = {
     "run": "track live: devices, trackers and recorder, supervised, with a status table",
     "replay": "track a recording again, frame by frame",
+    "new": "write the rig file for what you have, after some questions",
     "check": "validate a configuration and print what it describes",
     "devices": "list attached devices, with a remedy for those that cannot be used",
     "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",
@@ -35,7 +36,7 @@ COMMANDS = {
 }
 
 #: Modules that are not called as their command is.
-MODULES = {"import": "images.import_images"}
+MODULES = {"import": "images.import_images", "new": "new.new"}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.
@@ -44,6 +45,7 @@ THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV
 EPILOG = """\
 examples:
   abs-service run                        a simulated sheet of paper, nothing to connect or configure
+  abs-service new rig.toml               asks what you have, and describes it in a file
   abs-service run rig.toml               your own sensors
   abs-service check rig.toml             what that file describes, without touching a device
   abs-service replay recordings/x.mcap   the same estimates again, from a file
@@ -70,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
-    parser = _command_parser(name, module)
+    parser = command_parser(name, module)
     logs.add_arguments(parser)
     arguments = parser.parse_args(given)
     try:
@@ -125,7 +127,8 @@ def _command(commands: Mapping[str, str], name: str) -> str:
     raise argparse.ArgumentTypeError(f'there is no command "{name}".{guess} There are: {", ".join(commands)}')
 
 
-def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
+def command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
+    """The parser of one command, without the options that all commands have."""
     parser = argparse.ArgumentParser(
         prog=f"abs-service {name}",
         description=module.__doc__,
