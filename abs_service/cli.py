@@ -77,7 +77,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(given)
     try:
         logs.set_up(arguments, name, given)
-        return module.run(arguments)
+        code = module.run(arguments)
+        sys.stdout.flush()  # here, where a reader that is gone is noticed, and not at the end of the interpreter
+        return code
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except BrokenPipeError:

@@ -192,7 +192,7 @@ class Supervisor:
         child.exit_code = code
         if code == Exit.OK:
             child.state, child.process = State.FINISHED, NO_PROCESS
-        elif code in (Exit.USER, Exit.GIVE_UP):
+        elif code == Exit.USER:
             self._give_up(child, child.process.output_tail())
         else:
             self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
