@@ -32,6 +32,7 @@ COMMANDS = {
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
     "reinitialize": "make a running tracker detect its object again",
+    "completion": "print a script that completes commands and options in bash, zsh or fish",
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
@@ -74,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     parser = command_parser(name, module)
     logs.add_arguments(parser)
-    arguments = parser.parse_args(given)
+    arguments = parser.parse_args(given, argparse.Namespace(commands=COMMANDS, modules=MODULES))
     try:
         logs.set_up(arguments, name, given)
         code = module.run(arguments)
