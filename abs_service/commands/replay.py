@@ -19,13 +19,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import Progress
 
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
-from abs_service.commands.parts import logs, preview_option
+from abs_service.commands.parts import logs, preview_option, progress
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
@@ -69,9 +68,9 @@ def run(arguments: argparse.Namespace) -> int:
     out = arguments.out or free_path(arguments.recording)
     if out.exists():
         raise ReplayOptionError(f"--out {out}: exists already; choose another name or remove it")
-    with _writing(out, config.to_toml(settings)) as file:
+    with _writing(out, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
         trackers = {name: _tracker(settings, name, recording, file) for name in settings.trackers}
-        _run_through(recording, trackers, arguments.json)
+        _run_through(recording, trackers, bars, arguments.json)
     output = sys.stderr if arguments.json else sys.stdout
     for name, tracker in trackers.items():
         print(*(f"{name}: {line}" for line in [*tracker.log.summary(), *_unused(tracker)]), sep="\n", file=output)
@@ -160,18 +159,16 @@ def _unused(tracker: OfflineTracker) -> list[str]:
     return [f"frames in no set: {', '.join(f'{name} {n}' for name, n in counters.items())}"] if counters else []
 
 
-def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], as_json: bool) -> None:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), disable=as_json) as progress:
-        task = progress.add_task("images", total=sum(recording.counts.values()))
-        for _, report in replay(recording, trackers):
-            if report is None:
-                progress.advance(task)
-            elif as_json:
-                print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
-            else:
-                error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
-                progress.update(task, description=f"{report.tracker} {report.status}{error}")
+def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], bars: Progress, as_json: bool) -> None:
+    task = bars.add_task("images", total=sum(recording.counts.values()))
+    for _, report in replay(recording, trackers):
+        if report is None:
+            bars.advance(task)
+        elif as_json:
+            print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
+        else:
+            error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
+            bars.update(task, description=f"{report.tracker} {report.status}{error}")
 
 
 @contextmanager
