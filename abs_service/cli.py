@@ -17,12 +17,13 @@ from types import ModuleType
 
 import abs_service
 from abs_service.supervision import parent_watchdog
-from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.supervision.exit_codes import Exit
 
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
     "run": "track live: devices, trackers and recorder, supervised, with a status table",
     "replay": "track a recording again, frame by frame",
+    "new": "write the rig file for what you have, after some questions",
     "check": "validate a configuration and print what it describes",
     "devices": "list attached devices, with a remedy for those that cannot be used",
     "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",
@@ -33,11 +34,12 @@ COMMANDS = {
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
     "reinitialize": "make a running tracker detect its object again",
+    "completion": "print a script that completes commands and options in bash, zsh or fish",
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
 #: Modules that are not called as their command is.
-MODULES = {"import": "images.import_images"}
+MODULES = {"import": "images.import_images", "new": "new.new"}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.
@@ -49,6 +51,7 @@ THREADS_END_S = 1.0
 EPILOG = """\
 examples:
   abs-service run                        a simulated sheet of paper, nothing to connect or configure
+  abs-service new rig.toml               asks what you have, and describes it in a file
   abs-service run rig.toml               your own sensors
   abs-service check rig.toml             what that file describes, without touching a device
   abs-service replay recordings/x.mcap   the same estimates again, from a file
@@ -91,14 +94,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         name, given = f"{name} {chosen}".strip(), given[1:]
         module = import_module(f"{module.__name__}.{MODULES.get(chosen, chosen)}")
         commands = getattr(module, "COMMANDS", {})
-    import logging  # noqa: PLC0415 - a third of the time of --help
+    from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 
-    arguments = _command_parser(name, module).parse_args(given)
-    logging.basicConfig(
-        level=arguments.log_level.upper(), format="%(asctime)s %(levelname)s %(name)s: %(message)s", stream=sys.stderr
-    )
+    parser = command_parser(name, module)
+    logs.add_arguments(parser)
+    arguments = parser.parse_args(given, argparse.Namespace(commands=COMMANDS, modules=MODULES))
     try:
-        return module.run(arguments)
+        logs.set_up(arguments, name, given)
+        code = module.run(arguments)
+        sys.stdout.flush()  # here, where a reader that is gone is noticed, and not at the end of the interpreter
+        return code
     except KeyboardInterrupt:
         return Exit.INTERRUPTED
     except BrokenPipeError:
@@ -106,10 +111,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Exit.PIPE_CLOSED
     except Exception as error:
-        if not is_for_user(error):
-            raise
-        print(f"abs-service: error: {error}", file=sys.stderr)
-        return Exit.USER
+        return logs.end_with(error, arguments)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -151,7 +153,8 @@ def _command(commands: Mapping[str, str], name: str) -> str:
     raise argparse.ArgumentTypeError(f'there is no command "{name}".{guess} There are: {", ".join(commands)}')
 
 
-def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
+def command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
+    """The parser of one command, without the options that all commands have."""
     parser = argparse.ArgumentParser(
         prog=f"abs-service {name}",
         description=module.__doc__,
@@ -159,10 +162,4 @@ def _command_parser(name: str, module: ModuleType) -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     module.add_arguments(parser)
-    parser.add_argument(
-        "--log-level",
-        choices=("debug", "info", "warning", "error"),
-        default="warning",
-        help="how much is logged to standard error (default: warning)",
-    )
     return parser

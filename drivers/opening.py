@@ -30,11 +30,16 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         AddressError: no such driver, or an invalid address.
         DeviceError: the driver cannot open the device now.
     """
-    scheme = urlsplit(uri).scheme
-    driver = _driver(scheme) if scheme in _modules() else None
-    if driver is None:
-        raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
-    return driver.open_device(uri, clock)
+    return _driver_of(uri).open_device(uri, clock)
+
+
+def check_address(uri: str) -> None:
+    """Checks an address with `drivers.<scheme>.check_address`, without its device.
+
+    Raises:
+        AddressError: no such driver, or an address that no device can have.
+    """
+    _driver_of(uri).check_address(uri)
 
 
 def open_recording(program: str, path: Path) -> ForeignRecording:
@@ -89,6 +94,14 @@ def _modules() -> dict[str, str]:
     """Modules by scheme: of this package, and of installed distributions (entry points of the group `drivers`)."""
     own = {module.name: f"{drivers.__name__}.{module.name}" for module in pkgutil.iter_modules(drivers.__path__)}
     return own | {point.name: point.value for point in entry_points(group=drivers.__name__)}
+
+
+def _driver_of(uri: str) -> ModuleType:
+    scheme = urlsplit(uri).scheme
+    driver = _driver(scheme) if scheme in _modules() else None
+    if driver is None:
+        raise AddressError(f"{uri!r}: scheme {scheme!r} is none of {available()}")
+    return driver
 
 
 def _driver(scheme: str) -> ModuleType | None:

@@ -176,6 +176,7 @@ class DeviceSupervisor:
     def _report_state(self, state: DeviceState, reason: str) -> None:
         if self._abandoned:
             return
+        _log.info("device %s: %s %s", self._name, state.value, reason, extra={"fields": {"device": self._name}})
         self._health.label(f"device.{self._name}", state.value)
         level = _LEVELS[state]
         self._health.report(f"device {self._name}", level, f"{self._name}: {reason}" if level > Level.OK else "")

@@ -25,7 +25,7 @@ from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
-from drivers.contract.device import Device
+from drivers.contract.device import AddressError, Device
 from drivers.opening import open_device
 
 #: Time that the devices have to close [s].
@@ -62,9 +62,11 @@ def run(arguments: argparse.Namespace) -> int:
             publisher.close()
         _count(publishers, health)
         health.publish()
-    for supervisor in supervisors:
-        if supervisor.fatal_error:
-            raise supervisor.fatal_error
+    errors = [supervisor.fatal_error for supervisor in supervisors if supervisor.fatal_error]
+    if any(isinstance(error, AddressError) for error in errors):
+        rig_devices.check_addresses(rig, source)  # those of the devices that were not opened any more, too
+    if errors:
+        raise errors[0]
     return Exit.OK
 
 

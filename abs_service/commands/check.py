@@ -4,16 +4,16 @@
   abs-service check rig.toml        your own
   abs-service check rig.toml --json the same for scripts
   abs-service check rig.toml --picture first.png    also draws what would be tracked: region, mesh and its rim
+  abs-service check rig.toml --replay take.mcap     as `abs-service replay take.mcap --config rig.toml` would use it
 
 The picture needs images: only replay:// and simulated:// devices are opened for it.
 
-Exit code 0 if `abs-service run` could use it, 2 if not.
+Exit code 0 if `abs-service run` could use it (with --replay, if `abs-service replay` could), 2 if not.
 """
 
 import argparse
 import json
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,26 +21,26 @@ from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
-from abs_service.commands.parts import data_rates, disk, harmless_devices, preview_option, rig_process
-from abs_service.commands.parts.harmless_devices import HARMLESS, HarmlessError
+from abs_service.commands import replay
+from abs_service.commands.parts import data_rates, device_checks, disk, harmless_devices, preview_option, rig_process
+from abs_service.commands.parts.device_checks import CheckError
+from abs_service.commands.parts.harmless_devices import HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
-from abs_service.config import plugins
-from abs_service.config.problems import allowed_instead
+from abs_service.config import addresses, plugins
+from abs_service.config.positions import located
+from abs_service.config.problems import Key, Problem
 from abs_service.supervision.exit_codes import Exit, is_for_user
-from abs_service.tracker.measurements import measurement
-from calib.rig import Noise
-from drivers import opening
 from drivers.contract.capabilities import StreamInfo
-
-
-class CheckError(Exception):
-    """A configuration that reads well and still cannot work; the message lists every reason."""
+from drivers.replay import Recording
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service check`."""
     rig_process.add_config(parser)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument(
+        "--replay", metavar="FILE", type=Path, help="check against this recording; the rig's devices do not count"
+    )
     preview_option.add_argument(parser)
 
 
@@ -50,8 +50,9 @@ def run(arguments: argparse.Namespace) -> int:
         preview_option.check(arguments.picture)
     try:
         rig = rig_process.load_config(arguments)
-        found = describe(rig, str(arguments.config or "demo.toml"))
-        written = _draw_previews(rig, arguments.picture) if arguments.picture else []
+        toml = arguments.config.read_text(encoding="utf-8") if arguments.config else ""
+        found = describe(rig, str(arguments.config or "demo.toml"), toml, arguments.replay)
+        written = _draw_previews(rig, arguments) if arguments.picture else []
     except (config.ConfigError, CheckError, HarmlessError, PictureOptionError) as error:
         if not arguments.json:
             raise
@@ -63,40 +64,37 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.OK
 
 
-def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
+def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: Path | None = None) -> dict[str, Any]:
     """Description of a configuration as plain data.
 
     Args:
         rig: the configuration.
         source: where it came from.
+        toml: the text that it was read from, for the numbers of the lines in messages.
+        recording: file whose images take the place of the devices'; None for the devices.
 
     Raises:
         CheckError: something that it names does not exist or cannot be made.
     """
-    problems: list[str] = []
+    problems: list[Problem] = list(addresses.check({name: device.uri for name, device in rig.devices.items()}))
+    wrong = {problem.key for problem in problems}
     streams: dict[str, list[StreamInfo]] = {}
-    for name in rig.devices:
-        with _noting(f"devices.{name}.uri", problems):
-            streams |= _streams(rig, name)
-        with _noting(f"devices.{name}.controls", problems):
-            _check_controls(rig, name)
-    for name, sensor in rig.sensors.items():
-        with _noting(f"sensors.{name}.noise", problems):
-            if sensor.noise is not None:
-                wiring.noise(sensor.noise, sensor.range_m, sensor.no_return)
-        with _noting(f"sensors.{name}.texture", problems):
-            if sensor.texture is not None:
-                wiring.texture(sensor.texture)
-    for name, tracker in rig.trackers.items():
-        with _noting(f"trackers.{name}", problems):
-            wiring.plan(rig, name)
-            _check_streams(wiring.noises(rig, name), streams)
-        with _noting(f"trackers.{name}.region", problems):
-            tracker.region.build()
-        with _noting(f"trackers.{name}.template", problems):
-            tracker.template.build(tracker.mesh.vertices)
+    if recording:
+        with _noting(("--replay",), problems):
+            streams = device_checks.recorded_streams(rig, recording)
+    for name in (name for name in rig.devices if not recording and ("devices", name, "uri") not in wrong):
+        with _noting(("devices", name, "uri"), problems):
+            streams |= device_checks.device_streams(rig, name)
+        with _noting(("devices", name, "controls"), problems):
+            device_checks.check_controls(rig, name)
+    problems += _unusable_parts(rig, streams)
+    if recording and not problems:
+        for name in rig.trackers:
+            with _noting(("trackers", name, "sensors"), problems):
+                replay.recorded_rig(rig, name, Recording(recording))
     if problems:
-        raise CheckError("\n".join([f"{source}: cannot work", *(f"  {problem}" for problem in problems)]))
+        lines = located(problems, toml)
+        raise CheckError("\n".join([f"{source}: cannot work", *(f"  {line}" for line in lines)]))
     images = data_rates.describe({name: streams.get(name, []) for name in rig.sensors}, rig.record)
     return {
         "ok": True,
@@ -112,6 +110,27 @@ def describe(rig: config.ServiceConfig, source: str) -> dict[str, Any]:
         "records": str(rig.record.directory) if rig.record.enabled else None,
         "disk": disk.lasts(rig, 1e6 * images["recorded_mb_s"][1]),
     }
+
+
+def _unusable_parts(rig: config.ServiceConfig, streams: Mapping[str, list[StreamInfo]]) -> list[Problem]:
+    """Problems of sensors and trackers whose parts cannot be made, or that lack a stream."""
+    problems: list[Problem] = []
+    for name, sensor in rig.sensors.items():
+        with _noting(("sensors", name, "noise"), problems):
+            if sensor.noise is not None:
+                wiring.noise(sensor.noise, sensor.range_m, sensor.no_return)
+        with _noting(("sensors", name, "texture"), problems):
+            if sensor.texture is not None:
+                wiring.texture(sensor.texture)
+    for name, tracker in rig.trackers.items():
+        with _noting(("trackers", name), problems):
+            wiring.plan(rig, name)
+            device_checks.check_noises(wiring.noises(rig, name), streams)
+        with _noting(("trackers", name, "region"), problems):
+            tracker.region.build()
+        with _noting(("trackers", name, "template"), problems):
+            tracker.template.build(tracker.mesh.vertices)
+    return problems
 
 
 def text(found: dict[str, Any]) -> str:
@@ -141,59 +160,15 @@ def text(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _draw_previews(rig: config.ServiceConfig, path: Path) -> list[str]:
+def _draw_previews(rig: config.ServiceConfig, arguments: argparse.Namespace) -> list[str]:
     """Draws what each tracker would track; returns a line about each picture."""
+    if arguments.replay:
+        return replay.draw_previews(rig, Recording(arguments.replay), arguments.picture)
     written: list[str] = []
     for name in rig.trackers:
         with harmless_devices.opened(rig, name) as source:
-            written.append(preview_option.draw(rig, name, path, source))
+            written.append(preview_option.draw(rig, name, arguments.picture, source))
     return written
-
-
-def _streams(rig: config.ServiceConfig, name: str) -> dict[str, list[StreamInfo]]:
-    """Streams of a device by sensor; none if it cannot be opened without touching hardware."""
-    uri = rig.devices[name].uri
-    scheme = uri.partition(":")[0]
-    if scheme not in opening.available():
-        raise CheckError(f'"{uri}": no such driver, {allowed_instead(scheme, opening.available())}')
-    if scheme not in HARMLESS:
-        return {}
-    device = opening.open_device(uri, time.monotonic_ns)
-    device.close()
-    found: dict[str, list[StreamInfo]] = {}
-    for head, sensor in rig.heads(name).items():
-        streams = [stream for stream in device.capabilities.streams if stream.sensor == head]
-        if not streams:
-            heads = {stream.sensor for stream in device.capabilities.streams}
-            raise CheckError(f'sensor "{sensor}": no head "{head}", {allowed_instead(head, heads)}')
-        found[sensor] = streams
-    return found
-
-
-def _check_controls(rig: config.ServiceConfig, name: str) -> None:
-    """Refuses controls that a device which can be opened without touching hardware does not take."""
-    device_table = rig.devices[name]
-    if not device_table.controls or device_table.uri.partition(":")[0] not in HARMLESS:
-        return
-    device = opening.open_device(device_table.uri, time.monotonic_ns)
-    device.close()
-    infos = {info.name: info for info in device.controls.infos}
-    for control, value in device_table.controls.items():
-        if control not in infos:
-            raise CheckError(f"{control}: no such control, {allowed_instead(control, infos)}")
-        infos[control].checked(value)
-
-
-def _check_streams(noises: Mapping[str, Noise], streams: Mapping[str, list[StreamInfo]]) -> None:
-    """Refuses noise models of what a device is known not to deliver."""
-    for name, noise in noises.items():
-        head = name.partition("/")[0]
-        there = {info.stream for info in streams.get(head, [])}
-        missing = [kind.value for kind in measurement(noise).frames if kind not in there]
-        if there and missing:
-            raise CheckError(
-                f"{name}: its noise model needs the stream {missing[0]}, {allowed_instead(missing[0], there)}"
-            )
 
 
 def _sensor(rig: config.ServiceConfig, name: str, streams: dict[str, list[StreamInfo]]) -> dict[str, Any]:
@@ -238,10 +213,10 @@ def _tracker(rig: config.ServiceConfig, name: str) -> dict[str, Any]:
 
 
 @contextmanager
-def _noting(key: str, problems: list[str]) -> Iterator[None]:
+def _noting(key: Key, problems: list[Problem]) -> Iterator[None]:
     try:
         yield
     except Exception as error:
         if not is_for_user(error):
             raise
-        problems.append(f"{key}: {error}")
+        problems.append(Problem(key, str(error)))

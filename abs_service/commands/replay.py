@@ -17,16 +17,14 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TextIO
 from urllib.parse import quote
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import Progress
 
 from abs_service import config, wiring
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import run as run_command
-from abs_service.commands.parts import preview_option
+from abs_service.commands.parts import logs, preview_option, progress
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
@@ -63,15 +61,16 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = configuration(recording, arguments.config)
     if arguments.picture:
-        _draw_previews(settings, recording, arguments.picture, sys.stderr if arguments.json else sys.stdout)
+        for line in draw_previews(settings, recording, arguments.picture):
+            print(line, file=sys.stderr if arguments.json else sys.stdout, flush=True)
     if arguments.speed is not None:
         return _live(settings, arguments)
     out = arguments.out or free_path(arguments.recording)
     if out.exists():
         raise ReplayOptionError(f"--out {out}: exists already; choose another name or remove it")
-    with _writing(out, config.to_toml(settings)) as file:
+    with _writing(out, config.to_toml(settings)) as file, progress.bars(disable=arguments.json) as bars:
         trackers = {name: _tracker(settings, name, recording, file) for name in settings.trackers}
-        _run_through(recording, trackers, arguments.json)
+        _run_through(recording, trackers, bars, arguments.json)
     output = sys.stderr if arguments.json else sys.stdout
     for name, tracker in trackers.items():
         print(*(f"{name}: {line}" for line in [*tracker.log.summary(), *_unused(tracker)]), sep="\n", file=output)
@@ -115,6 +114,13 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     Raises:
         ReplayOptionError: the recording lacks images that the tracker needs.
     """
+    there = sorted({sensor for sensor, _ in recording.counts})
+    unknown = [sensor for sensor in settings.trackers[name].sensors if sensor not in there]
+    if unknown:
+        raise ReplayOptionError(
+            f'{recording.path}: tracker "{name}" needs sensor "{unknown[0]}", which is not there; '
+            f"the recording has: {', '.join(there)}"
+        )
     rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
     members = streams(rig.sensors.values())
     missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
@@ -123,12 +129,14 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
     return rig, wiring.synchroniser(settings, name, rig.sensors.values())
 
 
-def _draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path, output: TextIO) -> None:
-    """Draws what each tracker will track."""
+def draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path) -> list[str]:
+    """Draws what each tracker will track; returns a line about each picture."""
+    lines: list[str] = []
     for name in settings.trackers:
         rig, synchroniser = recorded_rig(settings, name, recording)
         frame_sets = synchroniser.group(item for item in recording.frames() if isinstance(item, Frame))
-        print(preview_option.draw(settings, name, path, (rig, frame_sets)), file=output, flush=True)
+        lines.append(preview_option.draw(settings, name, path, (rig, frame_sets)))
+    return lines
 
 
 def _tracker(settings: config.ServiceConfig, name: str, recording: Recording, file: McapFile) -> OfflineTracker:
@@ -151,18 +159,16 @@ def _unused(tracker: OfflineTracker) -> list[str]:
     return [f"frames in no set: {', '.join(f'{name} {n}' for name, n in counters.items())}"] if counters else []
 
 
-def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], as_json: bool) -> None:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), disable=as_json) as progress:
-        task = progress.add_task("images", total=sum(recording.counts.values()))
-        for _, report in replay(recording, trackers):
-            if report is None:
-                progress.advance(task)
-            elif as_json:
-                print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
-            else:
-                error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
-                progress.update(task, description=f"{report.tracker} {report.status}{error}")
+def _run_through(recording: Recording, trackers: dict[str, OfflineTracker], bars: Progress, as_json: bool) -> None:
+    task = bars.add_task("images", total=sum(recording.counts.values()))
+    for _, report in replay(recording, trackers):
+        if report is None:
+            bars.advance(task)
+        elif as_json:
+            print(json.dumps(report.as_dict(), ensure_ascii=False), flush=True)
+        else:
+            error = "" if report.error_mm is None else f", error {report.error_mm:.2f} mm"
+            bars.update(task, description=f"{report.tracker} {report.status}{error}")
 
 
 @contextmanager
@@ -193,7 +199,8 @@ def _live(settings: config.ServiceConfig, arguments: argparse.Namespace) -> int:
         options += ["--out", str(arguments.out)] if arguments.out else ["--no-record"]
         parser = argparse.ArgumentParser()
         run_command.add_arguments(parser)
-        return run_command.run(parser.parse_args([str(path), *options]))
+        logs.add_arguments(parser)
+        return run_command.run(parser.parse_args([str(path), *options, *logs.options(arguments)]))
 
 
 def _played(settings: config.ServiceConfig, uri: str) -> config.ServiceConfig:

@@ -13,8 +13,8 @@ import logging
 import os
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit, urlunsplit
@@ -26,17 +26,20 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
-from abs_service.commands.parts import rig_process
+from abs_service.commands.parts import logs, rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
-from abs_service.supervision import gc_tuning, parent_watchdog
+from abs_service.supervision import gc_tuning, log_lines, parent_watchdog
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
+
+#: Receives the lines of a child's output, with its name.
+PassOn = Callable[[str, str], None]
 
 
 class ChildError(Exception):
@@ -65,8 +68,8 @@ def run(arguments: argparse.Namespace) -> int:
         ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
-        _logging_to(display),
-        closing(Standby("record", partial(spawn, display), partial(prepare, display))) as starts,
+        _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
+        closing(starting(display, arguments)) as starts,
     ):
         supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
@@ -79,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     refused = supervisor.misconfigured()
     if refused is not None:
         # The child has read a temporary file of ours.
-        reason = refused.reason.rpartition("abs-service: error: ")[2]
+        reason = log_lines.final_error(refused.reason)
         raise ChildError(reason.replace(str(path), str(arguments.config or "demo.toml")))
     return supervisor.exit_code() or recording_code(supervisor.children.values())
 
@@ -139,14 +142,21 @@ def limits(rig: config.ServiceConfig) -> Limits:
     return Limits(table.max_restarts, *(int(value * 1e9) for value in seconds))
 
 
-def spawn(display: Display, component: str, arguments: Sequence[str]) -> Process:
+def starting(display: Display, arguments: argparse.Namespace) -> Standby:
+    """Starts child processes, which log as this one does; a second recorder waits."""
+    to = partial(_pass_on, display, logs.on_stderr(arguments)), logs.options(arguments)
+    return Standby("record", partial(spawn, *to), partial(prepare, *to))
+
+
+def spawn(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> Process:
     """Starts a child process."""
-    return ChildProcess(component, arguments, partial(_pass_on, display))
+    return ChildProcess(component, [*arguments, *log_options], pass_on)
 
 
-def prepare(display: Display, component: str, arguments: Sequence[str]) -> ChildProcess:
+def prepare(pass_on: PassOn, log_options: Sequence[str], component: str, arguments: Sequence[str]) -> ChildProcess:
     """Starts a child process that waits until it is woken."""
-    return ChildProcess(component, arguments, partial(_pass_on, display), environment={parent_watchdog.STANDBY: "1"})
+    waits = {parent_watchdog.STANDBY: "1"}
+    return ChildProcess(component, [*arguments, *log_options], pass_on, environment=waits)
 
 
 def recording_code(ended: Iterable[Child]) -> Exit:
@@ -154,9 +164,13 @@ def recording_code(ended: Iterable[Child]) -> Exit:
     return Exit.FAILED if any(child.component == "record" and child.exit_code for child in ended) else Exit.OK
 
 
-def _pass_on(display: Display, component: str, line: str) -> None:
+def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None:
     # An error that ends a child is what this process will end with, and say once.
-    if line and not line.startswith("abs-service: error: "):
+    if not line or log_lines.is_final(line):
+        return
+    if as_json:
+        display.note(line if log_lines.parse(line) else log_lines.line(time.time(), "info", component, line, {}))
+    else:
         display.note(f"{component}: {line}")
 
 
@@ -168,20 +182,21 @@ def make_display(as_json: bool) -> Display:
 
 
 class _Notes(logging.Handler):
-    def __init__(self, display: Display) -> None:
+    def __init__(self, display: Display, formatter: logging.Formatter | None) -> None:
         super().__init__()
         self._display = display
+        self.setFormatter(formatter)
 
     def emit(self, record: logging.LogRecord) -> None:
         self._display.note(self.format(record))
 
 
 @contextmanager
-def _logging_to(display: Display) -> Iterator[None]:
+def _logging_to(display: Display, as_json: bool) -> Iterator[None]:
     """Log records as notes of the display, because lines written past it would tear a table apart."""
     root = logging.getLogger()
     before = root.handlers[:]
-    root.handlers[:] = [_Notes(display)]
+    root.handlers[:] = [_Notes(display, log_lines.JsonFormatter("run") if as_json else None)]
     try:
         yield
     finally:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from abs_service import config, wiring
 from abs_service.commands import replay
+from abs_service.commands.parts import progress
 from abs_service.display.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.models import gravity
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"abs-service: note: {note}", file=sys.stderr)
     settings = replay.configuration(recording, arguments.config)
     name = _tracker(settings, arguments.tracker, path)
-    strip = track_strip(recording, *replay.recorded_rig(settings, name, recording), wiring.plan(settings, name))
+    strip = _track(recording, settings, name, arguments.json)
     model = strip.model
     seen = model.strip
     found = estimate_stiffness(strip.inclinations, seen.length, seen.length_deviation, seen.load_deviation)
@@ -68,6 +69,14 @@ def run(arguments: argparse.Namespace) -> int:
     lines = _json(found, bending, strip, plot) if arguments.json else _text(found, bending, strip, plot)
     print(lines)
     return Exit.OK
+
+
+def _track(recording: Recording, settings: config.ServiceConfig, name: str, as_json: bool) -> HangingStrip:
+    rig, synchroniser = replay.recorded_rig(settings, name, recording)
+    plan = wiring.plan(settings, name)
+    with progress.bars(disable=as_json) as bars:
+        task = bars.add_task("images", total=sum(recording.counts.values()))
+        return track_strip(recording, rig, synchroniser, plan, lambda: bars.advance(task))
 
 
 def _tracker(settings: config.ServiceConfig, wanted: str | None, path: Path) -> str:

@@ -1,10 +1,11 @@
 """The error of an invalid configuration, with all problems in it."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 
+from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem
 
 
@@ -12,11 +13,18 @@ class ConfigError(Exception):
     """A configuration that cannot be used; the message names the file and each problem: key, value, what is allowed."""
 
 
-def error_of(source: str, problems: list[Problem]) -> ConfigError:
-    """All problems of a file as one error."""
-    if len(problems) == 1:
-        return ConfigError(f"{source}: {problems[0]}")
-    return ConfigError("\n".join([f"{source}: {len(problems)} errors", *(f"  {problem}" for problem in problems)]))
+def error_of(source: str, problems: Iterable[Problem], text: str) -> ConfigError:
+    """All problems of a file as one error.
+
+    Args:
+        source: name of the file.
+        problems: what is wrong with it.
+        text: its content, for the numbers of the lines; "" if there is none.
+    """
+    found = located(problems, text)
+    if len(found) == 1:
+        return ConfigError(f"{source}: {found[0]}")
+    return ConfigError("\n".join([f"{source}: {len(found)} errors", *(f"  {problem}" for problem in found)]))
 
 
 def allowed_at(root: type[BaseModel], key: Key) -> Collection[str]:

@@ -10,10 +10,10 @@ from typing import Any
 import tomli_w
 from pydantic import ValidationError
 
-from abs_service.config import references
+from abs_service.config import addresses, references
 from abs_service.config.errors import ConfigError, allowed_at, error_of
-from abs_service.config.merging import merge
-from abs_service.config.problems import from_pydantic
+from abs_service.config.merging import merge, without_calibrated
+from abs_service.config.problems import ProblemsError, from_pydantic
 from abs_service.config.tables import ServiceConfig
 
 
@@ -53,21 +53,43 @@ def loads(text: str, source: str, base: Path) -> ServiceConfig:
         file = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
-    return from_tables(file, source, base)
+    return from_tables(file, source, base, text)
 
 
-def from_tables(file: dict[str, Any], source: str, base: Path) -> ServiceConfig:
+def from_tables(file: dict[str, Any], source: str, base: Path, text: str = "") -> ServiceConfig:
     """The configuration in the tables of a TOML file.
 
     Args:
         file: the tables.
         source: where they came from, for messages.
         base: folder that relative paths start from.
+        text: the TOML that they were read from, for the numbers of its lines; "" if they are no file's.
 
     Raises:
         ConfigError: names all that is wrong.
     """
-    file = merge(file, source, base)
+    try:
+        merged = merge(file, source, base, text)
+    except ConfigError as error:
+        # Only what does not depend on the calibration is told with its mistakes.
+        try:
+            _checked({**file, "calibration": None}, base, text)
+        except ProblemsError as others:
+            if left := without_calibrated(others.problems):
+                raise ConfigError(f"{error}\n{error_of(source, left, text)}") from None
+        raise
+    try:
+        return _checked(merged, base, text)
+    except ProblemsError as error:
+        raise error_of(source, error.problems, text) from None
+
+
+def _checked(file: dict[str, Any], base: Path, text: str) -> ServiceConfig:
+    """The configuration in merged tables.
+
+    Raises:
+        ProblemsError: all that is wrong.
+    """
     # The default directory of recordings starts from `base`, so it has to be made here.
     file = {"record": {}} | file
     problems = references.check(file)
@@ -75,10 +97,12 @@ def from_tables(file: dict[str, Any], source: str, base: Path) -> ServiceConfig:
         # JSON in strict mode is TOML's own type system: lists become tuples, but "3" is not a number.
         config = ServiceConfig.model_validate_json(json.dumps(file, default=str), strict=True, context={"base": base})
     except ValidationError as error:
-        raise error_of(source, from_pydantic(error, partial(allowed_at, ServiceConfig)) + problems) from None
-    if problems:
-        raise error_of(source, problems)
-    return config
+        problems = from_pydantic(error, partial(allowed_at, ServiceConfig)) + problems
+    else:
+        if not problems:
+            return config
+    # Importing drivers takes long; in a file without other mistakes, what opens its devices checks the addresses.
+    raise ProblemsError([*problems, *(addresses.check(references.uris(file)) if text else [])])
 
 
 def to_toml(config: ServiceConfig) -> str:

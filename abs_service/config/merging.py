@@ -3,7 +3,7 @@
 import hashlib
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,13 +24,14 @@ def load_calibration(path: Path) -> CalibrationFile:
     return _parse(path, _read(path))
 
 
-def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
+def merge(rig: dict[str, Any], source: str, base: Path, text: str) -> dict[str, Any]:
     """A rig file merged with the calibration file that its key `calibration` names.
 
     Args:
         rig: what the TOML file holds; returned as it is if it names no calibration file.
         source: where it came from, for messages.
         base: folder that the path of the calibration file starts from.
+        text: the rig file's content, for the numbers of its lines.
 
     Raises:
         ConfigError: the calibration file cannot be used, is about sensors that the rig does not have, or has
@@ -48,14 +49,19 @@ def merge(rig: dict[str, Any], source: str, base: Path) -> dict[str, Any]:
         if name not in sensors
     ]
     if unknown:
-        raise error_of(str(path), unknown)
+        raise error_of(str(path), unknown, content.decode())
     given = {name: _given(calibrated) for name, calibrated in file.sensors.items()}
     tables = {name: sensors[name] if isinstance(sensors[name], dict) else {} for name in given}
     clashes = [problem for name in given for problem in _clashes(name, tables[name], given[name], path)]
     if clashes:
-        raise error_of(source, clashes)
+        raise error_of(source, clashes, text)
     merged = {name: _merged(tables[name], given[name]) for name in given}
     return rig | {"sensors": sensors | merged, "calibration": _origin(path, content, file, given)}
+
+
+def without_calibrated(problems: Iterable[Problem]) -> list[Problem]:
+    """Problems that a calibration file, which could not be read, may not be the reason of."""
+    return [one for one in problems if not (one.key[:1] == ("sensors",) and set(one.key[2:3]) & set(SHARED))]
 
 
 def _read(path: Path) -> bytes:
@@ -66,13 +72,15 @@ def _read(path: Path) -> bytes:
 
 
 def _parse(path: Path, content: bytes) -> CalibrationFile:
+    text = ""
     try:
-        file = tomllib.loads(content.decode("utf-8"))
+        text = content.decode("utf-8")
+        file = tomllib.loads(text)
         # JSON in strict mode is TOML's own type system, as for the rig's own file.
-        text = json.dumps(file, default=str)
-        return CalibrationFile.model_validate_json(text, strict=True, context={"base": path.resolve().parent})
+        tables = json.dumps(file, default=str)
+        return CalibrationFile.model_validate_json(tables, strict=True, context={"base": path.resolve().parent})
     except ValidationError as error:
-        raise error_of(str(path), from_pydantic(error, partial(allowed_at, CalibrationFile))) from None
+        raise error_of(str(path), from_pydantic(error, partial(allowed_at, CalibrationFile)), text) from None
     except ValueError as error:  # no UTF-8, or no TOML
         raise ConfigError(f"{path}: not TOML: {error}") from None
 

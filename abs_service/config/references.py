@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from abs_service.config.problems import Problem, allowed_instead
+from abs_service.config.values import URI
 
 
 def check(file: dict[str, Any]) -> list[Problem]:
@@ -12,6 +13,12 @@ def check(file: dict[str, Any]) -> list[Problem]:
     Works on the raw tables, so that these problems are reported together with all others.
     """
     return [*_sensors(file), *_references(file), *_trackers(file), *_record(file)]
+
+
+def uris(file: dict[str, Any]) -> dict[str, str]:
+    """The addresses of the devices in a file that are addresses at all, by the names of the devices."""
+    given = {name: table.get("uri") for name, table in _tables(file, "devices").items()}
+    return {name: uri for name, uri in given.items() if isinstance(uri, str) and URI.fullmatch(uri)}
 
 
 def _tables(file: dict[str, Any], section: str) -> dict[str, dict[str, Any]]:

@@ -15,6 +15,8 @@ from abs_service.config import plugins
 
 #: Drivers whose addresses name a file, which starts from the folder of the TOML file like every other path.
 FILE_SCHEMES = frozenset({"replay"})
+#: What every address of a device looks like.
+URI = re.compile(r"[a-z][a-z0-9_]*:\S+")
 
 
 def _endpoint(value: str) -> str:
@@ -25,7 +27,7 @@ def _endpoint(value: str) -> str:
 
 
 def _uri(value: str, info: ValidationInfo) -> str:
-    if not re.fullmatch(r"[a-z][a-z0-9_]*:\S+", value):
+    if not URI.fullmatch(value):
         raise ValueError('a device URI begins with the name of its driver, for example "simulated://sheet?seed=1"')
     parts = urlsplit(value)
     if parts.scheme not in FILE_SCHEMES:

@@ -4,12 +4,11 @@ from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """Reason of a process's end."""
+    """Reason of a process's end; docs/command-line.md has a table for users."""
 
     OK = 0
     FAILED = 1  # something broke; starting again may help
     USER = 2  # the command line, the configuration or the surroundings have to be changed first
-    GIVE_UP = 3  # cannot start, and starting again will not help
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
     PIPE_CLOSED = 141  # the reader of the output has closed it
 

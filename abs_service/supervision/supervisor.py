@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from abs_service.supervision import log_lines
 from abs_service.supervision.child_process import NO_PROCESS, Process, Spawn, ThreadTimes
 from abs_service.supervision.exit_codes import Exit
 
@@ -174,6 +175,8 @@ class Supervisor:
 
     def _start(self, child: Child, now_ns: int) -> None:
         child.process = self._spawn(child.component, child.arguments)
+        started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
+        _log.info("%s is started", child.component, extra={"fields": started})
         child.state, child.reason = State.RUNNING, ""
         child.heard_ns, child.threads = now_ns, {}
         child.deadline_ns = now_ns + self._limits.startup_ns
@@ -189,7 +192,7 @@ class Supervisor:
         child.exit_code = code
         if code == Exit.OK:
             child.state, child.process = State.FINISHED, NO_PROCESS
-        elif code in (Exit.USER, Exit.GIVE_UP):
+        elif code == Exit.USER:
             self._give_up(child, child.process.output_tail())
         else:
             self._schedule_restart(child, now_ns, _exit_reason(code, child.process.output_tail()), State.BACKOFF)
@@ -237,5 +240,5 @@ def _longest_wait_ns(before: Mapping[int, ThreadTimes], now: Mapping[int, Thread
 
 def _exit_reason(code: int, output_tail: str) -> str:
     how = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
-    last = output_tail.strip().rpartition("\n")[2]
+    last = log_lines.message(output_tail.strip().rpartition("\n")[2])
     return f"{how}: {last}" if last else how

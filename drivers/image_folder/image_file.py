@@ -11,6 +11,8 @@ from drivers.image_folder.listing import ImageFolderError
 
 #: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
 _ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
+#: Formats that can be read, for messages.
+READABLE = "PNG, TIFF, PGM, PPM, JPEG, WebP and BMP"
 
 
 def read(path: Path) -> NDArray[Any]:
@@ -28,5 +30,5 @@ def read(path: Path) -> NDArray[Any]:
             raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
     image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
     if image is None:
-        raise ImageFolderError(f"{path}: cannot be read as an image")
+        raise ImageFolderError(f"{path}: cannot be read as an image; {READABLE} can")
     return image

@@ -10,6 +10,8 @@ from drivers.contract.device import Device, DeviceInfo, SdkMissingError
 from drivers.contract.discovery import Availability, Found
 from drivers.kinect1.address import parse
 
+check_address = parse
+
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.

@@ -9,8 +9,9 @@ from drivers.oak.device import OakDevice
 from drivers.oak.images.recording import OakRecording
 from drivers.oak.source import live, playback
 
-__all__ = ["discover", "open_device", "open_recording"]
+__all__ = ["check_address", "discover", "open_device", "open_recording"]
 
+check_address = parse
 open_recording = OakRecording
 
 

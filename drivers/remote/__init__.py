@@ -12,6 +12,8 @@ from drivers.remote.device import RemoteDevice
 from drivers.remote.link import open_link
 from drivers.remote.probe import choose_rig, probe
 
+check_address = parse
+
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens `remote://HOST:PORT/RIG`; the rig is optional if there is only one, host and port default to this host.

@@ -1,6 +1,7 @@
 """Recordings: read offline frame by frame, or played in real time as the device `replay://FILE?speed=1&loop=0`."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, unquote, urlsplit
 
@@ -10,7 +11,7 @@ from drivers.replay.contents import RecordingError
 from drivers.replay.device import ReplayDevice
 from drivers.replay.recording import Recording
 
-__all__ = ["Recording", "RecordingError", "ReplayDevice", "discover", "open_device"]
+__all__ = ["Recording", "RecordingError", "ReplayDevice", "check_address", "discover", "open_device"]
 
 _SPEEDS = (0.01, 100.0)
 _DELAYS_S = (0.0, 3600.0)
@@ -25,6 +26,30 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     Raises:
         AddressError: invalid address, or the file cannot be replayed.
     """
+    address = check_address(uri)
+    try:
+        recording = Recording(address.path)
+        return ReplayDevice(uri, recording, address.speed, address.loop, clock, delay_s=address.delay_s)
+    except RecordingError as error:
+        raise AddressError(str(error)) from error
+
+
+@dataclass(frozen=True)
+class Address:
+    """A parsed address: the file, the factor on its speed, whether it repeats, and the time before it begins [s]."""
+
+    path: Path
+    speed: float
+    loop: bool
+    delay_s: float
+
+
+def check_address(uri: str) -> Address:
+    """Parses an address; whether there is such a file is not looked at.
+
+    Raises:
+        AddressError: unknown key or invalid value; names both and what is allowed.
+    """
     parts = urlsplit(uri)
     values = {"speed": "1", "loop": "0", "delay": "0"}
     for key, value in parse_qsl(parts.query, keep_blank_values=True):
@@ -35,11 +60,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
         raise AddressError(f"{uri}: loop = {values['loop']!r} must be 0 or 1")
     speed = _number(uri, "speed", values["speed"], _SPEEDS)
     delay_s = _number(uri, "delay", values["delay"], _DELAYS_S)
-    path = Path(unquote(parts.netloc + parts.path))
-    try:
-        return ReplayDevice(uri, Recording(path), speed, values["loop"] == "1", clock, delay_s=delay_s)
-    except RecordingError as error:
-        raise AddressError(str(error)) from error
+    return Address(Path(unquote(parts.netloc + parts.path)), speed, values["loop"] == "1", delay_s)
 
 
 def discover(timeout_s: float) -> list[Found]:

@@ -10,6 +10,8 @@ from drivers.contract.discovery import Found
 from drivers.simulated.address import parse
 from drivers.simulated.device import SimulatedDevice
 
+check_address = parse
+
 
 def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens an address such as `simulated://sheet?seed=1&sensors=tof,color`; the keys are the fields of `Address`.

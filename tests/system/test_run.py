@@ -12,7 +12,7 @@ from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import config
 from evaluation.service.live.proc import children
-from tests.system.running import TRACKING, is_running, wait_until
+from tests.system.running import TRACKING, abs_service, is_running, wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -118,3 +118,22 @@ def test_the_first_estimate_after_the_start(rig_file, launch):
     process.send_signal(signal.SIGTERM)
     process.communicate(timeout=10)
     assert process.returncode == 0
+
+
+def test_all_processes_log_where_run_was_told_to(rig_file, tmp_path):
+    log = tmp_path / "rig.log"
+    options = ("--no-record", "--duration", "3", "--log-level", "info", "--log-format", "json", "--log-file", log)
+    assert abs_service("run", rig_file, *options).returncode == 0
+    records = [json.loads(line) for line in log.read_text().splitlines()]
+    assert {one["process"] for one in records} == {"run", "capture", "track/sheet"}
+    assert any(one["fields"].get("device") == "sim" for one in records if one["process"] == "capture")
+
+
+def test_standard_error_of_run_is_json(rig_file):
+    rig_file.write_text(rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1"))
+    done = abs_service("run", rig_file, "--log-level", "info", "--log-format", "json", timeout_s=60)
+    records = [json.loads(line) for line in done.stderr.splitlines()]
+    assert done.returncode == 2
+    assert {"run", "capture"} <= {one["process"] for one in records}
+    assert records[-1]["message"].startswith(f"{rig_file}: devices.sim.uri = ")
+    assert [one["fields"].get("exit_code") for one in records].count(2) == 1

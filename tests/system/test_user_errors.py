@@ -54,7 +54,17 @@ def test_a_name_that_cannot_be_on_the_wire(name, rig_file):
 
 def test_a_device_address_that_no_device_can_have(rig_file):
     rig_file.write_text(rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1"))
-    assert "simulated://sheet?sed=1: unknown key 'sed'" in refused("run", rig_file)
+    message = refused("run", rig_file)
+    assert message.startswith(f"{rig_file}: devices.sim.uri = \"simulated://sheet?sed=1\": unknown key 'sed'")
+
+
+def test_all_device_addresses_that_no_device_can_have(rig_file):
+    text = rig_file.read_text().replace("simulated://sheet?seed=1", "simulated://sheet?sed=1")
+    rig_file.write_text(text + '[devices.second]\nuri = "kinect1://?stream=ir"\n')
+    message = refused("run", rig_file)
+    assert message.startswith(f"{rig_file}: 2 errors\n")
+    assert "unknown key 'sed'" in message
+    assert "devices.second.uri = \"kinect1://?stream=ir\": unknown key 'stream'" in message
 
 
 class TestReplay:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
 from abs_service.config.camera import PoseTable
+from abs_service.config.positions import located
 from abs_service.config.problems import Key, from_pydantic
 from calib.camera import Camera
 from calib.lenses.by_name import LensName, lens_of
@@ -91,15 +92,17 @@ def load(path: Path) -> CameraFile:
     Raises:
         CameraFileError: the file cannot be read, or has invalid keys or values.
     """
+    toml = ""
     try:
         text = path.read_text(encoding="utf-8")
-        content = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+        toml = "" if path.suffix == ".json" else text
+        content = json.loads(text) if path.suffix == ".json" else tomllib.loads(toml)
         # Through JSON, because there a list may stand for a tuple.
         return CameraFile.model_validate_json(json.dumps(content), strict=True)
     except OSError as error:
         raise CameraFileError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:
-        problems = "".join(f"\n  {problem}" for problem in from_pydantic(error, _allowed_at))
+        problems = "".join(f"\n  {problem}" for problem in located(from_pydantic(error, _allowed_at), toml))
         raise CameraFileError(f"{path}:{problems}") from None
     except ValueError as error:  # what is no UTF-8, JSON or TOML
         raise CameraFileError(f"{path}: cannot be understood: {error}") from None

@@ -2,6 +2,7 @@
 
   abs-service import data/cloth --layout pairs --camera cloth.toml --out cloth.mcap
   abs-service import data/cloth --layout pairs --camera cloth.toml --depth 'd*.png' --color 'c*.jpg' --out cloth.mcap
+  abs-service import data/cloth --layout pairs --camera cloth.toml --frames 200:319 --out cloth.mcap
   abs-service import rgbd_dataset_freiburg1_xyz --layout tum --out xyz.mcap
   abs-service import kinect.mkv --layout azure --out kinect.mcap
 
@@ -10,7 +11,8 @@ process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 b
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
-and their times.
+and their times. --frames 200:319 takes a part, both ends included; 200:319:5 every fifth; 7,9,20: has several ranges.
+Numbers are those in the names (`pairs`) or count the lines of depth.txt from 0 (`tum`).
 
 Depth images have one channel of 16 bits, in millimetres (`pairs`) or 1/5000 m (`tum`), colour images have 8 bits. The
 camera file says what took them; without a table `color` in it there are no colour images:
@@ -37,7 +39,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from abs_service.commands.images import camera_file, import_file
+from abs_service.commands.images import camera_file, frame_numbers, import_file
 from abs_service.commands.images.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.frame import Geometry
@@ -70,6 +72,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--rate", type=_rate, default=30.0, metavar="HZ", help="exposures per second (pairs; %(default)g)"
     )
+    parser.add_argument(
+        "--frames",
+        type=frame_numbers.parse,
+        default=frame_numbers.ALL,
+        metavar="FIRST:LAST[:STEP]",
+        help="numbers of the exposures to import (pairs, tum; default: all)",
+    )
     parser.add_argument("--rig", type=Path, metavar="FILE", help="configuration to attach, for a replay without one")
 
 
@@ -100,6 +109,8 @@ def _foreign_recording(arguments: argparse.Namespace) -> ForeignRecording:
     for option in ("camera", "mask"):
         if getattr(arguments, option) is not None:
             raise ImportOptionError(f"--{option}: a recording with layout {arguments.layout} needs none")
+    if arguments.frames is not frame_numbers.ALL:
+        raise ImportOptionError(f"--frames: a recording with layout {arguments.layout} is imported as a whole")
     return open_recording(arguments.layout, arguments.path)
 
 
@@ -134,7 +145,7 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
     if not folder.is_dir():
         raise ImageFolderError(f"{folder}: no such folder")
     depth = cameras.depth
-    files = by_number(folder, arguments.depth, rate) if numbered else by_list(folder, "depth.txt")
+    files = arguments.frames.of(by_number(folder, arguments.depth, rate) if numbered else by_list(folder, "depth.txt"))
     streams: dict[str, Images] = {
         "depth": DepthImages(
             files=files,
@@ -146,8 +157,12 @@ def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str,
         )
     }
     if cameras.color is not None:
-        files = by_number(folder, arguments.color, rate) if numbered else by_list(folder, "rgb.txt")
-        streams["color"] = ColorImages(files, cameras.color.camera())
+        colors = by_number(folder, arguments.color, rate) if numbered else by_list(folder, "rgb.txt")
+        if numbered:
+            colors = arguments.frames.of(colors)
+        elif arguments.frames is not frame_numbers.ALL:
+            colors = frame_numbers.nearest(colors, files)
+        streams["color"] = ColorImages(colors, cameras.color.camera())
     return streams
 
 

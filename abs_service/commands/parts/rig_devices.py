@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 
 from abs_service import config
+from abs_service.config import addresses
+from abs_service.config.errors import error_of
 from calib.camera import Camera
 from drivers.contract.controls import Value
 from drivers.contract.device import ControlError, Device
@@ -14,6 +16,17 @@ class HeadError(Exception):
 
 class SettingError(Exception):
     """A configuration that sets a control which its device does not have, or to what it does not take."""
+
+
+def check_addresses(rig: config.ServiceConfig, source: str) -> None:
+    """Refuses a rig in which addresses are wrong, with all of them.
+
+    Raises:
+        ConfigError: names the devices.
+    """
+    problems = list(addresses.check({name: device.uri for name, device in rig.devices.items()}))
+    if problems:
+        raise error_of(source, problems, "")
 
 
 def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> None:

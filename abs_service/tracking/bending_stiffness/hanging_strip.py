@@ -1,5 +1,6 @@
 """Tracking of a recorded strip that hangs from a gripper, for the estimate of its stiffness."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,10 +85,17 @@ class HangingStrip:
         )
 
 
-def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan: Plan) -> HangingStrip:
+def track_strip(
+    recording: Recording,
+    rig: Rig,
+    synchroniser: Synchroniser,
+    plan: Plan,
+    on_image: Callable[[], None] = lambda: None,
+) -> HangingStrip:
     """Tracks a recording with a gravity model.
 
-    If the strip was lost and detected again, the mesh with the most tracked frames is used.
+    If the strip was lost and detected again, the mesh with the most tracked frames is used. `on_image` is called after
+    every image.
 
     Raises:
         StiffnessError: no strip was tracked in any frame.
@@ -95,7 +103,7 @@ def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan
     tracking, observer = TrackingSession(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
     sets = 0
-    for frames in synchroniser.group(item for item in recording.frames() if isinstance(item, Frame)):
+    for frames in synchroniser.group(_counted(recording, on_image)):
         sets += 1
         estimate, model = tracking.track(frames, lambda: True), tracking.model
         if isinstance(model, Gravity) and estimate.status == Status.TRACKING:
@@ -107,3 +115,10 @@ def track_strip(recording: Recording, rig: Rig, synchroniser: Synchroniser, plan
     seen = detect_object(observer.observe(frames), rig, plan.reference, plan.region.build(), plan.vertices)
     inclinations = [inclination_profile(model, estimate.theta, estimate.covariance) for _, estimate, _ in longest]
     return HangingStrip(model, inclinations, sets - len(longest), shown, seen.points)
+
+
+def _counted(recording: Recording, on_image: Callable[[], None]) -> Iterator[Frame]:
+    for item in recording.frames():
+        if isinstance(item, Frame):
+            yield item
+            on_image()

@@ -4,7 +4,10 @@ import pytest
 
 from abs_service import cli, config
 from abs_service.commands import check
+from abs_service.commands.parts import device_checks
 from abs_service.supervision.exit_codes import Exit
+from drivers.simulated.address import parse
+from tests.abs_service.commands.simulated_recording import write_take
 
 RIG = """
 version = 1
@@ -94,7 +97,11 @@ def test_a_mistake_for_scripts(checked):
     ("good", "bad", "message"),
     [
         ("simulated://sheet", "simulatde://sheet", 'no such driver, did you mean "simulated"? allowed: '),
-        ("seed=1&", "sede=1&", "devices.sim.uri: simulated://sheet?sede=1&sensors=tof: unknown key 'sede'"),
+        (
+            "seed=1&",
+            "sede=1&",
+            "line 5: devices.sim.uri = \"simulated://sheet?sede=1&sensors=tof\": unknown key 'sede'",
+        ),
         ("sensors=tof", "sensors=color", 'devices.sim.uri: sensor "tof": no head "tof", allowed: color'),
         ("sheet?seed=1&sensors=tof", "sheet?seed=x", "seed = 'x' must be a number"),
         (
@@ -102,7 +109,8 @@ def test_a_mistake_for_scripts(checked):
             "[devices.sim.controls]\ngain = 2\n[sensors",
             "devices.sim.controls: gain: no such control, allowed: none",
         ),
-        ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "none.mcap"),
+        ("simulated://sheet?seed=1&sensors=tof", "replay://none.mcap", "check with --replay FILE"),
+        ("simulated://sheet?seed=1&sensors=tof", "kinect1://?stream=ir", "unknown key 'stream'; allowed is"),
         ('"rigid" }', '"rigid" }\nregion = { type = "mask", file = "no.png" }', "trackers.sheet.region: file = "),
         (
             'noise = { type = "gaussian_polynomial", sigma = [[0.005]] }',
@@ -130,8 +138,8 @@ def test_all_problems_are_reported_at_once(checked):
 
 
 def test_no_driver_that_could_touch_hardware_is_opened(monkeypatch, tmp_path):
-    monkeypatch.setattr(check, "HARMLESS", frozenset())
-    monkeypatch.setattr(check.opening, "open_device", lambda *_: pytest.fail("opened"))
+    monkeypatch.setattr(device_checks, "HARMLESS", frozenset())
+    monkeypatch.setattr(device_checks.opening, "open_device", lambda *_: pytest.fail("opened"))
     found = check.describe(config.loads(RIG, "rig.toml", tmp_path), "rig.toml")
     assert found["sensors"]["tof"]["streams"] == []
 
@@ -159,3 +167,58 @@ def test_a_calibration_file_is_named_with_its_verdict(checked, tmp_path):
     found = json.loads(checked(given, "--json")[1])
     assert found["sensors"]["tof"]["camera"] == {"projection": "device", "pose": "x.calibration.toml"}
     assert found["calibration"]["provenance"]["version"] == "0.1.0"
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    """A recording of a depth camera, called "depth"."""
+    simulation = parse("simulated://sheet?seed=1&sensors=tof").build()
+    return write_take(tmp_path_factory.mktemp("takes") / "take.mcap", simulation, range(3), {"tof": "depth"})
+
+
+FOR_REPLAY = (
+    RIG.replace("simulated://sheet?seed=1&sensors=tof", "replay://not/here.mcap")
+    .replace("[sensors.tof]", "[sensors.depth]")
+    .replace('"tof"', '"depth"')
+    .replace("tof/depth", "depth/depth")
+)
+
+
+def test_a_rig_for_replay_is_checked_against_the_recording_and_not_its_devices(checked, take):
+    code, out, _ = checked(FOR_REPLAY, "--replay", str(take))
+    assert code == Exit.OK
+    assert "sensor   depth: depth 176×144 16UC1" in out
+    assert checked(FOR_REPLAY)[0] == Exit.USER
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "message"),
+    [
+        ("depth/depth", "depht/depth", 'synchronisation.reference = "depht/depth": no such sensor'),
+        (
+            "sensors.depth",
+            "sensors.other",
+            'tracker "sheet" needs sensor "other", which is not there; the recording has: depth',
+        ),
+        (
+            'noise = { type = "gaussian_polynomial", sigma = [[0.005]] }',
+            'noise = { type = "color" }',
+            "line 11: trackers.sheet: depth: its noise model needs the stream color",
+        ),
+        ("replay://not/here.mcap", "replay://not/here.mcap?sped=1", "devices.sim.uri = "),
+    ],
+)
+def test_what_a_rig_for_replay_lacks_is_named(checked, take, good, bad, message):
+    assert good in FOR_REPLAY
+    text = FOR_REPLAY.replace(good, bad)
+    if "other" in bad:
+        text = text.replace('["depth"]', '["other"]').replace('"depth/depth"', '"other/depth"')
+    code, _, err = checked(text, "--replay", str(take))
+    assert code == Exit.USER
+    assert message in err
+
+
+def test_a_recording_that_is_not_there_is_named(checked, tmp_path):
+    code, _, err = checked(FOR_REPLAY, "--replay", str(tmp_path / "no.mcap"))
+    assert code == Exit.USER
+    assert f"--replay: {tmp_path / 'no.mcap'}: No such file" in err

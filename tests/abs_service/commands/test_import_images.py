@@ -171,6 +171,63 @@ def test_a_missing_folder_and_an_existing_recording_are_named(folder: Path, caps
     assert (folder / "out.mcap").read_bytes() == b"precious"
 
 
+@pytest.mark.parametrize(
+    ("frames", "depths", "colors"),
+    [
+        ("1:2", [1, 2], [2]),
+        ("1:", [1, 2], [2]),
+        (":1", [0, 1], [0]),
+        ("0:2:2", [0, 2], [0, 2]),
+        ("0,2", [0, 2], [0, 2]),
+        ("2", [2], [2]),
+        ("0:99", [0, 1, 2], [0, 2]),
+    ],
+)
+def test_a_part_of_the_exposures(folder: Path, frames: str, depths: list[int], colors: list[int]) -> None:
+    camera = str(folder / "camera.toml")
+    assert run(folder, "--camera", camera, "--frames", frames, "--mask", "mask_*.png") == Exit.OK
+    found = frames_of(folder / "out.mcap")
+    assert [frame.seq for frame in found if frame.sensor == "depth"] == depths
+    assert [frame.seq for frame in found if frame.sensor == "color"] == colors
+    assert {frame.t_host_ns for frame in found} == {round(seq * 1e9 / 30) for seq in depths}
+
+
+def test_a_part_of_a_list_has_the_colours_of_its_moments(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "d.png"), np.full((480, 640), 5000, np.uint16))
+    cv2.imwrite(str(tmp_path / "c.png"), np.zeros((480, 640, 3), np.uint8))
+    for name, image, late in (("depth", "d", 0.0), ("rgb", "c", 0.01)):
+        for k in range(5):
+            (tmp_path / f"{image}{k}.png").write_bytes((tmp_path / f"{image}.png").read_bytes())
+        lines = [f"{10 + k / 30 + late:.6f} {image}{k}.png\n" for k in range(5)]
+        (tmp_path / f"{name}.txt").write_text("".join(lines))
+    out = tmp_path / "out.mcap"
+    assert cli.main(["import", str(tmp_path), "--layout", "tum", "--out", str(out), "--frames", "1:4:2"]) == Exit.OK
+    assert [(frame.sensor, frame.seq) for frame in frames_of(out)] == [
+        ("depth", 1),
+        ("color", 1),
+        ("depth", 3),
+        ("color", 3),
+    ]
+
+
+def test_frames_that_are_not_there_are_refused(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(folder, "--camera", str(folder / "camera.toml"), "--frames", "7:9") == Exit.USER
+    assert "--frames 7:9: no image has such a number; there are 0 to 2" in capsys.readouterr().err
+    arguments = ["import", str(tmp_path), "--layout", "o3r", "--out", str(tmp_path / "x.mcap"), "--frames", "0:2"]
+    assert cli.main(arguments) == Exit.USER
+    assert "--frames: a recording with layout o3r is imported as a whole" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("frames", ["a", "1:2:0", "1-2", "", "1:2:3:4", "-1:2"])
+def test_frames_are_numbers_with_colons(folder: Path, capsys: pytest.CaptureFixture[str], frames: str) -> None:
+    with pytest.raises(SystemExit) as exit_info:
+        run(folder, f"--frames={frames}")
+    assert exit_info.value.code == Exit.USER
+    assert "must be FIRST:LAST or FIRST:LAST:STEP" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("rate", ["0", "fast", "nan"])
 def test_a_rate_is_a_number(folder: Path, capsys: pytest.CaptureFixture[str], rate: str) -> None:
     with pytest.raises(SystemExit) as exit_info:

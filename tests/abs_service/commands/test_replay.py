@@ -173,7 +173,7 @@ def test_a_recording_that_breaks_off_is_tracked_up_to_there(recording, replayed,
 @pytest.mark.parametrize(
     ("toml", "sensors", "message"),
     [
-        (TOML, ("tof",), r'sensor "color" of tracker "sheet" has no camera model'),
+        (TOML, ("tof",), r'tracker "sheet" needs sensor "color", which is not there; the recording has: tof'),
         (TOML.partition("[trackers")[0] + "[record]\n", ("tof", "color"), "trackers: there is none"),
         ("version = 1\nname = 3\n", ("tof", "color"), "rig.toml"),
     ],

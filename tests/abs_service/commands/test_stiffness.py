@@ -1,6 +1,7 @@
 """`abs-service stiffness`: one number with its deviation and a picture, or clear words."""
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -38,7 +39,8 @@ def test_the_stiffness_and_a_picture_come_out(recording, capsys):
 
 def test_the_text_has_stiffness_and_uncertainty(recording, capsys):
     assert cli.main(["stiffness", str(recording), "--weight", "0.3"]) == Exit.OK
-    said = capsys.readouterr().out
+    said, progress = capsys.readouterr()
+    assert re.search(r"images \S+ (\d+)/\1 ", progress)
     assert "bending stiffness per width  D = " in said
     assert "mN·m ± " in said
     assert "strip-stiffness.png" in said

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def mistakes(text: str) -> list[str]:
         loads(text)
     first, *others = str(caught.value).splitlines()
     assert first.startswith("rig.toml: ")
-    return [line.strip() for line in others] or [first.removeprefix("rig.toml: ")]
+    return [re.sub(r"^line \d+: ", "", line.strip()) for line in others or [first.removeprefix("rig.toml: ")]]
 
 
 def test_optional_keys_have_defaults():
@@ -122,8 +123,8 @@ CASES = {
         '[sensors.second]\ndevice = "sim"\nhead = "rgb"\n',
         'sensors.second: sensor "color" is head "rgb" of device "sim" already',
     ),
-    "a name that cannot be a key": ('[devices."a/b"]\nuri = "simulated:x"\n', "devices.a/b = "),
-    "a reserved name": ('[devices.health]\nuri = "simulated:x"\n', "reserved"),
+    "a name that cannot be a key": ('[devices."a/b"]\nuri = "simulated://sheet"\n', "devices.a/b = "),
+    "a reserved name": ('[devices.health]\nuri = "simulated://sheet"\n', "reserved"),
     "a pose that is none": (
         "[sensors.tof.camera]\nT_rs = [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n",
         "sensors.tof.camera.T_rs = [[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]: not a pose",
@@ -175,9 +176,44 @@ def test_all_problems_are_reported_at_once():
     found = mistakes(text + "[bus]\nendpoint = 3\n")
     assert [line.split()[0] for line in found] == [
         "version",
-        "bus.endpoint",
         "sensors.tof.device",
         "sensors.color.device",
+        "bus.endpoint",
+    ]
+
+
+def test_each_problem_says_on_which_line_it_is():
+    text = SENSORS.replace('device = "sim"', 'device = "sam"', 1) + "[record]\nflush_s = 0\n[trackers.sheet]\n"
+    with pytest.raises(config.ConfigError) as caught:
+        loads(text)
+    lines = text.splitlines()
+    found = [line.split(": ") for line in str(caught.value).splitlines()[1:]]
+    assert [(key.partition(" = ")[0], lines[int(place.split()[1]) - 1]) for place, key, *_ in found] == [
+        ("sensors.tof.device", 'device = "sam"'),
+        ("record.flush_s", "flush_s = 0"),
+        ("trackers.sheet.sensors", "[trackers.sheet]"),
+        ("trackers.sheet.model", "[trackers.sheet]"),
+    ]
+
+
+def test_addresses_are_checked_with_everything_else():
+    text = SENSORS.replace("seed=1", "sede=1") + '[devices.k]\nuri = "kinekt1://"\n[record]\nflush_s = 0\n'
+    found = mistakes(text)
+    assert found[0].startswith("devices.sim.uri = \"simulated://sheet?sede=1\": unknown key 'sede'; allowed are")
+    assert found[1].startswith('devices.k.uri = "kinekt1://": no such driver, did you mean "kinect1"? allowed: ')
+    assert found[2].startswith("record.flush_s = 0")
+
+
+def test_mistakes_are_told_with_those_of_the_calibration_file(tmp_path):
+    (tmp_path / "x.toml").write_text('version = 1\nname = "bench"\n\n[sensors.tof]\nrange_m = -1.0\n')
+    text = 'calibration = "x.toml"\n' + SENSORS + "[record]\nflush_s = 0\n[sensors.tof.camera]\nfx = 1.0\n"
+    with pytest.raises(config.ConfigError) as caught:
+        config.loads(text, "rig.toml", tmp_path)
+    assert [line.strip().partition(" = ")[0] for line in str(caught.value).splitlines()] == [
+        f"{tmp_path / 'x.toml'}: 2 errors",
+        "provenance: missing, but needed",
+        "line 5: sensors.tof.range_m",
+        "rig.toml: line 20: record.flush_s",
     ]
 
 

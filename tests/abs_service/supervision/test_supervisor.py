@@ -137,22 +137,13 @@ def test_a_failed_recorder_stops_nothing(world):
     assert supervisor.exit_code() is None
 
 
-def test_exit_code_3_means_do_not_start_me_again(world):
-    supervisor = world.supervisor("capture", "track/a")
-    world.words = "the SDK is not installed"
-    ends(world, supervisor, "capture", Exit.GIVE_UP)
-    child = supervisor.children["capture"]
-    assert (child.state, child.restarts, child.reason) == (State.FAILED, 0, "the SDK is not installed")
-    assert supervisor.exit_code() is Exit.FAILED
-
-
 def test_exit_code_2_of_anyone_stops_everything_and_keeps_the_message(world):
     supervisor = world.supervisor("capture", "track/a", "record")
     world.words = "abs-service: error: record.directory is read-only"
     ends(world, supervisor, "record", Exit.USER)
     refused = supervisor.misconfigured()
     assert refused is not None
-    assert refused.reason == world.words
+    assert (refused.state, refused.restarts, refused.reason) == (State.FAILED, 0, world.words)
     assert supervisor.exit_code() is Exit.USER
 
 

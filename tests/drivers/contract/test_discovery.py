@@ -64,3 +64,4 @@ def test_a_failing_or_hanging_driver_does_not_hide_the_others(monkeypatch: pytes
 
 def test_every_driver_has_a_discovery() -> None:
     assert all(callable(sys.modules[f"drivers.{scheme}"].discover) for scheme in opening.available())
+    assert all(callable(sys.modules[f"drivers.{scheme}"].check_address) for scheme in opening.available())

@@ -8,6 +8,7 @@ import pytest
 
 from calib.camera import Camera
 from drivers.contract.frame import Geometry, Kind
+from drivers.image_folder import image_file
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder
 from drivers.image_folder.listing import ImageFile, ImageFolderError, by_list, by_number
 
@@ -161,3 +162,10 @@ def test_16_bit_colour_and_other_files_are_rejected(tmp_path: Path) -> None:
     file.path.write_bytes(b"no image")
     with pytest.raises(ImageFolderError, match=r"c_0.png: cannot be read as an image"):
         ColorImages([file], CAMERA).frame(file)
+
+
+@pytest.mark.parametrize("name", image_file.READABLE.replace(" and", ",").split(", "))
+def test_each_format_that_is_said_to_be_readable_is(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"image.{name.lower()}"
+    assert cv2.imwrite(str(path), np.zeros((3, 4, 1 if name == "PGM" else 3), np.uint8))
+    assert image_file.read(path).shape[:2] == (3, 4)

@@ -1,0 +1,1 @@
+"""The command `new`: questions, and the rig file that follows from the answers."""

@@ -1,0 +1,144 @@
+"""Writes the rig file for what you have: asks what is attached and what the object is.
+
+  abs-service new rig.toml                       asks
+  abs-service new rig.toml --device kinect1 --object sheet --no-color --behind plane       asks nothing
+  abs-service new rig.toml --device oak-tof --uri 'oak://18443010E1A2B3C4?mode=tof' …      one of several cameras
+
+Every question is an option; what is not given as one is asked if a person is there to answer, and an error if not. The
+file has comments, and `abs-service check` accepts it.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from abs_service.bus import keys
+from abs_service.commands.new import rig_text
+from abs_service.commands.new.rig_text import BEHIND, DEVICES, OBJECTS, Answers
+from abs_service.supervision.exit_codes import Exit
+from drivers import opening
+from drivers.contract.discovery import Found
+
+#: Time to look for cameras [s].
+DISCOVERY_S = 2.0
+#: Sides of the simulated sheet [m].
+SIMULATED_SIZE = (0.3, 0.2)
+
+
+class NewFileError(Exception):
+    """A rig file that cannot be written, or an answer that is missing or impossible."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service new`."""
+    parser.add_argument("file", metavar="RIG.toml", type=Path, help="file to write")
+    parser.add_argument("--device", choices=DEVICES, help="what is attached")
+    parser.add_argument("--uri", help="address of one of several cameras (default: the only one)")
+    parser.add_argument("--object", choices=OBJECTS, help="what is tracked")
+    parser.add_argument(
+        "--size", nargs=2, type=float, metavar=("WIDTH", "HEIGHT"), help="of a sheet of known size, in metres"
+    )
+    parser.add_argument("--color", action=argparse.BooleanOptionalAction, help="use the colour camera as well")
+    parser.add_argument("--behind", choices=BEHIND, help="what is behind the object")
+    parser.add_argument("--name", help="of the rig on the wire (default: that of the file)")
+    parser.add_argument("--force", action="store_true", help="replace a file that exists")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Asks for what the options do not say, and writes the file."""
+    file: Path = arguments.file
+    if file.exists() and not arguments.force:
+        raise NewFileError(f"{file}: exists already; choose another name, or replace it with --force")
+    name = keys.check_name(arguments.name or file.name.partition(".")[0])
+    ask = _ask if sys.stdin.isatty() and sys.stdout.isatty() else _refuse
+    found = opening.discover(DISCOVERY_S) if arguments.device is None and ask is _ask else []
+    answers = answered(arguments, name, found, ask)
+    try:
+        file.write_text(rig_text.write(answers, str(file)), encoding="utf-8")
+    except OSError as error:
+        raise NewFileError(f"{file}: cannot be written: {error.strerror}") from None
+    print(f"wrote {file}; next:\n  abs-service check {file}\n  abs-service run {file}")
+    return Exit.OK
+
+
+#: Asks for the answer to an option: its name, the question, and the choices with a text each (none: a line).
+Ask = Callable[[str, str, Mapping[str, str]], str]
+
+
+def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: Ask) -> Answers:
+    """What is known of the rig, from the options and the answers.
+
+    Args:
+        arguments: the options; None for what is to be asked.
+        name: of the rig.
+        found: attached cameras, which are named first.
+        ask: asks a question.
+
+    Raises:
+        NewFileError: an answer that is impossible.
+    """
+    attached = {one.info.uri: one.info.model for one in found if device_of(one)}
+    device, uri = arguments.device, arguments.uri
+    if device is None:
+        kinds = {name: device.text for name, device in DEVICES.items()}
+        device = ask("device", "What is attached?", attached | kinds)
+        if device in attached:
+            uri, device = device, next(kind for one in found if one.info.uri == device and (kind := device_of(one)))
+    thing = arguments.object or ask("object", "What is the object?", OBJECTS)
+    size = arguments.size and (arguments.size[0], arguments.size[1])
+    if thing == "known-sheet":
+        size = size or _size(ask("size", "Width and height of the sheet in metres, such as 0.297 0.21?", {}))
+        if not all(0 < side < 100 for side in size):
+            raise NewFileError(f"--size {size[0]:g} {size[1]:g}: sides are lengths in metres, above 0")
+    color = arguments.color
+    if color is None:
+        color = ask("color", "Is its colour camera used, too?", {"yes": "print and edges", "no": "distances"}) == "yes"
+    behind = arguments.behind or ask("behind", "What is behind the object?", BEHIND)
+    uri = uri or _uri(device, thing)
+    scheme = DEVICES[device].uri.partition(":")[0]
+    if not uri.startswith(f"{scheme}:"):
+        raise NewFileError(f"--uri {uri}: the address of a device {device} begins with {scheme}://")
+    opening.check_address(uri)
+    return Answers(name, device, uri, thing, size or SIMULATED_SIZE, color, behind)
+
+
+def device_of(found: Found) -> str | None:
+    """The kind of an attached device; None if it is none of `DEVICES`."""
+    scheme = found.info.uri.partition(":")[0]
+    if scheme == "oak" and found.info.serial:
+        return "oak-tof" if "tof" in found.info.model.lower() else "oak-stereo"
+    return scheme if scheme in DEVICES and found.info.serial else None
+
+
+def _uri(device: str, thing: str) -> str:
+    return "simulated://strip?seed=1" if (device, thing) == ("simulated", "strip") else DEVICES[device].uri
+
+
+def _size(text: str) -> tuple[float, float]:
+    try:
+        width, height = map(float, text.replace(",", " ").split())
+    except ValueError:
+        raise NewFileError(f'"{text}": the size is two numbers in metres, such as 0.297 0.21') from None
+    return width, height
+
+
+def _refuse(option: str, question: str, choices: Mapping[str, str]) -> str:
+    options = {"size": "two lengths in metres", "color": "--color or --no-color"}
+    allowed = options.get(option) or ", ".join(choices)
+    raise NewFileError(f"--{option}: missing, and nobody is there to be asked; allowed: {allowed}")
+
+
+def _ask(option: str, question: str, choices: Mapping[str, str]) -> str:
+    """Asks until the answer is a number or a name among the choices; any line if there are none."""
+    print(question)
+    width = max(map(len, choices), default=0)
+    for number, (name, text) in enumerate(choices.items(), 1):
+        print(f"  {number}  {name:<{width}}  {text}")
+    while True:
+        answer = input("> ").strip()
+        if not choices or answer in choices:
+            return answer
+        if answer.isdecimal() and 1 <= int(answer) <= len(choices):
+            return list(choices)[int(answer) - 1]
+        print(f"one of 1 to {len(choices)}, please")

@@ -1,0 +1,95 @@
+"""The log of every command: its options, where it goes, and what the processes of `run` inherit."""
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import abs_service
+from abs_service.supervision.exit_codes import Exit, is_for_user
+from abs_service.supervision.log_lines import ERROR, JsonFormatter
+
+LEVELS = ("debug", "info", "warning", "error")
+
+_log = logging.getLogger("abs_service")
+
+
+class LogFileError(Exception):
+    """The file of the log cannot be written."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds --log-level, --log-format and --log-file."""
+    group = parser.add_argument_group("log")
+    group.add_argument("--log-level", choices=LEVELS, default="warning", help="least level (default: %(default)s)")
+    group.add_argument(
+        "--log-format",
+        choices=("text", "json"),
+        default="text",
+        help="json: one object a line with time, level, process, message, fields (default: text)",
+    )
+    group.add_argument(
+        "--log-file", metavar="FILE", type=Path, help="append the log to this file instead of standard error"
+    )
+
+
+def options(arguments: argparse.Namespace) -> list[str]:
+    """The options of the log, to give to another command."""
+    file = ["--log-file", str(arguments.log_file.resolve())] if arguments.log_file else []
+    return ["--log-level", arguments.log_level, "--log-format", arguments.log_format, *file]
+
+
+def on_stderr(arguments: argparse.Namespace) -> bool:
+    """True if what is written to standard error should be JSON."""
+    return arguments.log_format == "json" and not arguments.log_file
+
+
+def set_up(arguments: argparse.Namespace, command: str, given: Sequence[str]) -> None:
+    """Opens the log of this process, and notes in it what was started.
+
+    Args:
+        arguments: with the options of the log.
+        command: name of the command.
+        given: its arguments as they were given.
+
+    Raises:
+        LogFileError: the file cannot be written.
+    """
+    process = "/".join(filter(None, [command, getattr(arguments, "tracker", None)]))
+    handler = _handler(arguments.log_file)
+    where = f" {process}" if arguments.log_file else ""  # several processes write into one file
+    text = logging.Formatter(f"%(asctime)s %(levelname)s{where} %(name)s: %(message)s")
+    handler.setFormatter(JsonFormatter(process) if arguments.log_format == "json" else text)
+    logging.basicConfig(level=arguments.log_level.upper(), handlers=[handler])
+    fields = {"version": abs_service.__version__, "arguments": list(given)}
+    _log.info("abs-service %s %s", command, abs_service.__version__, extra={"fields": fields})
+
+
+def end_with(error: Exception, arguments: argparse.Namespace) -> int:
+    """Tells the error that ends a command; returns its exit code.
+
+    Raises:
+        Exception: the error itself, if it is our own mistake and standard error is for people.
+    """
+    user = is_for_user(error)
+    code = Exit.USER if user else Exit.FAILED
+    if not isinstance(error, LogFileError) and (arguments.log_file or arguments.log_format == "json"):
+        text = str(error) if user else f"{type(error).__name__}: {error}"
+        _log.critical("%s", text, extra={"fields": {"exit_code": int(code)}}, exc_info=None if user else error)
+    if not on_stderr(arguments):
+        if not user:
+            raise error
+        print(f"{ERROR}{error}", file=sys.stderr)
+    return code
+
+
+def _handler(file: Path | None) -> logging.Handler:
+    if file is None:
+        return logging.StreamHandler(sys.stderr)
+    from logging.handlers import WatchedFileHandler  # noqa: PLC0415 - needed for a file only
+
+    try:
+        return WatchedFileHandler(file, encoding="utf-8")  # opens it again after it was moved by logrotate
+    except OSError as error:
+        raise LogFileError(f"--log-file {file}: cannot be written: {error.strerror}") from None

@@ -1,0 +1,68 @@
+"""Commands return the exit codes that docs/command-line.md lists."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from abs_service import cli
+from abs_service.commands import check, reinitialize
+from abs_service.supervision.exit_codes import Exit
+
+PAGE = (Path(__file__).parents[3] / "docs" / "command-line.md").read_text(encoding="utf-8")
+
+
+def listed():
+    section = PAGE.partition("## Exit codes")[2].partition("\n## ")[0]
+    return {int(code) for code in re.findall(r"^\| (\d+) \|", section, re.MULTILINE)}
+
+
+def test_the_page_lists_every_code():
+    assert listed() == {*Exit, 128 + signal.SIGTERM}
+
+
+def test_0_for_what_is_done():
+    assert cli.main(["check"]) == Exit.OK
+
+
+def test_1_for_what_did_not_happen(endpoint, monkeypatch):
+    monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.1)
+    assert cli.main(["reinitialize", "--listen", endpoint]) == Exit.FAILED
+
+
+def test_2_for_what_has_to_be_changed(tmp_path):
+    assert cli.main(["check", str(tmp_path / "none.toml")]) == Exit.USER
+
+
+def test_130_for_ctrl_c(monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(check, "describe", interrupted)
+    assert cli.main(["check"]) == Exit.INTERRUPTED
+
+
+@pytest.mark.parametrize("buffered", [True, False])
+def test_141_for_a_reader_that_is_gone(buffered):
+    reader, writer = os.pipe()
+    os.close(reader)
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    environment = kept | {"PYTHONPATH": os.pathsep.join(sys.path)} | ({} if buffered else {"PYTHONUNBUFFERED": "1"})
+    command = [sys.executable, "-m", "abs_service", "check"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, env=environment, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (Exit.PIPE_CLOSED, b"")
+
+
+def test_143_for_a_second_sigterm():
+    program = (
+        "import os, signal\nfrom abs_service.commands.parts import rig_process\nrig_process.stop_on_signals()\n"
+        "for _ in range(2):\n    os.kill(os.getpid(), signal.SIGTERM)"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, check=False)
+    assert done.returncode == 128 + signal.SIGTERM

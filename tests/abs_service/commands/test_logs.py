@@ -1,0 +1,88 @@
+"""The log of a command, as a process of its own writes it."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from abs_service.supervision.exit_codes import Exit
+
+#: A command that logs, and then does what its argument says.
+PROGRAM = """
+import logging, sys, types
+from abs_service import cli
+from drivers.contract.device import DeviceError
+
+def act(arguments):
+    logging.getLogger("abs_service.act").warning("%d left", 3, extra={"fields": {"left": 3}})
+    if arguments.end == "user":
+        raise DeviceError("no camera; plug one in")
+    return 1 // int(arguments.end)
+
+module = types.ModuleType("abs_service.commands.act", "Acts.")
+module.add_arguments = lambda parser: parser.add_argument("end")
+module.run = act
+sys.modules[module.__name__] = module
+cli.COMMANDS["act"] = "acts"
+sys.exit(cli.main(["act", *sys.argv[1:]]))
+"""
+
+
+def act(*arguments):
+    """Exit code and lines of standard error."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", PROGRAM, *map(str, arguments)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
+    return done.returncode, done.stderr.splitlines()
+
+
+def test_people_get_text():
+    code, (logged, error) = act("user")
+    assert code == Exit.USER
+    assert logged.endswith("WARNING abs_service.act: 3 left")
+    assert error == "abs-service: error: no camera; plug one in"
+
+
+def test_programs_get_nothing_but_json():
+    code, lines = act("user", "--log-format", "json", "--log-level", "info")
+    started, logged, error = map(json.loads, lines)
+    assert code == Exit.USER
+    assert started["fields"]["arguments"] == ["user", "--log-format", "json", "--log-level", "info"]
+    assert (logged["level"], logged["process"], logged["fields"]["left"]) == ("warning", "act", 3)
+    assert (error["message"], error["fields"]["exit_code"]) == ("no camera; plug one in", Exit.USER)
+
+
+def test_our_own_mistakes_are_logged_with_their_traceback():
+    code, lines = act("0", "--log-format", "json")
+    error = json.loads(lines[-1])
+    assert code == Exit.FAILED
+    assert error["message"].startswith("ZeroDivisionError: ")
+    assert "in act" in error["fields"]["exception"]
+
+
+@pytest.mark.parametrize("form", ["text", "json"])
+def test_a_file_gets_everything_and_standard_error_what_ended_the_command(tmp_path, form):
+    file = tmp_path / "log"
+    for end in ("user", "0", "1"):
+        code, lines = act(end, "--log-file", file, "--log-format", form)
+        assert code == {"user": Exit.USER, "0": Exit.FAILED, "1": 1}[end]
+        assert not any("left" in line for line in lines)
+        assert (lines or [""])[-1] == {
+            "user": "abs-service: error: no camera; plug one in",
+            "0": "ZeroDivisionError: integer division or modulo by zero",
+            "1": "",
+        }[end]
+    text = file.read_text()
+    assert text.count("3 left") == 3
+    assert text.count("no camera") == 1
+    assert "in act" in text
+    if form == "json":
+        assert all(json.loads(line)["process"] == "act" for line in text.splitlines())
+
+
+def test_a_file_that_cannot_be_written_is_refused(tmp_path):
+    code, lines = act("1", "--log-file", tmp_path / "no" / "log")
+    assert code == Exit.USER
+    assert lines == [f"abs-service: error: --log-file {tmp_path}/no/log: cannot be written: No such file or directory"]
