@@ -124,10 +124,10 @@ def live(tmp_path: Path) -> Iterator[list[str]]:
 
 @pytest.mark.slow
 def test_running_devices_are_verified_by_views_that_differ(live: list[str], tmp_path: Path, capsys) -> None:
-    code = cli.main([*live, "--shots", "4"])
+    code = cli.main([*live, "--shots", "6"])
     said = capsys.readouterr()
     assert code == Exit.USER, said.out
-    assert "4 of 4 views" in said.err
+    assert "6 of 6 views" in said.err
     report = json.loads((tmp_path / "lab.calibration-verify.json").read_text(encoding="utf-8"))
     (pair,) = report["values"]["pairs"]
     np.testing.assert_allclose(pair["move_m"], (-0.015, 0, 0), atol=4e-3)
