@@ -68,6 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
             if health.due():
                 clock.measure()
                 recorder.report()
+                bus.report(health)
                 health.tick()
         recorder.stop(DRAIN_S)
         recorder.report()

@@ -35,6 +35,7 @@ from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.wire.checked_bus import CheckedBus
 
 
 class ChildError(Exception):
@@ -57,8 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
     rig = effective(rig_process.load_config(arguments), arguments)
     stop = rig_process.stop_on_signals()
     gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
+    where = (rig.bus.endpoint, Role.ROUTER)
     with (
-        ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
+        CheckedBus(ZenohBus.open(rig.name, *where, rig.bus.shared_memory), time.monotonic_ns) as bus,
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
         _logging_to(display),
