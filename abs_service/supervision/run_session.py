@@ -110,6 +110,7 @@ class RunSession:
             elapsed_s=self.elapsed_s,
             now_ns=self._clock.monotonic(),
             host_clock=self._headers.host_clock,
+            refused=self._bus.trouble,
         )
 
     def _listen(self, seconds: float) -> None:

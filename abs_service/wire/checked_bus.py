@@ -14,12 +14,16 @@ class CheckedBus:
     Args:
         bus: the bus; closed with this one.
         clock: CLOCK_MONOTONIC [ns].
+
+    Attributes:
+        trouble: what was refused between the last two calls of `report`; "" if nothing was.
     """
 
     def __init__(self, bus: Bus, clock: Callable[[], int]) -> None:
         self._bus = bus
         self._edge = Edge(clock)
         self._reported = 0
+        self.trouble = ""
 
     def report(self, health: Health) -> None:
         """Puts what was refused into the health of the process; call it before `Health.tick`."""
@@ -27,8 +31,8 @@ class CheckedBus:
         health.count_up_to(refused, "refused.")
         total = sum(refused.values())
         new, self._reported = total - self._reported, total
-        level = Level.WARNING if new else Level.OK
-        health.report("refused", level, f"refused {new} messages, the last: {self._edge.last_error}" if new else "")
+        self.trouble = f"refused {new} messages, the last: {self._edge.last_error}" if new else ""
+        health.report("refused", Level.WARNING if new else Level.OK, self.trouble)
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
         """See `contract.Bus.publisher`."""
