@@ -141,7 +141,7 @@ def _check_values(field: FieldDescriptor, values: Iterable[Any]) -> None:
         odd = next((value for value in values if not is_printable(value, longest)), None)
         if odd is not None:
             raise MessageError("text", f"{name} = {odd[:40]!r} is too long or cannot be printed")
-    elif kind == FieldDescriptor.CPPTYPE_ENUM:
+    elif field.enum_type is not None:
         known = field.enum_type.values_by_number
         _require_all(name, values, known.__contains__, "range", f"must be one of {sorted(known)}")
     elif name in _FINITE:

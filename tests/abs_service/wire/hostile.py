@@ -49,12 +49,13 @@ TOPICS = (
     "-/\x1b[2J/image",
 )
 INFO = FrameInfo(sensor="tof", stream="depth", kind="depth", scale=0.001, geometry=FrameInfo.GEOMETRY_RADIAL)
+MODEL = SensorModel(
+    sensor="tof", width=32, height=24, fx=30, fy=30, cx=16, cy=12, T_rs=[float(i % 5 == 0) for i in range(16)]
+)
 #: A valid message on each topic that has some.
 VALID: Mapping[str, Message] = {
     "tof/depth/image": RawImage(frame_id="tof", width=2, height=1, encoding="mono8", step=2, data=b"12"),
-    "tof/model": SensorModel(
-        sensor="tof", width=32, height=24, fx=30, fy=30, cx=16, cy=12, T_rs=[float(i % 5 == 0) for i in range(16)]
-    ),
+    "tof/model": MODEL,
     "tof/calibration": CameraCalibration(frame_id="tof", width=32, height=24),
     "tf": FrameTransforms(),
     "config": Config(toml="version = 1\n"),
@@ -85,7 +86,8 @@ def value(field: FieldDescriptor) -> st.SearchStrategy[Any]:
     if kind == FieldDescriptor.CPPTYPE_BOOL:
         return st.booleans()
     if kind == FieldDescriptor.CPPTYPE_ENUM:
-        return st.sampled_from([*field.enum_type.values_by_number, 9, -1])
+        known = field.enum_type.values_by_number if field.enum_type else ()
+        return st.sampled_from([*known, 9, -1])
     low, high = _LIMITS[kind]
     return st.sampled_from([number for number in INTEGERS if low <= number <= high])
 

@@ -27,6 +27,7 @@ from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import draw
 from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
 from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Supervisor
 from abs_service.tracking.live_tracker import FrameSetQueue
@@ -40,21 +41,27 @@ from drivers.remote.link import Link
 from drivers.remote.probe import RemoteRig
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.recording.recorder_rig import depth, read, recordings
-from tests.abs_service.wire.hostile import TOPICS, samples
-from tests.abs_service.wire.test_edge import MODEL, sample
+from tests.abs_service.wire.hostile import MODEL, TOPICS, samples
+from tests.abs_service.wire.test_edge import sample
 from tests.drivers.recording_sink import RecordingSink
 
 HOSTILE = st.lists(samples(), min_size=1, max_size=5)
 S = 1_000_000_000
 
 
-class Everything:
+class Everything(Display):
     """All displays at once, drawn to the last character."""
 
     def __init__(self):
         self.out, self.lines = io.StringIO(), io.StringIO()
         self._console = Console(file=self.out, width=120, color_system=None)
         self._others = PlainDisplay(self.lines, self.lines), JsonDisplay(self.lines, self.lines)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        """Nothing to restore."""
 
     def update(self, view):
         self._console.print(draw(view, Text("")))
@@ -118,7 +125,9 @@ class TestRun:
 
     def test_escape_sequences_do_not_reach_the_terminal(self):
         run = Run()
-        run.take(sample("health/capture", Message(component="capture", level=3, message="\x1b[2Jgone")))
+        run.take(
+            sample("health/capture", Message(component="capture", level=Message.LEVEL_ERROR, message="\x1b[2Jgone"))
+        )
         run.take(sample("sheet/state", DeformationState(tracker="sheet", reasons=["\x1b[2Jgone"])))
         assert "\x1b" not in run.shown.out.getvalue() + run.shown.lines.getvalue()
         assert run.said.counters["refused.text"] >= 1
