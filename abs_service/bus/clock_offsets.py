@@ -16,6 +16,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Subscription
 from abs_service.bus.stamps import HeaderFactory
 from drivers.contract.clock import MAX_DRIFT
+from drivers.contract.text import is_name
 
 READING = Header.DESCRIPTOR.full_name
 #: Period of the queries, and their timeout [s].
@@ -71,7 +72,7 @@ class ClockOffsets:
     def measure(self) -> None:
         """Reads the other clock; takes as long as the answer, `TIMEOUT_S` at most."""
         asked_for = self._asked_for
-        if not keys.is_name(asked_for):
+        if not is_name(asked_for):
             return
         before_ns = self._clock()
         samples = self._bus.query(keys.clock(asked_for), TIMEOUT_S)

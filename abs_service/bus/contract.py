@@ -89,6 +89,20 @@ class Bus(Protocol):
         """Answers queries for `topic`; `payload` is called for each, from a thread of the transport."""
         ...
 
+    def answer_commands(self, topic: str, message: str, answer: Callable[[Sample], bytes]) -> Subscription:
+        """Answers commands, which are queries with a payload; `answer` is called for each, from the transport's thread.
+
+        Args:
+            topic: of the commands.
+            message: full name of the answers' type.
+            answer: from a command to its answer.
+        """
+        ...
+
+    def command(self, topic: str, message: str, payload: bytes, timeout_s: float) -> list[Sample]:
+        """All answers to a command of type `message`; empty at once if nobody takes commands on `topic`."""
+        ...
+
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         """All answers to a query for the topics that match; empty at once if there is no queryable."""
         ...

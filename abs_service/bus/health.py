@@ -1,5 +1,6 @@
 """Health of a component: counters, gauges, labels and level; published once a second and at every change of level."""
 
+import math
 import threading
 from collections import Counter
 from collections.abc import Mapping
@@ -10,6 +11,7 @@ from absmsg.v1 import health_pb2
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Bus
 from abs_service.bus.stamps import HeaderFactory
+from drivers.contract.text import printable
 
 PERIOD_NS = 1_000_000_000
 
@@ -60,6 +62,12 @@ class Health:
         with self._lock:
             self._counters[name] += number
 
+    def counted(self, name: str) -> int:
+        """Adds one to a counter and returns it."""
+        with self._lock:
+            self._counters[name] += 1
+            return self._counters[name]
+
     def count_up_to(self, totals: Mapping[str, int], prefix: str = "") -> None:
         """Sets counters to totals counted elsewhere; a smaller total, as after a new epoch, is ignored."""
         with self._lock:
@@ -67,9 +75,12 @@ class Health:
                 self._counters[prefix + name] = max(self._counters[prefix + name], total)
 
     def gauge(self, name: str, value: float) -> None:
-        """Sets a current value; the name ends in its unit."""
+        """Sets a current value, none if it is not finite; the name ends in its unit."""
         with self._lock:
-            self._gauges[name] = value
+            if math.isfinite(value):
+                self._gauges[name] = value
+            else:
+                self._gauges.pop(name, None)
 
     def rate(self, name: str, total: int) -> None:
         """Sets the gauge `name` to the rate [Hz] at which `total` grew since the last call."""
@@ -82,7 +93,7 @@ class Health:
     def label(self, name: str, value: str) -> None:
         """Sets a text value, such as the file being written or a device's state."""
         with self._lock:
-            self._labels[name] = value
+            self._labels[name] = printable(value)
 
     def report(self, condition: str, level: Level, message: str = "") -> None:
         """Sets one condition; a change of its level is published at once, all else with `tick`."""
@@ -117,7 +128,9 @@ class Health:
                 header=self._headers.now(self._seq),
                 component=self._component,
                 level=_WIRE[level],
-                message="; ".join(text for rank, text in self._conditions.values() if rank == level and text),
+                message=printable(
+                    "; ".join(text for rank, text in self._conditions.values() if rank == level and text)
+                ),
                 counters=self._counters,
                 gauges=self._gauges,
                 labels=self._labels,

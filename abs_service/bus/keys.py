@@ -1,6 +1,6 @@
 """Keys and topics: a zenoh key is `abs/<rig>/<topic>`, the topic of a recording is `/<topic>`."""
 
-import re
+from drivers.contract.text import is_name
 
 ROOT = "abs"
 CONFIG = "config"
@@ -13,16 +13,9 @@ RIG_FRAME = "rig"
 #: First parts of topics, not allowed as names of sensors, devices and trackers.
 RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live"})
 
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-
 
 class KeyNameError(ValueError):
     """A name that cannot be part of a key."""
-
-
-def is_name(text: str) -> bool:
-    """True if a text can be a part of a key."""
-    return _NAME.fullmatch(text) is not None
 
 
 def check_name(name: str) -> str:
@@ -32,7 +25,7 @@ def check_name(name: str) -> str:
         KeyNameError: it is empty, reserved, or holds a character with a meaning in keys.
     """
     if not is_name(name):
-        raise KeyNameError(f"{name!r} is no name: letters, digits, - and _, beginning with a letter or digit")
+        raise KeyNameError(f"{name!r} is no name: 1 to 64 letters, digits, - and _, beginning with a letter or digit")
     if name in RESERVED:
         raise KeyNameError(f"{name!r} is reserved, like {sorted(RESERVED - {name})}; choose another name")
     return name
@@ -79,7 +72,7 @@ def topology(tracker: str) -> str:
 
 
 def reinitialize(tracker: str) -> str:
-    """Topic of requests to detect a tracker's object again: an absmsg.v1.Header of the sender."""
+    """Topic of commands to detect a tracker's object anew: queries with an absmsg.v1.Reinitialize."""
     return f"{tracker}/reinitialize"
 
 

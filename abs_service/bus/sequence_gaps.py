@@ -5,8 +5,7 @@ from collections.abc import Mapping
 
 from absmsg.v1.common_pb2 import Header
 
-#: A larger gap is no loss: the numbers are not those of one publisher.
-LARGEST_GAP = 1_000_000
+from drivers.encoding.message_check import LARGEST_GAP
 
 
 class SequenceGaps:

@@ -6,12 +6,17 @@ from enum import StrEnum
 
 import zenoh
 
+from drivers.encoding.message_check import LARGEST_IMAGE
+
 #: Lease: a peer without a keep-alive for this long is disconnected [ms].
 LEASE_MS = 2000
 #: Timeout of a client's connection to its router [ms].
 CONNECT_TIMEOUT_MS = 3000
 #: Two publishing processes fit into the 64 MB that a container has by default; without room, TCP takes over.
 SHARED_MEMORY_POOL_BYTES = 30 << 20
+
+#: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
+LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
 
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
 
@@ -83,7 +88,7 @@ def _settings(endpoint: str, role: Role, shared_memory: bool) -> dict[str, objec
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
         "transport": {
-            "link": {"tx": {"lease": LEASE_MS}},
+            "link": {"tx": {"lease": LEASE_MS}, "rx": {"max_message_size": LARGEST_MESSAGE_BYTES}},
             "shared_memory": {
                 "enabled": shared_memory,
                 "transport_optimization": {

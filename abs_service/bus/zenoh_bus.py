@@ -83,6 +83,26 @@ class ZenohBus:
 
         return self._keep(from_non_daemon_thread(lambda: self._session.declare_queryable(key, on_query)))
 
+    def answer_commands(self, topic: str, message: str, answer: Callable[[Sample], bytes]) -> Subscription:
+        """See `contract.Bus.answer_commands`."""
+        key = self._key(topic)
+
+        def on_query(query: zenoh.Query) -> None:
+            if query.payload is None:
+                return  # somebody asks what there is
+            command = Sample(topic, _message(query.encoding), query.payload.to_bytes())
+            query.reply(key, answer(command), encoding=f"{ENCODING};{message}")
+
+        return self._keep(from_non_daemon_thread(lambda: self._session.declare_queryable(key, on_query)))
+
+    def command(self, topic: str, message: str, payload: bytes, timeout_s: float) -> list[Sample]:
+        """See `contract.Bus.command`."""
+        encoding = f"{ENCODING};{message}"
+        replies = self._session.get(
+            self._key(topic), target=zenoh.QueryTarget.ALL, timeout=timeout_s, payload=payload, encoding=encoding
+        )
+        return [self._sample(reply.ok) for reply in replies if reply.ok is not None]
+
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         """See `contract.Bus.query`."""
         replies = self._session.get(self._key(pattern), target=zenoh.QueryTarget.ALL, timeout=timeout_s)
@@ -150,14 +170,18 @@ class ZenohBus:
         return keys.key(self._rig, topic)
 
     def _sample(self, sample: zenoh.Sample) -> Sample:
-        _, _, message = str(sample.encoding).partition(f"{ENCODING};")
         attachment = sample.attachment
         return Sample(
             keys.topic(self._rig, str(sample.key_expr)),
-            message,
+            _message(sample.encoding),
             sample.payload.to_bytes(),
             b"" if attachment is None else attachment.to_bytes(),
         )
+
+
+def _message(encoding: zenoh.Encoding | None) -> str:
+    """Full name of the type of a message; "" if it was not given."""
+    return str(encoding).partition(f"{ENCODING};")[2]
 
 
 class _Publisher:

@@ -67,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
                 clock.measure()
                 recorder.report()
                 watch.look(recorder.written_bytes)
+                bus.report(health)
                 health.tick()
         recorder.stop(DRAIN_S)
         recorder.report()

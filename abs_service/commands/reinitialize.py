@@ -9,14 +9,15 @@ A tracker that has lost its object does so by itself; this is for another object
 import argparse
 import threading
 
-from absmsg.v1 import common_pb2, deformation_state_pb2
+from absmsg.v1 import deformation_state_pb2
 
 from abs_service import wiring
 from abs_service.bus import keys
-from abs_service.bus.contract import EVENTS, Bus, Sample
+from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.supervision.exit_codes import Exit
+from abs_service.wire import commands
 
 #: Timeout of the detection [s].
 TIMEOUT_S = 10.0
@@ -50,11 +51,13 @@ def request(bus: Bus, tracker: str, headers: HeaderFactory) -> int:
             renewed.set()
 
     bus.subscribe(keys.state(tracker), on_state)
-    command = bus.publisher(keys.reinitialize(tracker), common_pb2.Header.DESCRIPTOR.full_name, EVENTS)
     if not received.wait(TIMEOUT_S):
         print(f'tracker "{tracker}" publishes nothing: does it run, and do its sensors deliver?')
         return Exit.FAILED
-    command.put(headers.now(0).SerializeToString())
+    answer = commands.reinitialize(bus, tracker, headers, TIMEOUT_S)
+    if answer is None or not answer.accepted:
+        print(f'tracker "{tracker}" refuses: {answer.reason if answer else "it gives no answer"}')
+        return Exit.FAILED
     if not renewed.wait(TIMEOUT_S):
         print(f'tracker "{tracker}" found no object within {TIMEOUT_S:.0f} s; it goes on as it was')
         return Exit.FAILED

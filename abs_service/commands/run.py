@@ -37,6 +37,7 @@ from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
+from abs_service.wire.checked_bus import CheckedBus
 
 #: Receives the lines of a child's output, with its name.
 PassOn = Callable[[str, str], None]
@@ -64,8 +65,9 @@ def run(arguments: argparse.Namespace) -> int:
         folder.check(rig.record.directory)
     stop = rig_process.stop_on_signals()
     gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
+    where = (rig.bus.endpoint, Role.ROUTER)
     with (
-        ZenohBus.open(rig.name, rig.bus.endpoint, Role.ROUTER, rig.bus.shared_memory) as bus,
+        CheckedBus(ZenohBus.open(rig.name, *where, rig.bus.shared_memory), time.monotonic_ns) as bus,
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),

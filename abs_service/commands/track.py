@@ -9,6 +9,7 @@ Without CONFIG TRACKER it is the only tracker of the simulated demo rig.
 import argparse
 import threading
 import time
+from contextlib import suppress
 from queue import SimpleQueue
 
 from absmsg.v1.sensor_model_pb2 import SensorModel
@@ -28,9 +29,11 @@ from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
 from abs_service.tracking.warmup.board import warm_up
+from abs_service.wire import commands
 from calib.camera import Camera
 from calib.jit import load_compiler
 from calib.rig import Rig
+from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 
 #: Timeout of a query for calibrations [s].
@@ -69,21 +72,28 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
         tracking = TrackingSession(rig, plan)
-        bus.subscribe(keys.reinitialize(name), lambda _: tracking.reinitialize())
-        clocks = ClockOffsets(bus, time.monotonic_ns, headers.host_clock)
-        measuring = threading.Thread(target=clocks.measure_until, args=(stop,), name="clocks", daemon=True)
-        measuring.start()
+        commands.answer_reinitialize(bus, name, headers, health, tracking.reinitialize)
+        clocks, measuring = _clocks(bus, headers, stop)
         live = _live(bus, settings, name, rig, tracking, headers, health, clocks)
         while not stop.is_set():
             live.process_next()
             if health.due():
                 clock.measure()
                 live.report()
+                bus.report(health)
                 health.tick()
         live.report()
         health.publish()
         measuring.join()  # it uses the bus
     return Exit.OK
+
+
+def _clocks(bus: Bus, headers: HeaderFactory, stop: threading.Event) -> tuple[ClockOffsets, threading.Thread]:
+    """Offsets of other hosts' clocks, which a thread measures until `stop`."""
+    clocks = ClockOffsets(bus, time.monotonic_ns, headers.host_clock)
+    measuring = threading.Thread(target=clocks.measure_until, args=(stop,), name="clocks", daemon=True)
+    measuring.start()
+    return clocks, measuring
 
 
 def _live(
@@ -116,7 +126,10 @@ def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading
     while not stop.is_set():
         for sensor in set(sensors) - set(cameras):
             for sample in bus.query(keys.model(sensor), QUERY_S):
-                cameras[sensor] = decode_camera(SensorModel.FromString(sample.payload))
+                with suppress(
+                    CodecError
+                ):  # another answer may be right; until there is one, health says what is awaited
+                    cameras[sensor] = decode_camera(SensorModel.FromString(sample.payload))
         missing = [sensor for sensor in sensors if sensor not in cameras]
         if not missing:
             break

@@ -16,6 +16,9 @@ from abs_service.config.merging import merge, without_calibrated
 from abs_service.config.problems import ProblemsError, from_pydantic
 from abs_service.config.tables import ServiceConfig
 
+#: Largest file of a configuration [bytes].
+LARGEST = 1 << 20
+
 
 def load(path: Path) -> ServiceConfig:
     """The configuration in a file; relative paths in it start from the file's folder.
@@ -24,7 +27,11 @@ def load(path: Path) -> ServiceConfig:
         ConfigError: the file cannot be read or used; names all that is wrong with it.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        with path.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise ConfigError(f"{path}: larger than {LARGEST} bytes, which no rig file is")
+        text = content.decode("utf-8")
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -53,6 +60,8 @@ def loads(text: str, source: str, base: Path) -> ServiceConfig:
         file = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{source}: its tables are nested too deeply") from None
     return from_tables(file, source, base, text)
 
 

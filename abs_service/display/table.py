@@ -94,7 +94,7 @@ def _streams(view: RigView) -> RenderableType:
     table = _table("stream", "rate", "age", "images", "dropped")
     for stream in view.streams:
         table.add_row(
-            f" {stream.name}",
+            Text(f" {stream.name}"),
             f"{stream.rate_hz:.1f} Hz",
             "–" if stream.age_ms is None else f"{stream.age_ms:.0f} ms",
             str(stream.published),
@@ -125,7 +125,7 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
         "–" if last.error_mm is None else f"{last.error_mm:.2f} mm",
         "–" if last.surface_mm is None else f"{last.surface_mm:.2f} mm",
         f"{last.solve_ms:.1f} ms",
-        f"{last.age_ms:.0f} ms",
+        "–" if last.age_ms is None else f"{last.age_ms:.0f} ms",
         f"{last.generations}/{last.evaluations}",
         str(tracker.skipped),
     ]

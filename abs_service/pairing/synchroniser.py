@@ -15,6 +15,9 @@ DEPTH = 32
 #: Sequence numbers remembered per stream, to detect duplicates.
 MEMORY = 256
 
+#: So many frames in a row that the latest one would exclude, by its epoch or by more than this time [ns], are right.
+FOREIGN, FOREIGN_NS = 30, 10_000_000_000
+
 _NEVER_NS = -(1 << 63)
 
 
@@ -184,11 +187,24 @@ class _Stream:
         self.latest_ns = _NEVER_NS  # of the frame that arrived last: the stream has come so far
         self.stalled = False  # made the last set wait in vain
         self._epoch = -1
+        self._foreign = 0
         self._form: tuple[object, ...] = ()
         self._seen: deque[int] = deque(maxlen=MEMORY)
 
     def rejection_cause(self, frame: Frame) -> str:
-        """Cause for which a frame is rejected; "" if it is accepted."""
+        """Cause for which a frame is rejected; "" if it is accepted.
+
+        One frame of a wrong epoch or time must not stop its stream: after `FOREIGN` ones that are older, it begins anew.
+        """
+        cause = self._cause(frame)
+        is_foreign = cause == "old_epoch" or (cause == "stale" and self.passed_ns - frame.t_host_ns > FOREIGN_NS)
+        self._foreign = self._foreign + 1 if is_foreign else 0
+        if self._foreign <= FOREIGN:
+            return cause
+        self.passed_ns, self._epoch, self._foreign = _NEVER_NS, -1, 0
+        return ""
+
+    def _cause(self, frame: Frame) -> str:
         if frame.epoch < self._epoch:
             return "old_epoch"
         if frame.epoch == self._epoch:

@@ -15,6 +15,7 @@ from abs_service.recording.recording_file import RecordingFile
 from abs_service.wire import message_header as header
 from drivers.encoding.encoded_image import ImageEncoder
 from drivers.encoding.mcap_file import McapFileError
+from drivers.encoding.message_check import LARGEST_GAP
 from drivers.encoding.parsing import CodecError
 
 #: Messages repeated at the start of each file, so that every file is self-contained.
@@ -110,7 +111,7 @@ class SampleWriter:
         self._counts[f"messages.{topic}"] += 1
         self._health.count("recorded")
         gap = seq - self._last_seq.get(topic, seq) - 1
-        if gap > 0:  # lost before they came here
+        if 0 < gap <= LARGEST_GAP:  # lost before they came here
             self._counts[f"missing.{topic}"] += gap
             self._health.count(f"missing.{topic}", gap)
         self._last_seq[topic] = seq

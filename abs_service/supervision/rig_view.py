@@ -52,6 +52,7 @@ class RigView:
         elapsed_s: time since the start.
         now_ns: CLOCK_MONOTONIC [ns].
         host_clock: which host's clock that is, see `drivers.contract.host_clock`; ages on others are not shown.
+        refused: messages that this process did not take, in words.
     """
 
     rig: str
@@ -62,6 +63,7 @@ class RigView:
     elapsed_s: float
     now_ns: int
     host_clock: str
+    refused: str = ""
 
     @property
     def streams(self) -> list[Stream]:
@@ -108,6 +110,7 @@ class RigView:
             for name, received in sorted(self.live.received.items())
             if received.health.level >= Health.LEVEL_WARNING and received.health.message and name != "run"
         ]
+        found += [("run", Health.LEVEL_WARNING, self.refused)] if self.refused else []
         failed = [child for child in self.children if child.state is State.FAILED]
         return found + [(child.component, Health.LEVEL_ERROR, f"given up: {child.reason}") for child in failed]
 

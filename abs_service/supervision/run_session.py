@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from abs_service.bus import keys
-from abs_service.bus.contract import Bus, Sample
+from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import LatestQueue
 from abs_service.bus.stamps import HeaderFactory, WallClock
@@ -15,6 +15,7 @@ from abs_service.supervision import rig_state
 from abs_service.supervision.rig_view import Display, RigView
 from abs_service.supervision.supervisor import Child, State, Supervisor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
+from abs_service.wire.checked_bus import CheckedBus
 
 #: Messages per topic that may wait to be shown.
 DEPTH = 64
@@ -46,7 +47,7 @@ class RunSession:
 
     def __init__(
         self,
-        bus: Bus,
+        bus: CheckedBus,
         rig: str,
         endpoint: str,
         directory: Path,
@@ -109,6 +110,7 @@ class RunSession:
             elapsed_s=self.elapsed_s,
             now_ns=self._clock.monotonic(),
             host_clock=self._headers.host_clock,
+            refused=self._bus.trouble,
         )
 
     def _listen(self, seconds: float) -> None:
@@ -152,6 +154,8 @@ class RunSession:
             level = Level.WARNING if starved else _LEVELS.get(child.state, Level.OK)
             self._health.report(child.component, level, _condition(child))
         self._health.count_up_to({"malformed": self._live.malformed, "not_shown": sum(self._inbox.dropped.values())})
+        if self._health.due():
+            self._bus.report(self._health)
         self._health.tick()
 
 

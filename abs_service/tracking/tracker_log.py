@@ -158,11 +158,11 @@ class TrackerLog:
             reasons=tuple(state.reasons),
             warnings=tuple(state.warnings),
             theta=tuple(state.theta),
-            error_mm=errors.vertex_mm if errors else None,
-            surface_mm=errors.surface_mm if errors else None,
-            vertex_sigma_mm=rms_sigma_mm(mesh.covariance_f32),
+            error_mm=_known(errors.vertex_mm) if errors else None,
+            surface_mm=_known(errors.surface_mm) if errors else None,
+            vertex_sigma_mm=_known(rms_sigma_mm(mesh.covariance_f32)),
             solve_ms=state.solve_ms,
-            age_ms=None if math.isnan(state.age_ms) else state.age_ms,
+            age_ms=_known(state.age_ms),
             generations=state.generations,
             evaluations=state.evaluations,
             skipped=state.skipped,
@@ -173,6 +173,10 @@ class TrackerLog:
         self.surface_mm.add(report.surface_mm)
         self.solve_ms.add(report.solve_ms)
         return report
+
+
+def _known(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def points(xyz_f32: bytes) -> NDArray[np.float32]:

@@ -4,7 +4,6 @@ An image is two messages: RawImage, which every viewer displays, and FrameInfo, 
 untrusted: decoding yields a valid frame or a `CodecError` that names the problem.
 """
 
-import math
 from collections.abc import Mapping
 from typing import TypeVar
 
@@ -18,7 +17,8 @@ from google.protobuf.message import DecodeError
 from drivers.contract.device import Truth
 from drivers.contract.frame import Frame, FrameError, Geometry, Kind, Reference
 from drivers.encoding import raw_image
-from drivers.encoding.parsing import CodecError, bytes_per_pixel, parse_message, pixels_of
+from drivers.encoding.message_check import MessageError, check, parse_valid
+from drivers.encoding.parsing import CodecError, bytes_per_pixel, pixels_of
 
 IMAGE_SCHEMA = RawImage.DESCRIPTOR.full_name
 INFO_SCHEMA = FrameInfo.DESCRIPTOR.full_name
@@ -97,17 +97,30 @@ def encode_info(frame: Frame, header: Header) -> bytes:
     return info.SerializeToString()
 
 
+def parse_image(payload: bytes) -> tuple[RawImage, memoryview]:
+    """A serialized foxglove.RawImage without its pixels, and a view of these.
+
+    Raises:
+        CodecError: malformed message, or one that is not allowed.
+    """
+    try:
+        image, pixels = raw_image.parse(payload)
+    except DecodeError as error:
+        raise MessageError("malformed", f"{len(payload)} bytes are no {IMAGE_SCHEMA}: {error}") from error
+    check(image)
+    return image, pixels
+
+
 def decode(image: bytes, info: bytes) -> Frame:
     """The frame of a serialized foxglove.RawImage and its absmsg.v1.FrameInfo; its pixels are a view of those bytes.
 
     Raises:
         CodecError: malformed or inconsistent messages.
     """
-    (picture, pixels), about = _parse_image(image), parse_message(FrameInfo, info)
+    (picture, pixels), about = parse_image(image), parse_valid(FrameInfo, info)
     name = f"{about.sensor}/{about.stream}"
-    if not about.sensor or not about.stream:
-        raise CodecError(f"FrameInfo names no sensor or no stream: {name!r}")
-    _check(name, picture, about)
+    if picture.frame_id != about.sensor:
+        raise CodecError(f"{name}: the image is of sensor {picture.frame_id!r}, its info of {about.sensor!r}")
     try:
         return Frame(
             sensor=about.sensor,
@@ -165,22 +178,9 @@ def decode_truth(payload: bytes) -> Truth:
     Raises:
         CodecError: malformed message, or a number of points that differs from the declared one.
     """
-    message = parse_message(SurfaceTruth, payload)
-    expected = message.rows * message.columns * 3 * 4
-    if expected == 0 or len(message.points_f32) != expected:
-        raise CodecError(
-            f"SurfaceTruth of {message.rows} × {message.columns} points needs {expected} bytes (more than 0), "
-            f"has {len(message.points_f32)}"
-        )
+    message = parse_valid(SurfaceTruth, payload)
     points_r = np.frombuffer(message.points_f32, "<f4").reshape(message.rows, message.columns, 3)
     return Truth(message.seq, message.header.t_host_ns, points_r, message.surface)
-
-
-def _parse_image(payload: bytes) -> tuple[RawImage, memoryview]:
-    try:
-        return raw_image.parse(payload)
-    except DecodeError as error:
-        raise CodecError(f"{len(payload)} bytes are no {IMAGE_SCHEMA}: {error}") from error
 
 
 def _kind(name: str, value: str) -> Kind:
@@ -197,14 +197,3 @@ def _member(name: str, field: str, members: Mapping[int, _Member], number: int) 
     if number not in members:
         raise CodecError(f"{name}: {field} {number} is none of {sorted(members)}")
     return members[number]
-
-
-def _check(name: str, image: RawImage, info: FrameInfo) -> None:
-    if image.frame_id != info.sensor:
-        raise CodecError(f"{name}: the image is of sensor {image.frame_id!r}, its info of {info.sensor!r}")
-    if not (info.scale > 0 and math.isfinite(info.scale)):
-        raise CodecError(f"{name}: scale must be positive and finite, not {info.scale}")
-    if not (info.tick_hz >= 0 and math.isfinite(info.tick_hz)):
-        raise CodecError(f"{name}: tick_hz must be finite and 0 or more, not {info.tick_hz}")
-    if info.t_sigma_ns < 0:
-        raise CodecError(f"{name}: t_sigma_ns must be 0 or more, not {info.t_sigma_ns}")

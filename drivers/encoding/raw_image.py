@@ -19,6 +19,9 @@ _PIXELS = RawImage.DESCRIPTOR.fields_by_name["data"].number
 _VARINT, _BYTES = 0, 2
 _FIXED = {1: 8, 5: 4}
 
+#: Most fields of a message; there are seven.
+_MOST_FIELDS = 100
+
 #: Largest number of bytes of a varint: 64 bits, seven in each.
 _LONGEST = 10
 
@@ -36,9 +39,11 @@ def parse(payload: bytes) -> tuple[RawImage, memoryview]:
     Raises:
         DecodeError: malformed bytes.
     """
-    whole, pixels, rest, position, kept = memoryview(payload), memoryview(b""), [], 0, 0
+    whole, pixels, rest, position, kept, fields = memoryview(payload), memoryview(b""), [], 0, 0, 0
     while position < len(whole):
-        begin = position
+        begin, fields = position, fields + 1
+        if fields > _MOST_FIELDS:
+            raise DecodeError(f"more than {_MOST_FIELDS} fields")
         key, position = _varint(whole, position)
         size, position = _size(whole, position, key & 7)
         if position + size > len(whole):

@@ -12,6 +12,7 @@ from drivers.contract.device import DeviceInfo, DeviceState, Sink
 from drivers.contract.frame import Frame
 from drivers.contract.frame_gate import FrameGate
 from drivers.encoding import codec
+from drivers.encoding.message_check import LARGEST_GAP
 from drivers.encoding.parsing import CodecError
 from drivers.remote.link import Link
 from drivers.remote.probe import IMAGES, RemoteRig
@@ -124,6 +125,9 @@ class RemoteDevice:
         except CodecError:
             self._gate.drop("malformed")
             return
+        if not self._gate.knows(frame):
+            self._gate.deliver(frame)  # which counts it
+            return
         stream = self._follow(frame)
         if self._same_clock:
             self._gate.deliver(replace(frame, epoch=stream.ours, host_clock=""))
@@ -160,7 +164,7 @@ class RemoteDevice:
                 self._gate.begin_epoch()
                 stream.ours = self._gate.epoch
             stream.theirs, stream.clock = frame.epoch, DeviceClock(CLOCK)
-        elif frame.seq > stream.seq:
+        elif 0 < frame.seq - stream.seq <= LARGEST_GAP:
             self._gate.drop("missing", frame.seq - stream.seq - 1)
         stream.seq = frame.seq
         return stream

@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from absmsg.v1.sensor_model_pb2 import Config, SensorModel
-from google.protobuf.message import DecodeError
 
 from calib.camera import Camera
 from drivers.contract.capabilities import ClockInfo, StreamInfo
@@ -15,6 +14,7 @@ from drivers.contract.discovery import Found, choose
 from drivers.contract.frame import Frame
 from drivers.contract.host_clock import host_clock
 from drivers.encoding import codec
+from drivers.encoding.message_check import parse_valid
 from drivers.encoding.parsing import CodecError
 from drivers.encoding.sensor_model import decode_camera
 from drivers.remote.address import Address
@@ -98,10 +98,11 @@ class _Seen:
 def _configured(link: Link, rig: str) -> tuple[str, ...]:
     """Sensors in the rig's configuration; their metadata may be published one after the other."""
     try:
-        configs = [tomllib.loads(Config.FromString(payload).toml) for payload in link.query(rig, "config")]
-    except (DecodeError, tomllib.TOMLDecodeError) as error:
+        configs = [tomllib.loads(parse_valid(Config, payload).toml) for payload in link.query(rig, "config")]
+    except (CodecError, RecursionError, tomllib.TOMLDecodeError) as error:
         raise DeviceError(f'rig "{rig}" announces a configuration that is not understood: {error}') from error
-    sensors = tuple(sorted({name for config in configs for name in config.get("sensors", {})}))
+    tables = [table for config in configs if isinstance(table := config.get("sensors"), dict)]
+    sensors = tuple(sorted({name for table in tables for name in table}))
     if not sensors:
         raise DeviceError(f'rig "{rig}" has announced no sensor yet')
     return sensors
@@ -110,8 +111,8 @@ def _configured(link: Link, rig: str) -> tuple[str, ...]:
 def _models(link: Link, rig: str, wanted: Collection[str]) -> dict[str, SensorModel]:
     """Sensor models of the requested sensors, by name."""
     try:
-        models = [SensorModel.FromString(payload) for payload in link.query(rig, "*/model")]
-    except DecodeError as error:
+        models = [parse_valid(SensorModel, payload) for payload in link.query(rig, "*/model")]
+    except CodecError as error:
         raise DeviceError(f'rig "{rig}" announces a sensor in a way that is not understood: {error}') from error
     announced = {model.sensor: model for model in models}
     missing = sorted(set(wanted) - set(announced))

@@ -4,6 +4,7 @@ import argparse
 import os
 import signal
 import threading
+import time
 from pathlib import Path
 from types import FrameType
 
@@ -11,6 +12,7 @@ from abs_service import config
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.supervision import gc_tuning
+from abs_service.wire.checked_bus import CheckedBus
 
 
 def add_config(parser: argparse.ArgumentParser) -> None:
@@ -37,7 +39,7 @@ def load_config(arguments: argparse.Namespace) -> config.ServiceConfig:
     return config.load(arguments.config) if arguments.config else config.load_default()
 
 
-def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> ZenohBus:
+def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> CheckedBus:
     """The bus that the configuration and the arguments describe; close it before the process ends.
 
     Raises:
@@ -46,7 +48,7 @@ def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> ZenohB
     gc_tuning.shorten_switch_interval()
     role = Role.ROUTER if arguments.listen else Role.CLIENT
     endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
-    return ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory)
+    return CheckedBus(ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory), time.monotonic_ns)
 
 
 def stop_on_signals() -> threading.Event:

@@ -16,6 +16,7 @@ class LoopbackBus:
         self.sent: list[Sample] = []
         self.alive: set[str] = set()
         self._subscribers: list[tuple[str, Callable[[Sample], None]]] = []
+        self._commands: dict[str, tuple[str, Callable[[Sample], bytes]]] = {}
         self._answers: dict[str, tuple[str, Callable[[], bytes | None]]] = {}
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
@@ -29,6 +30,16 @@ class LoopbackBus:
     def answer_queries(self, topic: str, message: str, payload: Callable[[], bytes]) -> Subscription:
         self._answers[topic] = (message, payload)
         return _Closer(lambda: self._answers.pop(topic, None))
+
+    def answer_commands(self, topic: str, message: str, answer: Callable[[Sample], bytes]) -> Subscription:
+        self._commands[topic] = (message, answer)
+        return _Closer(lambda: self._commands.pop(topic, None))
+
+    def command(self, topic: str, message: str, payload: bytes, timeout_s: float) -> list[Sample]:
+        if topic not in self._commands:
+            return []
+        of_answer, answer = self._commands[topic]
+        return [Sample(topic, of_answer, answer(Sample(topic, message, payload)))]
 
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:
         found = [

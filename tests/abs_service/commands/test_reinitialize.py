@@ -1,12 +1,14 @@
 """`abs-service reinitialize` tells a tracker, and says what came of it."""
 
 import pytest
-from absmsg.v1 import common_pb2, deformation_state_pb2
+from absmsg.v1 import deformation_state_pb2
 
 from abs_service.bus import keys
 from abs_service.bus.contract import STATE
+from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands import reinitialize
+from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
 
 STATES = deformation_state_pb2.DeformationState.DESCRIPTOR.full_name
@@ -16,17 +18,17 @@ class Tracker:
     """Publishes a state of a mesh; finds another one when it is told to, if there is one."""
 
     def __init__(self, bus: LoopbackBus, finds: bool):
-        self.told: list[common_pb2.Header] = []
+        self.headers = HeaderFactory("demo", WallClock())
         self._states = bus.publisher(keys.state("sheet"), STATES, STATE)
         self._finds = finds
         self._version = 1
-        bus.subscribe(keys.reinitialize("sheet"), self._on_command)
+        health = Health(bus, "track/sheet", self.headers)
+        commands.answer_reinitialize(bus, "sheet", self.headers, health, self._on_command)
 
     def publish(self) -> None:
         self._states.put(deformation_state_pb2.DeformationState(mesh_version=self._version).SerializeToString())
 
-    def _on_command(self, sample) -> None:
-        self.told.append(common_pb2.Header.FromString(sample.payload))
+    def _on_command(self) -> None:
         self._version += self._finds
         self.publish()
 
@@ -47,7 +49,6 @@ def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, find
 
     monkeypatch.setattr(bus, "subscribe", and_publish)
     assert reinitialize.request(bus, "sheet", HeaderFactory("demo", WallClock())) == code
-    assert [header.rig for header in tracker.told] == ["demo"]
     assert words in capsys.readouterr().out
 
 
@@ -55,3 +56,20 @@ def test_a_silent_tracker_is_named(monkeypatch, capsys):
     monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.05)
     assert reinitialize.request(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock())) == 1
     assert 'tracker "sheet" publishes nothing' in capsys.readouterr().out
+
+
+def test_a_tracker_that_takes_no_command_is_named(monkeypatch, capsys):
+    monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.2)
+    bus = LoopbackBus()
+    subscribe = bus.subscribe
+
+    def and_publish(pattern, on_sample):
+        subscription = subscribe(pattern, on_sample)
+        bus.publisher(keys.state("sheet"), STATES, STATE).put(
+            deformation_state_pb2.DeformationState().SerializeToString()
+        )
+        return subscription
+
+    monkeypatch.setattr(bus, "subscribe", and_publish)
+    assert reinitialize.request(bus, "sheet", HeaderFactory("demo", WallClock())) == 1
+    assert 'tracker "sheet" refuses: it gives no answer' in capsys.readouterr().out

@@ -252,3 +252,19 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe4"')
     with pytest.raises(config.ConfigError, match="byte 8"):
         config.load(tmp_path / "latin.toml")
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [(b"a" * (2 << 20), "larger than 1048576 bytes"), (b"a = " + b"[" * 100_000, "nested too deeply|not TOML")],
+)
+def test_a_file_that_is_no_rig_file_is_refused_without_being_read_to_its_end(tmp_path, content, complaint):
+    path = tmp_path / "rig.toml"
+    path.write_bytes(content)
+    with pytest.raises(config.ConfigError, match=complaint):
+        config.load(path)
+
+
+def test_a_device_without_end_is_no_rig_file():
+    with pytest.raises(config.ConfigError, match="/dev/zero: larger than"):
+        config.load(Path("/dev/zero"))

@@ -23,6 +23,7 @@ from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, State, Supervisor
 from abs_service.tracking.monitors import silence_monitor
 from abs_service.wire import estimate_messages
+from abs_service.wire.checked_bus import CheckedBus
 from tests.abs_service.bus.loopback import LoopbackBus
 from tests.abs_service.supervision.idle_process import Idle
 
@@ -123,7 +124,14 @@ class Bench:
             children, lambda component, _: Idle(component, self.killed), time.monotonic_ns, limits
         )
         self.session = RunSession(
-            self.bus, "bench", "tcp/127.0.0.1:1", Path(), trackers, self.supervisor, display, WallClock()
+            CheckedBus(self.bus, time.monotonic_ns),
+            "bench",
+            "tcp/127.0.0.1:1",
+            Path(),
+            trackers,
+            self.supervisor,
+            display,
+            WallClock(),
         )
 
 
@@ -153,7 +161,7 @@ def test_a_topology_that_the_network_lost_is_queried():
 
     def topology():
         asked.append(bench.session.elapsed_s)
-        return MeshTopology(mesh_version=3).SerializeToString()
+        return MeshTopology(tracker="sheet", mesh_version=3).SerializeToString()
 
     bench.bus.answer_queries(keys.topology("sheet"), estimate_messages.TOPOLOGY, topology)
     state = DeformationState(tracker="sheet", mesh_version=3).SerializeToString()

@@ -213,16 +213,13 @@ def test_a_tracker_without_frames_is_an_error_until_they_come(bench):
 
 
 def test_a_tracker_whose_frames_are_all_of_no_use_says_why(bench):
-    for k in range(3):
-        bench.expose(k, lambda frame: dataclasses.replace(frame, epoch=5))
-        bench.live.process_next()
-    for k in range(3, 50):
-        bench.expose(k)  # of an older epoch
+    for k in range(50):
+        bench.expose(k, lambda frame: dataclasses.replace(frame, seq=min(frame.seq, 2)))
         bench.live.process_next()
     said = bench.said
     assert said.level == Message.LEVEL_ERROR
     assert said.message.startswith("no estimate for 2 s: since then unused.")
-    assert ".old_epoch 47" in said.message
+    assert ".duplicate 47" in said.message
 
 
 def test_without_frames_nothing_is_published(bench):

@@ -1,0 +1,25 @@
+from absmsg.v1 import common_pb2 as _common_pb2
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class Reinitialize(_message.Message):
+    __slots__ = ("header", "tracker")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    TRACKER_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    tracker: str
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ...) -> None: ...
+
+class CommandAnswer(_message.Message):
+    __slots__ = ("header", "accepted", "reason")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    ACCEPTED_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    accepted: bool
+    reason: str
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ...) -> None: ...

@@ -1,0 +1,85 @@
+"""A tracker acts on valid commands only, answers each, and leaves a line about it."""
+
+import logging
+
+import pytest
+from absmsg.v1.command_pb2 import CommandAnswer, Reinitialize
+from absmsg.v1.common_pb2 import Header
+
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.wire import commands
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.waiting import eventually
+
+SENDER = Header(rig="demo", boot_id="5f1c", host_clock="0b6c")
+
+
+class Bench:
+    """A tracker called sheet that counts how often it was told to detect its object anew."""
+
+    def __init__(self, bus=None):
+        self.bus, self.acted = bus or LoopbackBus(), 0
+        self.headers = HeaderFactory("demo", WallClock())
+        self.health_bus = LoopbackBus()
+        self.health = Health(self.health_bus, "track/sheet", self.headers)
+        commands.answer_reinitialize(self.bus, "sheet", self.headers, self.health, self.act)
+
+    def act(self):
+        self.acted += 1
+
+    @property
+    def said(self):
+        return health_now(self.health, self.health_bus)
+
+
+def test_a_command_is_carried_out_answered_and_told(caplog):
+    bench = Bench()
+    with caplog.at_level(logging.WARNING):
+        answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0)
+    assert answer is not None
+    assert (answer.accepted, answer.reason, bench.acted) == (True, "", 1)
+    assert bench.said.counters["commands.accepted"] == 1
+    line = f"sheet/reinitialize from process {bench.headers.boot_id} on {bench.headers.host_clock}: accepted"
+    assert bench.said.labels["command"] == line
+    assert line in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("message", "payload", "reason"),
+    [
+        ("", b"", "'' is no absmsg.v1.Reinitialize"),
+        ("absmsg.v1.Header", SENDER.SerializeToString(), "is no absmsg.v1.Reinitialize"),
+        (commands.REINITIALIZE, b"\xff\xff", "are no absmsg.v1.Reinitialize"),
+        (commands.REINITIALIZE, bytes(1 << 25), "are allowed"),
+        (commands.REINITIALIZE, Reinitialize(header=SENDER).SerializeToString(), "belongs to /reinitialize"),
+        (commands.REINITIALIZE, Reinitialize(tracker="cloth").SerializeToString(), "belongs to cloth/reinitialize"),
+        (commands.REINITIALIZE, Reinitialize(tracker="sheet").SerializeToString(), "it is for rig ''"),
+        (
+            commands.REINITIALIZE,
+            Reinitialize(tracker="sheet", header=Header(boot_id="\x1b[2J")).SerializeToString(),
+            r"boot_id = '\x1b[2J' is too long or cannot be printed",
+        ),
+    ],
+)
+def test_anything_else_is_refused_with_the_reason(message, payload, reason):
+    bench = Bench()
+    (sample,) = bench.bus.command("sheet/reinitialize", message, payload, 1.0)
+    answer = CommandAnswer.FromString(sample.payload)
+    assert not answer.accepted
+    assert reason in answer.reason
+    assert bench.acted == 0
+    assert bench.said.counters["commands.refused"] == 1
+    assert "\x1b" not in bench.said.labels["command"]
+
+
+def test_a_command_crosses_real_sessions(open_bus):
+    open_bus()
+    bench, asking = Bench(open_bus()), open_bus()
+    assert eventually(lambda: commands.reinitialize(asking, "sheet", bench.headers, 1.0) is not None)
+    assert asking.query("**", 1.0) == []  # a query without a payload is no command
+    assert bench.acted == 1
+
+
+def test_without_a_tracker_there_is_no_answer():
+    assert commands.reinitialize(LoopbackBus(), "sheet", HeaderFactory("demo", WallClock()), 0.1) is None

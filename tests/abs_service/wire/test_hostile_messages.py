@@ -1,0 +1,285 @@
+"""Nothing that comes from the bus ends a process, its recording or its display: every subscriber behind the edge."""
+
+import io
+import itertools
+import math
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.health_pb2 import Health as Message
+from absmsg.v1.sensor_model_pb2 import SensorModel
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+from rich.text import Text
+
+from abs_service.bus.clock_offsets import ClockOffsets
+from abs_service.bus.contract import Sample
+from abs_service.bus.frames import FrameSubscriber
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands import track
+from abs_service.display.lines import JsonDisplay, PlainDisplay
+from abs_service.display.table import draw
+from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
+from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.supervision.rig_view import Display
+from abs_service.supervision.run_session import RunSession
+from abs_service.supervision.supervisor import Supervisor
+from abs_service.tracking.live_tracker import FrameSetQueue
+from abs_service.wire.checked_bus import CheckedBus
+from drivers.contract.capabilities import StreamInfo
+from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import codec, encoded_image
+from drivers.encoding.encoded_image import ImageCodec
+from drivers.remote.device import IMAGES, TRUTHS, RemoteDevice
+from drivers.remote.link import Link
+from drivers.remote.probe import RemoteRig
+from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.abs_service.recording.recorder_rig import depth, read, recordings
+from tests.abs_service.wire.hostile import MODEL, TOPICS, samples
+from tests.abs_service.wire.test_edge import sample
+from tests.drivers.recording_sink import RecordingSink
+
+HOSTILE = st.lists(samples(), min_size=1, max_size=5)
+S = 1_000_000_000
+
+
+class Everything(Display):
+    """All displays at once, drawn to the last character."""
+
+    def __init__(self):
+        self.out, self.lines = io.StringIO(), io.StringIO()
+        self._console = Console(file=self.out, width=120, color_system=None)
+        self._others = PlainDisplay(self.lines, self.lines), JsonDisplay(self.lines, self.lines)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        """Nothing to restore."""
+
+    def update(self, view):
+        self._console.print(draw(view, Text("")))
+        for display in self._others:
+            display.update(view)
+
+    def estimate(self, report):
+        for display in self._others:
+            display.estimate(report)
+
+    def note(self, text):
+        pass
+
+    def close(self, view):
+        self._console.print("\n".join(view.summary()), highlight=False, markup=False)
+
+
+class Run:
+    """`abs-service run` without processes."""
+
+    def __init__(self):
+        self.bus, self.shown = LoopbackBus(), Everything()
+        supervisor = Supervisor([], lambda component, _: pytest.fail(component), time.monotonic_ns)
+        about = ("demo", "tcp/127.0.0.1:1", Path(), ["sheet"])
+        checked = CheckedBus(self.bus, time.monotonic_ns)
+        self.session = RunSession(checked, *about, supervisor, self.shown, WallClock())
+
+    def take(self, *hostile):
+        for one in hostile:
+            self.bus.deliver(one)
+        turns = itertools.count()
+        self.session.run_until(lambda: next(turns) > 1)
+        self.shown.close(self.session.view())
+
+    @property
+    def said(self):
+        told = [one for one in self.bus.sent if one.topic == "health/run"]
+        return Message.FromString(told[-1].payload)
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    monkeypatch.setattr("abs_service.supervision.run_session.PERIOD_S", 0.002)
+
+
+class TestRun:
+    def test_a_file_of_infinite_size(self):
+        run = Run()
+        health = Message(component="record", labels={"file": "a.mcap"}, gauges={"file_bytes": math.inf})
+        run.take(sample("health/record", health))
+        assert "not recording" in run.shown.out.getvalue()
+        assert run.said.counters["refused.number"] == 1
+        assert "run: refused 1 messages, the last: health/record: " in run.shown.out.getvalue()
+
+    def test_an_estimate_of_unknown_age(self):
+        run = Run()
+        run.take(sample("sheet/state", DeformationState(tracker="sheet", age_ms=math.nan)))
+        run.take(sample("sheet/state", DeformationState(tracker="sheet", age_ms=math.nan)))
+        assert "UNSPECIFIED" in run.shown.out.getvalue()
+        assert '"age_ms": null' in run.shown.lines.getvalue()
+
+    def test_escape_sequences_do_not_reach_the_terminal(self):
+        run = Run()
+        run.take(
+            sample("health/capture", Message(component="capture", level=Message.LEVEL_ERROR, message="\x1b[2Jgone"))
+        )
+        run.take(sample("sheet/state", DeformationState(tracker="sheet", reasons=["\x1b[2Jgone"])))
+        assert "\x1b" not in run.shown.out.getvalue() + run.shown.lines.getvalue()
+        assert run.said.counters["refused.text"] >= 1
+
+    def test_names_that_look_like_markup_are_shown_as_they_are(self):
+        run = Run()
+        run.take(sample("health/capture", Message(component="capture", counters={"published.[/x]/image": 1})))
+        assert "[/x]" in run.shown.out.getvalue()
+
+    @settings(max_examples=200)
+    @given(HOSTILE)
+    def test_nothing_ends_it(self, hostile):
+        run = Run()
+        run.take(*hostile)
+        assert "\x1b" not in run.shown.out.getvalue() + run.shown.lines.getvalue()
+
+
+class Recording:
+    """A recorder of a rig, and its health."""
+
+    def __init__(self, directory):
+        self.bus, self.told = LoopbackBus(), LoopbackBus()
+        clock = WallClock()
+        self.health = Health(self.told, "record", HeaderFactory("demo", clock))
+        encode = encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.RAW)
+        rig = RecorderSettings(directory, "demo", "version = 1\n", encode, minimum_free_bytes=0)
+        self.recorder = Recorder(CheckedBus(self.bus, clock.monotonic), rig, self.health, clock)
+
+    def record(self, *hostile):
+        self.recorder.start()
+        for one in hostile:
+            self.bus.deliver(one)
+        self.recorder.stop(10)
+        self.recorder.report()
+        return health_now(self.health, self.told)
+
+
+class TestRecorder:
+    def test_a_sensor_model_of_an_absurd_year(self, tmp_path):
+        absurd = SensorModel(header=Header(stamp={"seconds": 10**12}), sensor="tof")
+        absurd.MergeFrom(MODEL)
+        recording = Recording(tmp_path)
+        recording.record(sample("tof/model", absurd), sample("tof/model", MODEL))
+        assert recording.recorder.failed == ""
+        assert [m.channel.topic for m in read(recordings(tmp_path)[0])[0]] == ["/tof/model"]
+
+    def test_sequence_numbers_that_jump_between_the_ends_of_their_range(self, tmp_path):
+        jumps = [Message(component="run", header=Header(seq=seq)) for seq in (0, 2**64 - 1, 0, 2**62, 0, 2**62)]
+        said = Recording(tmp_path).record(*(sample("health/run", one) for one in jumps))
+        assert said.counters["recorded"] == 5
+        assert said.counters["missing.health/run"] == 0
+
+    @settings(max_examples=100)
+    @given(HOSTILE)
+    def test_nothing_ends_it(self, tmp_path_factory, hostile):
+        directory = tmp_path_factory.mktemp("recording")
+        recording = Recording(directory)
+        recording.record(*hostile)
+        assert recording.recorder.failed == ""
+        assert len(recordings(directory)) == 1
+
+
+class Tracking:
+    """What a tracker takes from the bus: frame sets of one depth stream."""
+
+    def __init__(self):
+        self.bus, self.headers = LoopbackBus(), HeaderFactory("demo", WallClock())
+        checked = CheckedBus(self.bus, time.monotonic_ns)
+        frames = FrameSubscriber(checked, [("tof", "depth")], time.monotonic_ns)
+        key = ("tof", "depth")
+        self.sets = FrameSetQueue(frames, Synchroniser(key, [key], 12_000_000), time.monotonic_ns)
+
+    def publish(self, seq, epoch=0, t_ns=None):
+        t_ns = seq * S // 30 if t_ns is None else t_ns
+        image = depth(seq)
+        frame = Frame("tof", "depth", Kind.DEPTH, image.data, "16UC1", t_ns, t_ns, seq, epoch, geometry=Geometry.RADIAL)
+        info = codec.encode_info(frame, self.headers.at(t_ns, seq))
+        self.bus.deliver(Sample("tof/depth/image", codec.IMAGE_SCHEMA, codec.encode_image(frame, 0), info))
+        return self.sets.take()
+
+
+class TestTracker:
+    @pytest.mark.parametrize("wrong", [{"epoch": 2**32 - 1}, {"t_ns": 2**61}])
+    def test_goes_on_after_a_frame_of_a_huge_epoch_or_time(self, wrong):
+        tracking = Tracking()
+        assert tracking.publish(0) is not None
+        tracking.publish(1, **wrong)
+        taken = [tracking.publish(seq) is not None for seq in range(2, 2 + 2 * FOREIGN)]
+        assert taken == [False] * FOREIGN + [True] * FOREIGN
+
+    def test_waits_for_a_camera_that_is_one(self):
+        bus, stop = LoopbackBus(), threading.Event()
+        health = Health(LoopbackBus(), "track/sheet", HeaderFactory("demo", WallClock()))
+        answers = iter([SensorModel(sensor="tof"), SensorModel(), MODEL])
+        bus.answer_queries("tof/model", MODEL.DESCRIPTOR.full_name, lambda: next(answers).SerializeToString())
+        cameras = track._cameras(CheckedBus(bus, time.monotonic_ns), ("tof",), health, stop)
+        assert cameras["tof"].width == MODEL.width
+
+    @given(st.lists(samples(("tof/depth/image",)), min_size=1, max_size=5))
+    def test_nothing_ends_it(self, hostile):
+        tracking = Tracking()
+        for one in hostile:
+            tracking.bus.deliver(one)
+            tracking.sets.take()
+        health = Health(LoopbackBus(), "track/sheet", tracking.headers)
+        health.count_up_to(tracking.sets.counters)
+        health.publish()
+
+    @given(st.lists(samples(("clock/there",)), min_size=1, max_size=5))
+    def test_no_answer_of_a_clock_ends_it(self, answers):
+        bus = LoopbackBus()
+        bus.query = lambda pattern, timeout_s: answers
+        clocks = ClockOffsets(CheckedBus(bus, time.monotonic_ns), time.monotonic_ns, "here")
+        clocks.offset("there")
+        clocks.measure()
+        clocks.offset("there")
+
+
+class FakeLink(Link):
+    """A link with messages from the test."""
+
+    def __init__(self):
+        self.listeners = {}
+
+    def subscribe(self, rig, pattern, on_message):
+        self.listeners[pattern] = on_message
+
+    def watch_liveliness(self, rig, on_gone):
+        pass
+
+    def unsubscribe(self):
+        self.listeners = {}
+
+
+class TestRemoteDevice:
+    @given(HOSTILE, st.booleans())
+    def test_nothing_ends_it(self, hostile, same_clock):
+        link, sink = FakeLink(), RecordingSink()
+        streams = (StreamInfo("tof", "depth", Kind.DEPTH, "16UC1", 32, 24, 30.0),)
+        device = RemoteDevice("remote://", "demo", link, RemoteRig({}, streams, same_clock), time.monotonic_ns)
+        device.start(sink)
+        for one in hostile:
+            pattern = TRUTHS if one.topic.endswith("truth") else IMAGES
+            link.listeners[pattern](one.topic, one.payload, one.attachment)
+        health = Health(LoopbackBus(), "capture", HeaderFactory("demo", WallClock()))
+        health.count_up_to(device.counters)
+        for name, value in device.gauges.items():
+            health.gauge(name, value)
+        health.publish()
+
+
+def test_every_kind_of_key_is_among_the_topics():
+    from abs_service.bus import keys
+
+    assert {topic.partition("/")[0] for topic in TOPICS} >= keys.RESERVED
