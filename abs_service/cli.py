@@ -92,7 +92,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        module = import_module(f"{module.__name__}.{MODULES.get(chosen, chosen)}")
+        path = f"{module.__name__}.{MODULES.get(chosen, chosen)}"
+        parent_watchdog.load_gently(path)
+        module = import_module(path)
         commands = getattr(module, "COMMANDS", {})
     from abs_service.commands.parts import logs  # noqa: PLC0415 - `logging` takes a third of the time of --help
 

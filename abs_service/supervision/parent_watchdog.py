@@ -10,12 +10,16 @@ import signal
 import sys
 import threading
 import time
+from importlib import import_module
 
 #: Set in the environment of children whose standard input is such a pipe.
 VARIABLE = "ABS_SERVICE_PARENT_WATCHDOG"
 
 #: Set beside it for a child that waits until it is needed.
 STANDBY = "ABS_SERVICE_STANDBY"
+
+#: Niceness while such a child is loaded.
+LOADING_NICE = 19
 
 _needed = threading.Event()
 
@@ -27,6 +31,20 @@ def start() -> None:
     """If a supervisor started this process, ends it when the supervisor is gone: in order first, then by force."""
     if os.environ.pop(VARIABLE, ""):
         threading.Thread(target=_watch, args=(sys.stdin.fileno(), GRACE_S), name="parent watchdog", daemon=True).start()
+
+
+def load_gently(module: str) -> None:
+    """In a child that waits, imports a module from a thread that steps back for all others; else does nothing."""
+    if os.environ.get(STANDBY):
+        # Linux has a niceness for each thread; that of the main thread could not be lowered again.
+        thread = threading.Thread(target=_load, args=(module,), name="load")
+        thread.start()
+        thread.join()
+
+
+def _load(module: str) -> None:
+    os.nice(LOADING_NICE)
+    import_module(module)
 
 
 def wait_until_needed() -> None:

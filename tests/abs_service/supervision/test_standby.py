@@ -73,8 +73,9 @@ def test_a_real_process_waits_until_it_is_woken(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
     said, lines = threading.Event(), []
     code = (
-        "from abs_service.supervision import parent_watchdog\nparent_watchdog.start()\nprint('loaded')\n"
-        "parent_watchdog.wait_until_needed()\nprint('works')"
+        "import os, sys\nfrom abs_service.supervision import parent_watchdog\nparent_watchdog.start()\n"
+        "before = os.nice(0)\nparent_watchdog.load_gently('wave')\nassert 'wave' in sys.modules\nprint('loaded')\n"
+        "parent_watchdog.wait_until_needed()\nprint('works', os.nice(0) - before)"
     )
 
     def on_line(component, line):
@@ -87,5 +88,5 @@ def test_a_real_process_waits_until_it_is_woken(monkeypatch):
     assert lines == ["loaded"]
     process.wake()
     assert eventually(lambda: process.poll() == 0)
-    assert process.output_tail() == "loaded\nworks"
+    assert process.output_tail() == "loaded\nworks 0"
     process.wake()  # harmless
