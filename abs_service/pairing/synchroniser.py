@@ -194,7 +194,7 @@ class _Stream:
     def rejection_cause(self, frame: Frame) -> str:
         """Cause for which a frame is rejected; "" if it is accepted.
 
-        One frame of a wrong epoch or time must not stop its stream: after `FOREIGN` ones that are older, it begins anew.
+        One frame of a wrong epoch or time must not stop its stream: after `FOREIGN` older ones, it begins anew.
         """
         cause = self._cause(frame)
         is_foreign = cause == "old_epoch" or (cause == "stale" and self.passed_ns - frame.t_host_ns > FOREIGN_NS)
