@@ -1,6 +1,7 @@
 """Calibration files: exact round trips, rigs that use them, and mistakes named with both files."""
 
 import dataclasses
+import re
 from pathlib import Path
 from typing import Any
 
@@ -167,7 +168,7 @@ def test_what_both_files_say_is_a_mistake_that_names_both_places(rig: Path) -> N
 def test_a_calibration_of_sensors_that_the_rig_lacks_is_refused(rig: Path) -> None:
     rig.write_text(RIG.replace("[sensors.color]", "[sensors.colour]"), encoding="utf-8")
     message = refusal(rig)
-    assert "bench.calibration.toml: line 69: sensors.color: no such sensor in" in message
+    assert re.search(r"bench.calibration.toml: line \d+: sensors.color: no such sensor in", message)
     assert 'did you mean "colour"? allowed: colour, tof' in message
 
 

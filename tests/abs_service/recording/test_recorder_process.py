@@ -72,7 +72,7 @@ class Stream:
 
     def track(self):
         publisher = self._bus.publisher(keys.state("sheet"), DeformationState.DESCRIPTOR.full_name, STATE)
-        state = DeformationState(header=self._headers.now(0), status=DeformationState.STATUS_TRACKING)
+        state = DeformationState(header=self._headers.now(0), tracker="sheet", status=DeformationState.STATUS_TRACKING)
         publisher.put(state.SerializeToString())
 
     def wait_for(self, condition):
