@@ -41,5 +41,5 @@ clean: ## remove .venv and every cache
 	@echo "Installing the pinned requirements, a few minutes the first time"
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
 .venv/.all: .venv/.run constraints-all.txt
-	@$(PIP) --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
+	@$(PIP) --no-deps --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
 .PHONY: help run test check lint format evaluate bench cost proto constraints all clean
