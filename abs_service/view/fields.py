@@ -100,7 +100,8 @@ FIELDS: Mapping[str, Field] = {
 def palette(signed: bool) -> NDArray[np.uint8]:
     """256 colours (256, 3): viridis, or blue over white to red for values with a sign."""
     if not signed:
-        return cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)[:, 0, ::-1].copy()
+        bgr = cv2.applyColorMap(np.arange(256, dtype=np.uint8)[:, None], cv2.COLORMAP_VIRIDIS)
+        return np.array(bgr[:, 0, ::-1], np.uint8)
     place = np.linspace(-1, 1, 256)[:, None]
     ends = np.where(place < 0, (40, 90, 200), (205, 50, 40))
     return (np.abs(place) * ends + (1 - np.abs(place)) * 240).astype(np.uint8)
@@ -139,4 +140,4 @@ class ColorScale:
         share = np.where(known, values, 0.0) / self.end
         share = (share + 1) / 2 if self._field.signed else share
         shown = PALETTES[self._field.signed][(255 * np.clip(share, 0, 1)).astype(np.uint8)]
-        return np.where(known[:, None], shown, np.uint8(GREY)).astype(np.uint8)
+        return np.where(known[:, None], shown, GREY).astype(np.uint8)

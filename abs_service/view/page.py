@@ -1,8 +1,8 @@
 """The page: reads the feed and updates scene and panel, a few times a second each, while somebody looks."""
 
 import threading
-from collections.abc import Callable
-from contextlib import redirect_stdout
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
 from os import devnull
 
 import numpy as np
@@ -47,7 +47,7 @@ class Page:
     ) -> None:
         self._feed, self._endpoint = feed, endpoint
         self._send = reinitialize
-        with open(devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):  # viser prints a box
+        with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
         self._panel = Panel(self._server, view_only, self._reinitialize)
@@ -79,7 +79,8 @@ class Page:
 
     def close(self) -> None:
         """Ends the server."""
-        self._server.stop()
+        with _quiet():
+            self._server.stop()
 
     def _draw_mesh(self) -> None:
         found = self._feed.newest(keys.mesh(self._panel.tracker), DeformedMesh)
@@ -211,3 +212,10 @@ class Page:
     def _version(self, tracker: str) -> int:
         found = self._feed.newest(keys.state(tracker), DeformationState)
         return found[0].mesh_version if found else 0
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what viser prints: standard output is for estimates and notes."""
+    with open(devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        yield

@@ -33,7 +33,7 @@ class Panel:
             control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
         )
         self._status = gui.add_html("")
-        self._tracker = gui.add_dropdown("Tracker", ("–",), visible=False)
+        self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
             self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))

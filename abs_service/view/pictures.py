@@ -51,9 +51,9 @@ def cloud(distance: NDArray[np.floating], camera: Camera) -> tuple[NDArray[np.fl
 def picture(frame: Frame) -> Picture:
     """A frame as red, green, blue (height, width, 3): distances in colours, all else as it looks."""
     if frame.encoding in _BAYER:
-        return cv2.cvtColor(np.asarray(frame.data), _BAYER[frame.encoding])
+        return np.asarray(cv2.cvtColor(np.asarray(frame.data, np.uint8), _BAYER[frame.encoding]), np.uint8)
     if frame.data.ndim == 3:
-        return np.asarray(frame.data if frame.encoding == "rgb8" else frame.data[..., ::-1])
+        return np.asarray(frame.data if frame.encoding == "rgb8" else frame.data[..., ::-1], np.uint8)
     values = frame.si()
     known = np.isfinite(values)
     low, high = np.percentile(values[known][::7], SHOWN_PERCENT) if known.any() else (0.0, 1.0)
@@ -62,7 +62,7 @@ def picture(frame: Frame) -> Picture:
         return np.repeat(grey[..., None], 3, axis=2)
     colored = cv2.applyColorMap(255 - grey, cv2.COLORMAP_TURBO)[..., ::-1].copy()
     colored[~known] = NO_RETURN
-    return colored
+    return np.asarray(colored, np.uint8)
 
 
 def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Picture:
@@ -78,7 +78,7 @@ def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], fac
     by = cv2.INTER_AREA if factor < 1 else cv2.INTER_NEAREST
     drawn = np.ascontiguousarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=by))
     if not len(faces):
-        return drawn
+        return np.asarray(drawn, np.uint8)
     place = factor * (camera.project(vertices) + 0.5) - 0.5
     within = np.isfinite(place).all(axis=1)
     corners = np.round(16 * np.clip(np.where(within[:, None], place, 0), -1e4, 1e4)).astype(np.int32)  # of 1/16 pixel

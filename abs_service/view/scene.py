@@ -16,7 +16,7 @@ GHOST, CAMERA, POINT, CAMERA_M = (150, 160, 175), (80, 160, 220), (150, 175, 205
 STALE = (70, 70, 70)
 
 #: Diameter of a point, as a share of the distance between neighbours.
-POINT_SHARE = 0.25
+POINT_SHARE = 0.15
 
 #: Where the eye of the first view is, seen from the middle of the mesh, in units of the mesh's extent.
 EYE = np.array([0.75, -0.65, -1.5])
