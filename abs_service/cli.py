@@ -24,6 +24,7 @@ COMMANDS = {
     "run": "track live: devices, trackers and recorder, supervised, with a status table",
     "replay": "track a recording again, frame by frame",
     "new": "write the rig file for what you have, after some questions",
+    "view": "show a running rig in the browser: mesh, points, images, status",
     "check": "validate a configuration and print what it describes",
     "devices": "list attached devices, with a remedy for those that cannot be used",
     "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",

@@ -3,6 +3,7 @@
   abs-service run                            the simulated demo rig, nothing to connect or configure
   abs-service run rig.toml --out takes       your own sensors, recorded to takes/
   abs-service run --no-record --json         one JSON object per estimate, for scripts
+  abs-service run --view                     with a page in the browser that shows mesh, points and images
   abs-service run --seed 3 --duration 20     another simulated motion, for 20 s
 
 Applications connect to bus.endpoint; the keys are abs/<rig>/<tracker>/state and so on. Ctrl-C ends everything in order.
@@ -26,6 +27,7 @@ from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.commands import view
 from abs_service.commands.parts import logs, rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
@@ -55,11 +57,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, help="folder of the recordings instead of record.directory")
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
     parser.add_argument("--seed", metavar="N", type=int, help="seed of all simulated devices")
+    parser.add_argument("--view", action="store_true", help="serve a page that shows the rig, as `abs-service view`")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate instead of a table")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until SIGTERM or SIGINT, the end of its devices, or a failure."""
+    if arguments.view:
+        view.check()
     rig = effective(rig_process.load_config(arguments), arguments)
     if rig.record.enabled:
         folder.check(rig.record.directory)
@@ -73,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         closing(starting(display, arguments)) as starts,
     ):
-        supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
+        supervisor = Supervisor(children(rig, path, arguments.view), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
         try:
@@ -121,11 +126,12 @@ def with_seed(uri: str, seed: int) -> str:
     return urlunsplit(parts._replace(query=urlencode(query, safe=",")))
 
 
-def children(rig: config.ServiceConfig, path: Path) -> list[Child]:
+def children(rig: config.ServiceConfig, path: Path, with_page: bool = False) -> list[Child]:
     """The processes of a rig whose effective configuration is in the file `path`; the recorder is to stop last."""
     trackers = [Child(f"track/{name}", ("track", str(path), name), 1) for name in rig.trackers]
     recorder = [Child("record", ("record", str(path)), 2)] if rig.record.enabled else []
-    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder]
+    page = [Child("view", ("view", str(path)), 0)] if with_page else []
+    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder, *page]
 
 
 @contextmanager

@@ -1,0 +1,72 @@
+"""Shows a running rig in the browser: deforming mesh, measured points, images, status in words, plots.
+
+  abs-service view                                          the demo rig that `abs-service run` shows elsewhere
+  abs-service view rig.toml --connect tcp/192.168.1.7:7447  a rig on another host
+  abs-service view rig.toml --view-only                     without anything that acts on the rig
+
+`abs-service run --view` serves the same page. It can be opened on this host only; Ctrl-C ends it.
+"""
+
+import argparse
+import time
+from importlib.util import find_spec
+
+from abs_service.bus.health import Health
+from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.commands.parts import rig_process
+from abs_service.supervision.exit_codes import Exit
+from abs_service.wire import commands
+
+PORT = 8080
+
+#: Time that a tracker has to answer a command [s].
+ANSWER_S = 3.0
+
+
+class ViewError(Exception):
+    """The page cannot be served."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments of `abs-service view`."""
+    rig_process.add_arguments(parser)
+    parser.add_argument("--port", metavar="N", type=int, default=PORT, help=f"port of the page (default: {PORT})")
+    parser.add_argument("--view-only", action="store_true", help="leave out everything that acts on the rig")
+
+
+def check() -> None:
+    """Refuses to go on without viser.
+
+    Raises:
+        ViewError: it is not installed.
+    """
+    if find_spec("viser") is None:
+        raise ViewError("the page needs viser: pip install 'abs-service[view]'")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serves the page until SIGTERM or SIGINT."""
+    check()
+    from abs_service.view.feed import Feed  # noqa: PLC0415 - needs viser
+    from abs_service.view.page import Page  # noqa: PLC0415 - needs viser
+
+    rig = rig_process.load_config(arguments)
+    stop = rig_process.stop_on_signals()
+    headers = HeaderFactory(rig.name, WallClock())
+    with rig_process.open_bus(rig, arguments) as bus:
+        health = Health(bus, "view", headers)
+
+        def reinitialize(tracker: str) -> str:
+            answer = commands.reinitialize(bus, tracker, headers, ANSWER_S)
+            if answer is None:
+                return "it gives no answer"
+            return "" if answer.accepted else answer.reason
+
+        feed = Feed(bus, time.monotonic_ns)
+        page = Page(feed, arguments.connect or rig.bus.endpoint, arguments.port, arguments.view_only, reinitialize)
+        print(f"live page: {page.url}", flush=True)
+        try:
+            page.run(stop, health.tick)
+        finally:
+            page.close()
+    return Exit.OK

@@ -1,0 +1,197 @@
+"""The newest messages of a rig, and numbers of the last minute. Images are received only while somebody looks."""
+
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
+from absmsg.v1.sensor_model_pb2 import SensorModel
+from google.protobuf.message import DecodeError, Message
+
+from abs_service.bus import keys
+from abs_service.bus.contract import Bus, Sample, Subscription
+from calib.camera import Camera
+from drivers.contract.frame import Frame
+from drivers.encoding import codec
+from drivers.encoding.sensor_model import decode_camera
+
+M = TypeVar("M", bound=Message)
+
+#: Time that numbers are kept [s], images that are kept of a stream, and the timeout of a query [s].
+MINUTE_S, IMAGES, QUERY_S = 60.0, 6, 0.2
+
+_PATTERNS = ("health/**", keys.state("*"), keys.mesh("*"), keys.topology("*"), keys.model("*"))
+_MESSAGES: tuple[type[Message], ...] = (Health, DeformationState, DeformedMesh, MeshTopology, SensorModel)
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """Numbers of one estimate: arrival [s], ages [ms], effort, and the log-likelihood of a vertex by sensor."""
+
+    t_s: float
+    age_ms: float
+    solve_ms: float
+    generations: int
+    skipped: int
+    likelihoods: dict[str, float]
+
+
+class Feed:
+    """Collects what a rig publishes. Its methods may be called from one thread; messages arrive in another.
+
+    Args:
+        bus: of the rig.
+        clock: monotonic time [ns].
+
+    Attributes:
+        malformed: messages that could not be parsed.
+    """
+
+    def __init__(self, bus: Bus, clock: Callable[[], int]) -> None:
+        self.malformed = 0
+        self._bus, self._clock = bus, clock
+        self._parse = {message.DESCRIPTOR.full_name: message for message in _MESSAGES}
+        self._newest: dict[str, tuple[Message, float]] = {}
+        self._numbers: dict[str, deque[Numbers]] = {}
+        self._images: dict[str, deque[tuple[Sample, float]]] = {}
+        self._cameras: dict[str, Camera] = {}
+        self._watching: list[Subscription] = []
+        self._lock = threading.Lock()
+        for pattern in _PATTERNS:
+            bus.subscribe(pattern, self._take)
+
+    @property
+    def now_s(self) -> float:
+        """Monotonic time [s]."""
+        return self._clock() * 1e-9
+
+    def watch_images(self, wanted: bool) -> None:
+        """Begins or ends receiving images."""
+        if wanted and not self._watching:
+            self._watching = [self._bus.subscribe("*/*/image", self._take_image)]
+        elif not wanted and self._watching:
+            self._watching.pop().close()
+            with self._lock:
+                self._images.clear()
+
+    def trackers(self) -> list[str]:
+        """Trackers that have published estimates, by name."""
+        with self._lock:
+            return sorted(self._numbers)
+
+    def newest(self, topic: str, kind: type[M]) -> tuple[M, float] | None:
+        """The last message of a topic if it is of that kind, and its age [s]."""
+        with self._lock:
+            found = self._newest.get(topic)
+        if found is None or not isinstance(found[0], kind):
+            return None
+        return found[0], self.now_s - found[1]
+
+    def healths(self) -> list[tuple[Health, float]]:
+        """Health of every component and its age [s], by name."""
+        with self._lock:
+            found = sorted((topic, *one) for topic, one in self._newest.items() if topic.startswith("health/"))
+        return [(message, self.now_s - t_s) for _, message, t_s in found if isinstance(message, Health)]
+
+    def age_s(self) -> float:
+        """Time since any message but our own came [s]; infinite before the first."""
+        with self._lock:
+            times = [t_s for topic, (_, t_s) in self._newest.items() if topic != keys.health("view")]
+        return self.now_s - max(times, default=-float("inf"))
+
+    def numbers(self, tracker: str) -> list[Numbers]:
+        """Numbers of the last minute, oldest first."""
+        begin_s = self.now_s - MINUTE_S
+        with self._lock:
+            return [one for one in self._numbers.get(tracker, ()) if one.t_s >= begin_s]
+
+    def topology(self, mesh: DeformedMesh) -> MeshTopology | None:
+        """The topology of a mesh, asked for if it has not come; None if there is none."""
+        topic = keys.topology(mesh.tracker)
+        for ask in (False, True):
+            for sample in self._bus.query(topic, QUERY_S) if ask else ():
+                self._take(sample)
+            found = self.newest(topic, MeshTopology)
+            if found and _belong(found[0], mesh):
+                return found[0]
+        return None
+
+    def cameras(self) -> dict[str, Camera]:
+        """The camera of every sensor that said it."""
+        with self._lock:
+            models = [one for one, _ in self._newest.values() if isinstance(one, SensorModel)]
+        for model in models:
+            known = self._cameras.get(model.sensor)
+            if known is None or known.calib_id != model.calib_id:
+                with suppress(codec.CodecError):
+                    self._cameras[model.sensor] = decode_camera(model)
+        return dict(self._cameras)
+
+    def streams(self) -> list[str]:
+        """Topics of the images that are there, by name."""
+        with self._lock:
+            return sorted(self._images)
+
+    def frame(self, topic: str, t_host_ns: int = 0) -> tuple[Frame, float] | None:
+        """A frame and its age [s]: the one nearest to the exposure `t_host_ns`, or the newest; None without any."""
+        with self._lock:
+            kept = list(self._images.get(topic, ()))
+        if not kept:
+            return None
+        nearest = min(kept, key=lambda one: abs(_exposure_ns(one[0]) - t_host_ns)) if t_host_ns else kept[-1]
+        try:
+            return codec.decode(nearest[0].payload, nearest[0].attachment), self.now_s - kept[-1][1]
+        except codec.CodecError:
+            self.malformed += 1
+            return None
+
+    def image_rate_hz(self, topic: str) -> float:
+        """Rate of a stream as its sender measures it [1/s]; 0 if unknown."""
+        found = self.newest(keys.health("capture"), Health)
+        return found[0].gauges.get(f"rate_hz.{topic}", 0.0) if found else 0.0
+
+    def _take(self, sample: Sample) -> None:
+        kind = self._parse.get(sample.message)
+        if kind is None:
+            return
+        try:
+            message = kind.FromString(sample.payload)
+        except DecodeError:
+            self.malformed += 1
+            return
+        with self._lock:
+            self._newest[sample.topic] = message, self.now_s
+            if isinstance(message, DeformationState):
+                length = deque[Numbers](maxlen=round(60 * MINUTE_S))
+                self._numbers.setdefault(message.tracker, length).append(_numbers(message, self.now_s))
+
+    def _take_image(self, sample: Sample) -> None:
+        with self._lock:
+            self._images.setdefault(sample.topic, deque(maxlen=IMAGES)).append((sample, self.now_s))
+
+
+def rate_hz(numbers: Iterable[Numbers], now_s: float, seconds: float = 3.0) -> float:
+    """Estimates per second in the last seconds."""
+    return sum(one.t_s > now_s - seconds for one in numbers) / seconds
+
+
+def _numbers(state: DeformationState, t_s: float) -> Numbers:
+    likelihoods = {one.sensor: one.mean_log_likelihood for one in state.sensors if not one.missing and one.samples}
+    return Numbers(t_s, state.age_ms, state.solve_ms, state.generations, state.skipped, likelihoods)
+
+
+def _belong(topology: MeshTopology, mesh: DeformedMesh) -> bool:
+    of_topology = topology.header.boot_id, topology.mesh_version
+    return of_topology == (mesh.header.boot_id, mesh.mesh_version)
+
+
+def _exposure_ns(sample: Sample) -> int:
+    with suppress(DecodeError):
+        return FrameInfo.FromString(sample.attachment).header.t_host_ns
+    return 0

@@ -1,0 +1,224 @@
+"""The page: reads the feed and updates scene and panel, a few times a second each, while somebody looks."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from os import devnull
+
+import numpy as np
+import viser
+from absmsg.v1.deformation_state_pb2 import DeformationState
+from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus import keys
+from abs_service.tracking.tracker_log import points
+from abs_service.view import pictures, words
+from abs_service.view.feed import Feed, rate_hz
+from abs_service.view.fields import FIELDS, ColorScale, MeshView
+from abs_service.view.panel import Panel
+from abs_service.view.scene import Scene
+from calib.camera import Camera
+from drivers.contract.frame import Frame, Kind
+
+#: Periods of the page: mesh, points and images, words and plots [s]; with nobody looking [s].
+MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
+
+#: Time that a detection may take [s].
+ANSWER_S = 10.0
+
+#: The page listens here only.
+HOST = "127.0.0.1"
+
+
+class Page:
+    """One page of one rig.
+
+    Args:
+        feed: of the rig.
+        endpoint: of the rig, for people to read.
+        port: to listen at; the next free one is taken.
+        view_only: True leaves out everything that acts on the rig.
+        reinitialize: asks a tracker to detect its object anew; returns why it refuses, "" if it does not.
+    """
+
+    def __init__(
+        self, feed: Feed, endpoint: str, port: int, view_only: bool, reinitialize: Callable[[str], str]
+    ) -> None:
+        self._feed, self._endpoint = feed, endpoint
+        self._send = reinitialize
+        with _quiet():
+            self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
+        self._scene = Scene(self._server)
+        self._panel = Panel(self._server, view_only, self._reinitialize)
+        self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
+        self._drawn: object = None
+        self._view: MeshView | None = None
+        self._exposure_ns = 0  # of that mesh
+        self._asked: tuple[str, float, int] | None = None  # tracker, when, and its mesh before
+        self._due_s = dict.fromkeys((self._draw_mesh, self._draw_images, self._write), 0.0)
+
+    @property
+    def url(self) -> str:
+        """Address of the page."""
+        return f"http://{HOST}:{self._server.get_port()}"
+
+    def run(self, stop: threading.Event, tick: Callable[[], None]) -> None:
+        """Updates the page until stopped; calls `tick` at least twice a second."""
+        periods_s = {self._draw_mesh: MESH_S, self._draw_images: IMAGES_S, self._write: WORDS_S}
+        while not stop.is_set():
+            tick()
+            looked_at = bool(self._server.get_clients())
+            self._feed.watch_images(looked_at)
+            now_s = self._feed.now_s
+            for draw in periods_s if looked_at else ():
+                if now_s >= self._due_s[draw]:
+                    self._due_s[draw] = max(self._due_s[draw] + periods_s[draw], now_s)
+                    draw()
+            stop.wait(max(self._due_s[self._draw_mesh] - self._feed.now_s, 0.002) if looked_at else IDLE_S)
+
+    def close(self) -> None:
+        """Ends the server."""
+        with _quiet():
+            self._server.stop()
+
+    def _draw_mesh(self) -> None:
+        found = self._feed.newest(keys.mesh(self._panel.tracker), DeformedMesh)
+        if found is None or not (mesh := found[0]).vertices_f32:
+            return
+        stale, name = found[1] > words.STALE_S, self._panel.field
+        drawn = mesh.header.boot_id, mesh.header.seq, stale, name, self._panel.shows
+        if drawn == self._drawn or (view := self._mesh_view(mesh, name == "residual")) is None:
+            return
+        self._drawn, self._view, self._exposure_ns = drawn, view, mesh.header.t_host_ns
+        colors = self._scales[name].colors(FIELDS[name].values(view))
+        self._scene.show_mesh(view, colors, stale)
+        self._scene.show_first(view, self._panel.shows[0])
+
+    def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
+        """What is shown of a mesh; None as long as its faces are unknown."""
+        topology = self._feed.topology(mesh)
+        if topology is None:
+            return None
+        measured, camera = np.empty((0, 0)), None
+        for topic in self._feed.streams() if with_image else ():
+            found = self._feed.frame(topic, mesh.header.t_host_ns)
+            if found and found[0].kind == Kind.DEPTH and (camera := self._camera(found[0])):
+                measured = pictures.radial(found[0], camera)
+                break
+        return MeshView(
+            points(mesh.vertices_f32).astype(float),
+            points(topology.rest_vertices_f32).astype(float),
+            np.frombuffer(topology.faces_u32, "<u4").reshape(-1, 3).astype(np.int32),
+            np.frombuffer(mesh.covariance_f32, "<f4").reshape(-1, 6).astype(float),
+            measured,
+            camera,
+        )
+
+    def _camera(self, frame: Frame) -> Camera | None:
+        """The camera in whose view a frame is; None if it is unknown or of another size."""
+        camera = self._feed.cameras().get(frame.aligned_to or frame.sensor)
+        return camera if camera and (camera.height, camera.width) == frame.data.shape[:2] else None
+
+    def _draw_images(self) -> None:
+        self._scene.show_cameras(self._feed.cameras(), self._panel.shows[2])
+        for topic in self._feed.streams():
+            found = self._feed.frame(topic, self._exposure_ns)
+            if found is None or (camera := self._camera(found[0])) is None:
+                continue
+            frame, age_s = found
+            stale = age_s > words.STALE_S
+            image = pictures.picture(frame)
+            if frame.kind == Kind.DEPTH:
+                points_r, _, spacing_m = pictures.cloud(pictures.radial(frame, camera), camera)
+                self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
+            faces = self._view.faces if self._view is not None else np.empty((0, 3), np.int32)
+            vertices = self._view.vertices if self._view is not None else np.empty((0, 3))
+            drawn = pictures.with_mesh(pictures.grey(image) if stale else image, camera, vertices, faces)
+            name = topic.removesuffix("/image")
+            state = f"{words.age(age_s)} old" if stale else f"{self._feed.image_rate_hz(topic):.1f} Hz"
+            self._panel.show_image(name, f"{name}, {state}", drawn)
+
+    def _write(self) -> None:
+        self._panel.offer(self._feed.trackers())
+        tracker = self._panel.tracker
+        numbers = self._feed.numbers(tracker)
+        self._panel.show_status(self._status(tracker))
+        self._panel.show_legend(self._scales[self._panel.field].end)
+        self._panel.show_table(self._table(tracker))
+        self._panel.show_plots(numbers, self._feed.now_s)
+        self._answer(tracker)
+
+    def _status(self, tracker: str) -> list[words.Words]:
+        silent = words.silence(self._feed.age_s(), self._endpoint)
+        if silent is not None:
+            return [silent]
+        found = self._feed.newest(keys.state(tracker), DeformationState)
+        state, age_s = found if found else (DeformationState(), float("inf"))
+        name = DeformationState.Status.Name(state.status).removeprefix("STATUS_") if found else ""
+        lines = [words.tracker(name, state.reasons, state.warnings, age_s, 1e3 * state.deviation_m)]
+        numbers = self._feed.numbers(tracker)
+        camera_hz = self._reference_hz()
+        slow = words.slow(rate_hz(numbers, self._feed.now_s), camera_hz, sum(one.skipped for one in numbers))
+        if slow and age_s <= words.STALE_S:
+            lines.append(words.Words("The tracker is slow", slow, words.STATUS["DEGRADED"][1]))
+        for health, health_age_s in self._feed.healths():
+            of_status = health.component == f"track/{tracker}" and health.message.startswith(name)
+            if health_age_s < 3 * words.STALE_S and health.level >= Health.LEVEL_WARNING and not of_status:
+                color = words.STATUS["LOST" if health.level == Health.LEVEL_ERROR else "DEGRADED"][1]
+                lines.append(words.Words(health.component, health.message, color))
+        return lines
+
+    def _reference_hz(self) -> float:
+        """Rate of the fastest depth stream, which estimates should keep up with [1/s]; 0 if unknown."""
+        depth = [topic for topic in self._feed.streams() if topic.endswith("/depth/image")]
+        return max((self._feed.image_rate_hz(topic) for topic in depth), default=0.0)
+
+    def _table(self, tracker: str) -> dict[str, str]:
+        numbers = self._feed.numbers(tracker)
+        rows = {
+            "estimates": f"{rate_hz(numbers, self._feed.now_s):.1f} Hz, {sum(one.skipped for one in numbers)} skipped"
+        }
+        if numbers:
+            last = numbers[-1]
+            rows["latency"] = f"{last.age_ms:.0f} ms, search {last.solve_ms:.0f} ms, {last.generations} generations"
+            rows |= {f"log-likelihood, {name}": f"{value:.2f}" for name, value in last.likelihoods.items()}
+        for health, _ in self._feed.healths():
+            losses = ("dropped", "lost", "malformed", "unused", "skipped")
+            lost = sum(number for name, number in health.counters.items() if name.partition(".")[0] in losses)
+            rows[f"lost, {health.component}"] = str(lost)
+            if health.labels.get("file"):
+                rows["recording"] = health.labels["file"].removesuffix(".active")
+        return rows
+
+    def _reinitialize(self, tracker: str) -> None:
+        version = self._version(tracker)
+        self._panel.answer("Asks the tracker to detect its object again …")
+        if refused := self._send(tracker):
+            self._panel.answer(f"The tracker refuses: {refused}.")
+        else:
+            self._asked = tracker, self._feed.now_s, version
+
+    def _answer(self, tracker: str) -> None:
+        """Says what came of the last request."""
+        if self._asked is None:
+            return
+        asked, t_s, before = self._asked
+        if (now := self._version(asked)) != before:
+            self._panel.answer(f"New mesh, version {now}.")
+        elif self._feed.now_s - t_s > ANSWER_S:
+            self._panel.answer("No object was found; the tracker goes on as it was.")
+        else:
+            return
+        self._asked = None
+
+    def _version(self, tracker: str) -> int:
+        found = self._feed.newest(keys.state(tracker), DeformationState)
+        return found[0].mesh_version if found else 0
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without what viser prints: standard output is for estimates and notes."""
+    with open(devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        yield

@@ -1,0 +1,181 @@
+"""The controls of the page: status in words, colours, images, plots, and buttons that act."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
+
+import numpy as np
+import viser
+from viser import uplot
+
+from abs_service.view.feed import MINUTE_S, Numbers
+from abs_service.view.fields import FIELDS, PALETTES
+from abs_service.view.pictures import Picture
+from abs_service.view.words import Words
+
+_LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
+
+#: Columns of a plot: a point each half second.
+_STEPS = round(2 * MINUTE_S)
+
+
+class Panel:
+    """The panel beside the scene.
+
+    Args:
+        server: that serves it.
+        view_only: True leaves out everything that acts on the rig.
+        reinitialize: called with the tracker that is to detect its object anew.
+    """
+
+    def __init__(self, server: viser.ViserServer, view_only: bool, reinitialize: Callable[[str], None]) -> None:
+        gui = self._gui = server.gui
+        gui.configure_theme(
+            control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
+        )
+        self._status = gui.add_html("")
+        self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("View"):
+            self._field = gui.add_dropdown("Colour of the mesh", tuple(FIELDS))
+            self._legend = gui.add_html("")
+            self._first = gui.add_checkbox("First pose", True)
+            self._points = gui.add_checkbox("Measured points", True)
+            self._cameras = gui.add_checkbox("Cameras", True)
+            if not view_only:
+                button = gui.add_button("Reinitialise", hint="Detect the object again, with a new mesh")
+                button.on_click(lambda _: reinitialize(self.tracker))
+            self._answer = gui.add_markdown("", visible=False)
+            self._table = gui.add_html("")
+        self._image_tab = tabs.add_tab("Images")
+        self._images: dict[str, viser.GuiImageHandle] = {}
+        with tabs.add_tab("Plots"):
+            self._plots = gui.add_folder("The last minute", expand_by_default=True)
+        self._lines: dict[str, tuple[tuple[str, ...], viser.GuiUplotHandle]] = {}
+
+    @property
+    def tracker(self) -> str:
+        """The tracker that is shown."""
+        return self._tracker.value
+
+    @property
+    def field(self) -> str:
+        """The quantity that the mesh's colours show, a key of `FIELDS`."""
+        return self._field.value
+
+    @property
+    def shows(self) -> tuple[bool, bool, bool]:
+        """Whether first pose, points and cameras are to be shown."""
+        return self._first.value, self._points.value, self._cameras.value
+
+    def offer(self, trackers: Sequence[str]) -> None:
+        """Offers trackers to choose from, once there is more than one."""
+        if trackers and tuple(trackers) != tuple(self._tracker.options):
+            self._tracker.options, self._tracker.visible = tuple(trackers), len(trackers) > 1
+
+    def show_status(self, words: Iterable[Words]) -> None:
+        """Shows the status; the first line is the largest."""
+        lines = []
+        for number, one in enumerate(words):
+            title = f"<b style='font-size:{1.0 if number else 1.25}em'>{escape(one.title)}</b>"
+            text = f"<div style='margin-top:2px'>{escape(one.text)}</div>" if one.text else ""
+            style = f"background:{one.color};color:white;padding:8px 12px;border-radius:6px;margin:6px 8px"
+            lines.append(f"<div class='abs-status' style='{style}'>{title}{text}</div>")
+        _set(self._status, "".join(lines))
+
+    def show_legend(self, end: float) -> None:
+        """Shows the colours of the mesh; `end` has the last one."""
+        field = FIELDS[self.field]
+        chosen = PALETTES[field.signed][np.linspace(0, 255, 9).astype(int)]
+        stops = ",".join(f"rgb({r},{g},{b})" for r, g, b in chosen)
+        bar = f"<div style='height:10px;border-radius:3px;background:linear-gradient(to right,{stops})'></div>"
+        names = (f"−{end:g}", "0", f"+{end:g} {field.unit}") if field.signed else ("0", "", f"{end:g} {field.unit}")
+        ends = "".join(f"<span>{name}</span>" for name in names)
+        row = f"<div style='display:flex;justify-content:space-between;font-size:.8em'>{ends}</div>"
+        _set(self._legend, f"<div style='margin:2px 12px'>{bar}{row}</div>")
+
+    def show_table(self, rows: Mapping[str, str]) -> None:
+        """Shows numbers by name."""
+        cells = "".join(
+            f"<tr><td style='opacity:.7;padding-right:10px'>{escape(name)}</td><td>{escape(text)}</td></tr>"
+            for name, text in rows.items()
+        )
+        _set(self._table, f"<table style='font-size:.85em;margin:4px 12px'>{cells}</table>")
+
+    def answer(self, text: str) -> None:
+        """Says what came of an action."""
+        self._answer.content, self._answer.visible = text, bool(text)
+
+    def show_image(self, name: str, label: str, picture: Picture) -> None:
+        """Shows an image."""
+        shown = self._images.get(name)
+        if shown is None:
+            with self._image_tab:
+                self._images[name] = self._gui.add_image(picture, label=label, format="jpeg", jpeg_quality=80)
+            return
+        shown.image = picture
+        if shown.label != label:
+            shown.label = label
+
+    def show_plots(self, numbers: Sequence[Numbers], now_s: float) -> None:
+        """Plots numbers of the last minute; each point is the mean of half a second."""
+        sensors = sorted({name for one in numbers for name in one.likelihoods})
+        curves = {
+            "latency [ms]": {"age": [one.age_ms for one in numbers], "search": [one.solve_ms for one in numbers]},
+            "estimates a second": {"rate": None},
+            "generations": {"generations": [one.generations for one in numbers]},
+            "log-likelihood of a vertex": {
+                name: [one.likelihoods.get(name, np.nan) for one in numbers] for name in sensors
+            },
+        }
+        times = np.array([one.t_s for one in numbers]) - now_s
+        for title, series in curves.items():
+            if series:
+                self._plot(title, tuple(series), [binned(times, values) for values in series.values()])
+
+    def _plot(self, title: str, names: tuple[str, ...], columns: list[np.ndarray]) -> None:
+        data = complete(columns)
+        known = self._lines.get(title)
+        if known is not None and known[0] == names:
+            known[1].data = data
+            return
+        if known is not None:
+            known[1].remove()
+        series = [uplot.Series(label="s"), *_series(names)]
+        axes = (uplot.Axis(stroke="#bbb"), uplot.Axis(stroke="#bbb"))
+        scales = {"x": uplot.Scale(time=False)}
+        with self._plots:
+            plot = self._gui.add_uplot(data, tuple(series), title=title, scales=scales, axes=axes, aspect=2.6)
+        self._lines[title] = names, plot
+
+
+def binned(times_s: np.ndarray, values: Sequence[float] | None) -> np.ndarray:
+    """Means of values in half seconds of the last minute, NaN where there are none; of None the rate [1/s].
+
+    Args:
+        times_s: of the values, before now (n,) [s], so negative.
+        values: (n,); NaN are left out.
+    """
+    index = np.floor((times_s + MINUTE_S) * _STEPS / MINUTE_S).astype(int)
+    number = np.ones(len(index)) if values is None else np.asarray(values, float)
+    kept = (index >= 0) & (index < _STEPS) & np.isfinite(number)
+    count = np.bincount(index[kept], minlength=_STEPS)
+    if values is None:
+        return count * _STEPS / MINUTE_S
+    total = np.bincount(index[kept], number[kept], minlength=_STEPS)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def complete(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Times [s] and values of the half seconds in which every column has one: a plot cannot leave out values."""
+    times_s = np.linspace(-MINUTE_S, 0, _STEPS, endpoint=False) + 0.5 * MINUTE_S / _STEPS
+    kept = np.isfinite(columns).all(axis=0)
+    return times_s[kept], *(column[kept] for column in columns)
+
+
+def _series(names: Iterable[str]) -> list[uplot.Series]:
+    return [uplot.Series(label=name, stroke=color, width=2) for name, color in zip(names, _LINES)]
+
+
+def _set(html: viser.GuiHtmlHandle, content: str) -> None:
+    if html.content != content:
+        html.content = content

@@ -1,0 +1,102 @@
+"""Images of a rig as points and as pictures with the mesh drawn over them."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.mesh import Mesh
+from calib.camera import Camera
+from calib.pose import transform
+from drivers.contract.frame import Frame, Geometry, Kind
+
+Picture = NDArray[np.uint8]
+
+#: Width of pictures [px], and the largest number of points of a sensor.
+WIDTH, POINTS = 480, 20_000
+
+#: Percentiles of an image's values at the ends of its colours.
+SHOWN_PERCENT = (1, 99)
+
+MESH, RIM, NO_RETURN = (255, 255, 255), (0, 230, 160), (22, 37, 110)
+
+_BAYER = {
+    "bayer_rggb8": cv2.COLOR_BayerRGGB2RGB,
+    "bayer_bggr8": cv2.COLOR_BayerBGGR2RGB,
+    "bayer_gbrg8": cv2.COLOR_BayerGBRG2RGB,
+    "bayer_grbg8": cv2.COLOR_BayerGRBG2RGB,
+}
+
+
+def radial(frame: Frame, camera: Camera) -> NDArray[np.floating]:
+    """Radial distances (height, width) [m] of a depth frame, NaN without return."""
+    distance = frame.si()
+    return distance / camera.rays()[..., 2] if frame.geometry == Geometry.Z else distance
+
+
+def cloud(distance: NDArray[np.floating], camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.intp], float]:
+    """Points (n, 3) [m] in rig coordinates of every k-th pixel with a return, its row and column, and spacing [m].
+
+    Args:
+        distance: radial distances (height, width) [m].
+        camera: of the image.
+    """
+    step = max(1, int(np.ceil(np.sqrt(distance.size / POINTS))))
+    pixels = step * np.argwhere(np.isfinite(distance[::step, ::step]))
+    row, column = pixels.T
+    points_s = camera.rays()[row, column] * distance[row, column, None]
+    spacing_m = step * float(np.median(distance[row, column])) / camera.fx if len(pixels) else 0.0
+    return transform(camera.T_rs, points_s).astype(np.float32), pixels, spacing_m
+
+
+def picture(frame: Frame) -> Picture:
+    """A frame as red, green, blue (height, width, 3): distances in colours, all else as it looks."""
+    if frame.encoding in _BAYER:
+        return np.asarray(cv2.cvtColor(np.asarray(frame.data, np.uint8), _BAYER[frame.encoding]), np.uint8)
+    if frame.data.ndim == 3:
+        return np.asarray(frame.data if frame.encoding == "rgb8" else frame.data[..., ::-1], np.uint8)
+    values = frame.si()
+    known = np.isfinite(values)
+    low, high = np.percentile(values[known][::7], SHOWN_PERCENT) if known.any() else (0.0, 1.0)
+    grey = (255 * np.clip((np.nan_to_num(values) - low) / max(high - low, 1e-9), 0, 1)).astype(np.uint8)
+    if frame.kind != Kind.DEPTH:
+        return np.repeat(grey[..., None], 3, axis=2)
+    colored = cv2.applyColorMap(255 - grey, cv2.COLORMAP_TURBO)[..., ::-1].copy()
+    colored[~known] = NO_RETURN
+    return np.asarray(colored, np.uint8)
+
+
+def with_mesh(image: Picture, camera: Camera, vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> Picture:
+    """A picture `WIDTH` pixels wide, with the edges of a mesh and its rim drawn over it.
+
+    Args:
+        image: of the camera, (height, width, 3).
+        camera: that took it.
+        vertices: positions (n, 3) [m] in rig coordinates.
+        faces: vertex indices (m, 3); none draws nothing.
+    """
+    factor = WIDTH / image.shape[1]
+    by = cv2.INTER_AREA if factor < 1 else cv2.INTER_NEAREST
+    drawn = np.ascontiguousarray(cv2.resize(image, None, fx=factor, fy=factor, interpolation=by))
+    if not len(faces):
+        return np.asarray(drawn, np.uint8)
+    place = factor * (camera.project(vertices) + 0.5) - 0.5
+    within = np.isfinite(place).all(axis=1)
+    corners = np.round(16 * np.clip(np.where(within[:, None], place, 0), -1e4, 1e4)).astype(np.int32)  # of 1/16 pixel
+    edges, rim = Mesh(vertices, faces, np.empty((0, 3), np.float32), np.empty((0, 2))).edges, rim_edges(faces)
+    lines = drawn.copy()
+    cv2.polylines(lines, list(corners[edges[within[edges].all(axis=1)]]), False, MESH, 1, cv2.LINE_AA, 4)
+    drawn = cv2.addWeighted(drawn, 0.6, lines, 0.4, 0)
+    cv2.polylines(drawn, list(corners[rim[within[rim].all(axis=1)]]), False, RIM, 2, cv2.LINE_AA, 4)
+    return np.asarray(drawn, np.uint8)
+
+
+def rim_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Vertex indices (k, 2) of the edges that belong to one face only."""
+    sides = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    return edges[count == 1]
+
+
+def grey(image: Picture) -> Picture:
+    """A stale picture: without colours, and darker."""
+    return np.repeat((cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) // 2 + 40)[..., None], 3, axis=2)

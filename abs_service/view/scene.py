@@ -1,0 +1,103 @@
+"""The 3-D part of the page: mesh, its first pose, points of the depth sensors, cameras."""
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import transforms
+
+from abs_service.view.fields import MeshView
+from abs_service.view.gltf import glb
+from calib.camera import Camera
+
+#: Colour of first pose, cameras and points, and size of a camera [m].
+GHOST, CAMERA, POINT, CAMERA_M = (150, 160, 175), (80, 160, 220), (150, 175, 205), 0.06
+
+#: Colour of everything that is stale.
+STALE = (70, 70, 70)
+
+#: Diameter of a point, as a share of the distance between neighbours.
+POINT_SHARE = 0.15
+
+#: Where the eye of the first view is, seen from the middle of the mesh, in units of the mesh's extent.
+EYE = np.array([0.75, -0.65, -1.5])
+
+
+class Scene:
+    """Draws into the scene of a server. Rigs have y downwards, like their cameras."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._meshes: list[viser.GlbHandle] = []
+        self._ghost: viser.MeshHandle | None = None
+        self._clouds: dict[str, viser.PointCloudHandle] = {}
+        self._cameras: dict[str, str] = {}
+        server.scene.set_up_direction("-y")
+        server.scene.configure_default_lights(enabled=True, cast_shadow=False)
+
+    def show_mesh(self, view: MeshView, colors: NDArray[np.uint8], stale: bool) -> None:
+        """Shows a mesh with colours (n, 3). Each file is loaded out of sight, and seen when the next one comes."""
+        data = glb(view.vertices, view.faces, np.full_like(colors, STALE) if stale else colors)
+        if not self._meshes:
+            add = self._server.scene.add_glb
+            self._meshes = [add(f"/mesh/{i}", data, visible=i == 0, cast_shadow=False) for i in range(2)]
+            self._place_camera(view)
+        seen, hidden = self._meshes
+        with self._server.atomic():
+            hidden.visible, seen.visible = True, False
+            seen.glb_data = data
+        self._meshes = [hidden, seen]
+
+    def show_first(self, view: MeshView, visible: bool) -> None:
+        """Shows the first pose as a net."""
+        if self._ghost is None or len(self._ghost.vertices) != len(view.first):
+            add = self._server.scene.add_mesh_simple
+            options = {"wireframe": True, "opacity": 0.35, "side": "double", "cast_shadow": False}
+            self._ghost = add("/first", view.first.astype(np.float32), view.faces, color=GHOST, **options)
+        elif not np.array_equal(self._ghost.vertices, view.first.astype(np.float32)):
+            self._ghost.vertices, self._ghost.faces = view.first.astype(np.float32), view.faces.astype(np.uint32)
+        if self._ghost.visible != visible:
+            self._ghost.visible = visible
+
+    def show_points(
+        self, sensor: str, points: NDArray[np.float32], spacing_m: float, stale: bool, visible: bool
+    ) -> None:
+        """Shows the points (n, 3) [m] of one depth sensor, whose neighbours are about `spacing_m` apart."""
+        colors = np.full(points.shape, STALE if stale else POINT, np.uint8)
+        shown = self._clouds.get(sensor)
+        if shown is None:
+            options = {
+                "point_size": POINT_SHARE * spacing_m,
+                "precision": "float32",
+                "point_shape": "circle",
+                "point_shading": "flat",
+            }
+            add = self._server.scene.add_point_cloud
+            self._clouds[sensor] = add(f"/points/{sensor}", points, colors, visible=visible, **options)
+            return
+        with self._server.atomic():
+            if shown.visible != visible:
+                shown.visible = visible
+            if visible:
+                shown.points, shown.colors = points, colors
+
+    def show_cameras(self, cameras: dict[str, Camera], visible: bool) -> None:
+        """Shows the field of view of every sensor at its pose."""
+        for name, camera in cameras.items():
+            if self._cameras.get(name) == f"{camera.calib_id}{visible}":
+                continue
+            self._cameras[name] = f"{camera.calib_id}{visible}"
+            turn, fov = transforms.SO3.from_matrix(camera.T_rs[:3, :3]), 2 * np.arctan2(camera.height / 2, camera.fy)
+            self._server.scene.add_camera_frustum(
+                f"/cameras/{name}", float(fov), camera.width / camera.height, scale=CAMERA_M, color=CAMERA,
+                thickness=0.0015, wxyz=turn.wxyz, position=camera.center, visible=visible,
+            )  # fmt: skip
+            text = f"/cameras/{name}/name"
+            self._server.scene.add_label(text, name, position=(0.0, -CAMERA_M, CAMERA_M), visible=visible)
+
+    def _place_camera(self, view: MeshView) -> None:
+        """Aims the first view of every browser at the mesh, from behind the cameras."""
+        middle = view.vertices.mean(axis=0)
+        eye = middle + EYE * float(np.linalg.norm(np.ptp(view.vertices, axis=0)))
+        self._server.initial_camera.position, self._server.initial_camera.look_at = eye, middle
+        for client in self._server.get_clients().values():
+            client.camera.position, client.camera.look_at = eye, middle

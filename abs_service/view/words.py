@@ -1,0 +1,79 @@
+"""What a rig's state means, in plain words: status, reason, age, and what to do about it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+#: Data older than this is stale [s]; a tracker below this share of its camera's rate is slow.
+STALE_S, SLOW_SHARE = 1.0, 0.8
+
+#: A status in words, its colour, and what to do about it.
+STATUS = {
+    "INITIALIZING": ("Looking for the object", "#3b82f6", "Put the object where its region selects it."),
+    "TRACKING": ("Tracking", "#16a34a", ""),
+    "DEGRADED": ("Tracking with doubts", "#d97706", "Use the estimate with care."),
+    "LOST": ("Object lost", "#dc2626", "Bring the object back into view, or press Reinitialise."),
+}
+
+STALE_COLOR = "#6b7280"
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """A line about a tracker or a rig: title, reasons and what to do, and its colour."""
+
+    title: str
+    text: str
+    color: str
+
+
+def age(seconds: float) -> str:
+    """An age for people: 0.4 s, 12 s, 3 min."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+
+
+def tracker(status: str, reasons: Sequence[str], warnings: Sequence[str], age_s: float, sigma_mm: float) -> Words:
+    """A tracker's state.
+
+    Args:
+        status: as in messages, without prefix; "" before the first estimate.
+        reasons, warnings: of its last estimate.
+        age_s: since that came [s].
+        sigma_mm: median deviation of its vertices [mm]; NaN if unknown.
+    """
+    if not status:
+        return Words("No estimate yet", "The tracker is starting, or its sensors deliver nothing.", STALE_COLOR)
+    title, color, remedy = STATUS.get(status, (status.title(), STALE_COLOR, ""))
+    if age_s > STALE_S:
+        text = f"The last estimate said: {title.lower()}. Check that the tracker runs and its sensors deliver."
+        return Words(f"No estimate for {age(age_s)}", text, STALE_COLOR)
+    precise = f", σ {sigma_mm:.2f} mm" if status in ("TRACKING", "DEGRADED") and math.isfinite(sigma_mm) else ""
+    text = ". ".join(one[:1].upper() + one[1:] for one in [*reasons, *warnings])
+    return Words(title + precise, f"{text}. {remedy}".strip(". ") if text or remedy else "", color)
+
+
+def slow(rate_hz: float, camera_hz: float, skipped: int) -> str:
+    """Warning that a tracker is slower than its camera; "" if it is not.
+
+    Args:
+        rate_hz: of its estimates.
+        camera_hz: of the images of its reference; 0 if unknown.
+        skipped: frame sets that it passed over in the last minute.
+    """
+    if camera_hz <= 0 or rate_hz >= SLOW_SHARE * camera_hz:
+        return ""
+    return (
+        f"Only {rate_hz:.0f} estimates a second of {camera_hz:.0f} images, {skipped} skipped in the last minute: "
+        "the tracker gets too little processor time. Close other programs, or choose fewer vertices."
+    )
+
+
+def silence(age_s: float, endpoint: str) -> Words | None:
+    """The rig as a whole: None as long as it says something."""
+    if age_s <= 3 * STALE_S:
+        return None
+    since = "yet" if age_s == float("inf") else f"for {age(age_s)}"
+    text = f"Is abs-service running at {endpoint}? This page connects again by itself; what it shows is old."
+    return Words(f"Nothing heard from the rig {since}", text, STALE_COLOR)

@@ -1,0 +1,99 @@
+"""Points from depth frames of either geometry, and meshes drawn over pictures."""
+
+import numpy as np
+import pytest
+
+from abs_service.view import pictures
+from abs_service.view.gltf import glb
+from calib.camera import Camera
+from drivers.contract.frame import Frame, Geometry, Kind
+
+#: Turned by 90° about z and shifted, so that a pose that is left out shows.
+T_RS = np.array([[0.0, -1, 0, 0.1], [1, 0, 0, 0.2], [0, 0, 1, 0.3], [0, 0, 0, 1]])
+CAMERA = Camera(64, 48, 60.0, 60.0, 31.5, 23.5, T_rs=T_RS)
+
+FACES = np.array([[0, 1, 2], [2, 1, 3]], np.int32)
+
+
+def depth(values, geometry) -> Frame:
+    """A depth frame in half millimetres."""
+    data = np.asarray(np.round(np.asarray(values) * 2000), "<u2")
+    return Frame("tof", "depth", Kind.DEPTH, data, "16UC1", 1, 1, 1, scale=0.0005, geometry=geometry, invalid=0)
+
+
+def plane_points() -> np.ndarray:
+    """Rig points (height, width, 3) of the plane z = 2 m before the camera."""
+    return CAMERA.unproject(2.0 / CAMERA.rays()[..., 2])
+
+
+def test_points_of_a_plane_are_the_same_from_either_geometry():
+    z = np.full((48, 64), 2.0)
+    z[:, 10] = 0
+    radial = z / CAMERA.rays()[..., 2]
+    for frame in (depth(z, Geometry.Z), depth(radial, Geometry.RADIAL)):
+        found, pixels, spacing_m = pictures.cloud(pictures.radial(frame, CAMERA), CAMERA)
+        assert len(found) == 48 * 63
+        assert 10 not in pixels[:, 1]
+        np.testing.assert_allclose(found, plane_points()[pixels[:, 0], pixels[:, 1]], atol=6e-4)
+        assert spacing_m == pytest.approx(2 / 60, rel=0.2)
+
+
+def test_large_images_are_thinned_out(monkeypatch):
+    monkeypatch.setattr(pictures, "POINTS", 200)
+    found, pixels, _ = pictures.cloud(np.full((48, 64), 2.0), CAMERA)
+    assert len(found) <= 200
+    assert (pixels % 4 == 0).all()
+
+
+def test_an_image_without_any_return_has_no_points():
+    assert len(pictures.cloud(np.full((48, 64), np.nan), CAMERA)[0]) == 0
+
+
+def test_the_rim_is_drawn_where_the_camera_sees_it():
+    corners = plane_points()[[12, 12, 36, 36], [16, 48, 16, 48]]
+    drawn = pictures.with_mesh(np.zeros((48, 64, 3), np.uint8), CAMERA, corners, FACES)
+    assert drawn.shape == (360, 480, 3)
+    factor = pictures.WIDTH / 64
+    rim = np.argwhere((drawn == pictures.RIM).all(axis=2))
+    low, high = rim.min(axis=0), rim.max(axis=0)
+    np.testing.assert_allclose([*low, *high], factor * (np.array([12, 16, 36, 48]) + 0.5) - 0.5, atol=2)
+
+
+def test_what_is_behind_the_camera_is_not_drawn():
+    behind = plane_points()[[12, 12, 36, 36], [16, 48, 16, 48]] - (0, 0, 9)
+    assert not pictures.with_mesh(np.zeros((48, 64, 3), np.uint8), CAMERA, behind, FACES).any()
+
+
+def test_pictures_show_distances_in_colours_and_no_return_in_its_own():
+    z = np.tile(np.linspace(1, 2, 64), (48, 1))
+    z[5] = 0
+    shown = pictures.picture(depth(z, Geometry.Z))
+    assert (shown[5] == pictures.NO_RETURN).all()
+    assert shown[10, 0, 0] > shown[10, -1, 0]  # near is red
+    grey = pictures.grey(shown)
+    assert (grey[..., 0] == grey[..., 2]).all()
+
+
+def test_colour_images_are_shown_as_they_are_and_in_the_right_order():
+    data = np.zeros((4, 4, 3), np.uint8)
+    data[..., 0] = 200
+    for encoding, channel in (("rgb8", 0), ("bgr8", 2)):
+        shown = pictures.picture(Frame("color", "color", Kind.COLOR, data, encoding, 1, 1, 1))
+        assert (shown[..., channel] == 200).all()
+        assert shown.sum() == 16 * 200
+
+
+def test_rim_edges_belong_to_one_face():
+    assert pictures.rim_edges(FACES).tolist() == [[0, 1], [0, 2], [1, 3], [2, 3]]
+
+
+def test_a_mesh_file_can_be_read_by_others():
+    trimesh = pytest.importorskip("trimesh")
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5]])
+    colors = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]], np.uint8)
+    data = glb(vertices, FACES, colors)
+    scene = trimesh.load(trimesh.util.wrap_as_stream(data), file_type="glb")
+    (mesh,) = scene.geometry.values()
+    np.testing.assert_allclose(mesh.vertices, vertices)
+    np.testing.assert_array_equal(mesh.faces, FACES)
+    np.testing.assert_array_equal(mesh.visual.vertex_attributes["color"][:, :3], colors)

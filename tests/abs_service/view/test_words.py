@@ -1,0 +1,47 @@
+"""Status and staleness in words."""
+
+import math
+
+import pytest
+
+from abs_service.view import words
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(0.44, "0.4 s"), (19.2, "19 s"), (119.0, "119 s"), (200.0, "3 min"), (7200.0, "120 min")]
+)
+def test_ages_are_short(seconds, text):
+    assert words.age(seconds) == text
+
+
+def test_a_good_estimate_says_how_good():
+    assert words.tracker("TRACKING", [], [], 0.1, 0.77) == words.Words("Tracking, σ 0.77 mm", "", "#16a34a")
+    assert words.tracker("TRACKING", [], [], 0.1, math.nan).title == "Tracking"
+
+
+def test_reasons_warnings_and_the_remedy_are_said():
+    said = words.tracker("DEGRADED", ["tof is missing"], ["it fills the image"], 0.1, 2.0)
+    assert said.text == "Tof is missing. It fills the image. Use the estimate with care"
+    assert "Reinitialise" in words.tracker("LOST", ["hardly any vertex agrees"], [], 0.1, 2.0).text
+
+
+def test_an_old_estimate_is_grey_and_says_how_old_whatever_it_said():
+    said = words.tracker("TRACKING", [], [], 19.0, 0.77)
+    assert said.title == "No estimate for 19 s"
+    assert said.color == words.STALE_COLOR
+    assert "tracking" in said.text
+    assert words.tracker("", [], [], math.inf, math.nan).color == words.STALE_COLOR
+
+
+def test_a_tracker_that_does_not_keep_up_is_told():
+    assert "12 estimates a second of 30 images, 9 skipped" in words.slow(12.2, 30.0, 9)
+    assert words.slow(29.0, 30.0, 0) == words.slow(5.0, 0.0, 0) == ""
+
+
+def test_a_silent_rig_is_told_with_its_address():
+    assert words.silence(0.5, "tcp/rig:1") is None
+    said = words.silence(12.0, "tcp/rig:1")
+    assert said is not None
+    assert said.title == "Nothing heard from the rig for 12 s"
+    assert "tcp/rig:1" in said.text
+    assert "yet" in getattr(words.silence(math.inf, "tcp/rig:1"), "title", "")

@@ -1,0 +1,111 @@
+"""The live page in a headless browser, of a running rig."""
+
+import signal
+import socket
+import time
+
+import pytest
+
+from tests.system.running import START_S, RigListener, wait_until
+
+sync_api = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("viser")
+
+CHROMIUM = "/usr/bin/chromium"
+OPTIONS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-unsafe-swiftshader",
+    "--use-angle=swiftshader",
+]
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(400)]
+
+
+@pytest.fixture
+def browser():
+    """Chromium; skipped where it is missing."""
+    with sync_api.sync_playwright() as playwright:
+        try:
+            opened = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        except sync_api.Error as error:
+            pytest.skip(f"no Chromium: {str(error).splitlines()[0]}")
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def port():
+    """A free port."""
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        return unused.getsockname()[1]
+
+
+def _opened(browser, port):
+    """The page, once it says something, and how long that took [s]."""
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    begin_s = time.monotonic()
+    while True:
+        try:
+            page.goto(f"http://127.0.0.1:{port}")
+            break
+        except sync_api.Error:
+            assert time.monotonic() < begin_s + 20
+            time.sleep(0.2)  # until the server listens
+    page.wait_for_selector(".abs-status", timeout=30_000)
+    return page, time.monotonic() - begin_s
+
+
+def _says(page, text, timeout_s=30.0):
+    """Waits until the status or an answer holds a text."""
+    page.get_by_text(text).first.wait_for(timeout=1e3 * timeout_s)
+
+
+def _picture(page) -> bytes:
+    return page.locator("canvas").first.screenshot()
+
+
+def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file, endpoint, launch, browser, port):
+    rig, listener = run
+    server = launch("view", rig_file, "--port", port)
+    page, opened_s = _opened(browser, port)
+    print(f"the page opened after {opened_s:.1f} s")
+    _says(page, "Tracking")
+    page.get_by_role("checkbox").nth(1).click(force=True)  # without the measured points, only the mesh moves
+    time.sleep(1.0)
+    before = _picture(page)
+    wait_until(lambda: _picture(page) != before, 20, "motion of the mesh")
+
+    version = listener.states()[-1][1].mesh_version
+    page.get_by_role("button", name="Reinitialise").click(force=True)
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh")
+    _says(page, "New mesh, version")
+
+    server.send_signal(signal.SIGTERM)
+    assert server.wait(20) == 0
+    said = len(listener.health("view"))
+    launch("view", rig_file, "--port", port)
+    wait_until(lambda: len(listener.health("view")) > said, 30, "health of the second page")
+    _says(page, "Tracking", 60)
+
+    rig.send_signal(signal.SIGTERM)
+    rig.wait(20)
+    _says(page, "Nothing heard from the rig")
+    launch("run", rig_file, "--no-record", "--json")
+    with RigListener(endpoint) as again:
+        wait_until(again.tracks_since(0), START_S, "TRACKING")
+    _says(page, "Tracking", 60)
+
+
+def test_a_page_that_only_shows_has_no_buttons(run, rig_file, launch, browser, port):
+    launch("view", rig_file, "--port", port, "--view-only")
+    page, _ = _opened(browser, port)
+    _says(page, "Tracking")
+    assert page.get_by_role("button", name="Reinitialise").count() == 0
