@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
+from abs_service.bus.session import DEFAULT_ENDPOINT
 from abs_service.config.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
@@ -21,7 +22,7 @@ class BusTable(Table):
         shared_memory: images travel through shared memory between processes of one host.
     """
 
-    endpoint: Endpoint = "tcp/127.0.0.1:7447"
+    endpoint: Endpoint = DEFAULT_ENDPOINT
     shared_memory: bool = True
 
 
