@@ -30,7 +30,7 @@ from abs_service.commands.parts import logs, rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
-from abs_service.supervision import gc_tuning, log_lines, parent_watchdog
+from abs_service.supervision import gc_tuning, log_lines, parent_watchdog, systemd
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
@@ -75,10 +75,12 @@ def run(arguments: argparse.Namespace) -> int:
     ):
         supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
+        notifier = systemd.notifier(os.environ)
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), [notifier.update])
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:
+            notifier.stopping()
             session.stop()
         display.close(session.view())
     refused = supervisor.misconfigured()
