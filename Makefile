@@ -5,6 +5,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input install --quiet
 COMPILE := $(BIN)/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --fork-strategy fewest \
 	--generate-hashes --no-annotate --custom-compile-command "make constraints" $(ARGS)
+IMAGE_EXTRAS := oak kinect realsense import mesh metrics
 
 help: ## list the targets; ARGS="…" is passed on to the command behind a target
 	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/make \1\t\2/p' Makefile | expand -t 18
@@ -28,6 +29,7 @@ proto: .venv/.all ## regenerate the wire code from proto/absmsg/v1/*.proto
 constraints: .venv/.all ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
 	@$(COMPILE) --group dev --all-extras --constraints constraints.txt --output-file constraints-all.txt
+	@$(COMPILE) --group build $(IMAGE_EXTRAS:%=--extra %) --constraints constraints-all.txt --output-file constraints-image.txt
 all: .venv/.all ## install everything: device SDKs, what `make evaluate ARGS=peers` compares with, tools
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

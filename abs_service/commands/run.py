@@ -30,7 +30,7 @@ from abs_service.commands.parts import logs, rig_process
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
-from abs_service.supervision import gc_tuning, log_lines, parent_watchdog, systemd
+from abs_service.supervision import gc_tuning, log_lines, metrics, parent_watchdog, systemd
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
@@ -72,11 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         closing(starting(display, arguments)) as starts,
+        metrics.served(rig.run.metrics_port) as measure,
     ):
         supervisor = Supervisor(children(rig, path), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), [notifier.update])
+        watchers = (notifier.update, measure)
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:

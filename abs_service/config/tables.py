@@ -167,7 +167,7 @@ class RecordTable(Table):
 
 
 class RunTable(Table):
-    """`[run]`: limits and timeouts of the supervisor.
+    """`[run]`: limits and timeouts of the supervisor, and what it tells others.
 
     Attributes:
         max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up.
@@ -176,6 +176,7 @@ class RunTable(Table):
         stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted. The
             time that it waited for a processor is added, up to `startup_timeout_s`.
         stop_timeout_s: time that all processes together have to end in order before they are killed [s].
+        metrics_port: port of 127.0.0.1 at which Prometheus reads `/metrics`; 0: none. Needs the extra `metrics`.
     """
 
     max_restarts: Annotated[int, Field(ge=0)] = 5
@@ -183,6 +184,7 @@ class RunTable(Table):
     startup_timeout_s: Positive = 180.0
     stall_timeout_s: Positive = 10.0
     stop_timeout_s: Positive = 4.0
+    metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
 
 
 class ServiceConfig(Table):

@@ -16,7 +16,7 @@ import abs_service
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("abs_service", "drivers", "calib")
-CONSTRAINTS = ("constraints.txt", "constraints-all.txt")
+CONSTRAINTS = ("constraints.txt", "constraints-image.txt", "constraints-all.txt")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = PROJECT["project"]["optional-dependencies"]
 OPTIONAL = [line for extra in EXTRAS.values() for line in extra]
@@ -70,8 +70,9 @@ def test_what_a_pinned_package_requires_is_pinned_with_it(name: str) -> None:
     assert {f"{pin} wants {wanted}" for pin in pins for wanted in _requirements(pin) if wanted not in pins} == set()
 
 
-def test_running_and_testing_use_the_same_versions() -> None:
-    assert _pins("constraints.txt").items() <= _pins("constraints-all.txt").items()
+def test_running_the_image_and_testing_use_the_same_versions() -> None:
+    assert _pins("constraints.txt").items() <= _pins("constraints-image.txt").items()
+    assert _pins("constraints-image.txt").items() <= _pins("constraints-all.txt").items()
 
 
 @pytest.mark.parametrize("name", CONSTRAINTS)
