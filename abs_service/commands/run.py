@@ -27,6 +27,8 @@ from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands.parts import logs, rig_process
+from abs_service.display import journal
+from abs_service.display.journal import JournalDisplay
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
@@ -181,9 +183,11 @@ def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None
 
 
 def make_display(as_json: bool) -> Display:
-    """JSON, the live table in a terminal, or plain lines elsewhere."""
+    """JSON, the live table in a terminal, the journal of systemd, or plain lines elsewhere."""
     if as_json:
         return JsonDisplay(sys.stdout, sys.stderr)
+    if journal.is_attached(os.environ, sys.stderr.fileno()):
+        return JournalDisplay(journal.send)
     return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)
 
 
