@@ -19,7 +19,7 @@ for step; do
       ;;
     libraries)
       apt-get update -qq
-      apt-get install -qq -y --no-install-recommends libusb-1.0-0 > /dev/null
+      DEBIAN_FRONTEND=noninteractive apt-get install -qq -y -o Dpkg::Use-Pty=0 --no-install-recommends libusb-1.0-0 > /dev/null
       rm -rf /var/lib/apt/lists/*
       ;;
     account)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from abs_service.supervision.rig_view import RigView
 
 if TYPE_CHECKING:
-    from prometheus_client.core import Metric
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
 
 #: Period in which the numbers are taken [ns]; health comes as often.
 PERIOD_NS = 1_000_000_000
@@ -65,11 +65,11 @@ class _Snapshot:
             self._next_ns = view.now_ns + PERIOD_NS
             self._rows = [(name, text, {"rig": view.rig, **labels}, value) for name, text, labels, value in rows(view)]
 
-    def collect(self) -> "Iterator[Metric]":
+    def collect(self) -> "Iterator[CounterMetricFamily | GaugeMetricFamily]":
         """Called by prometheus-client for each request."""
         from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily  # noqa: PLC0415 - an extra
 
-        families: dict[str, Metric] = {}
+        families: dict[str, CounterMetricFamily | GaugeMetricFamily] = {}
         for name, text, labels, value in self._rows:
             kind = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
             family = families.setdefault(name, kind(name, text, labels=list(labels)))
