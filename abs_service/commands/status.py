@@ -11,7 +11,6 @@ Exit code 0: everything works, warnings included; 1: a part reports an error or 
 import argparse
 import json
 import sys
-from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +20,9 @@ from abs_service.bus import keys, rig_health
 from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.health_words import words
+from abs_service.supervision.exit_codes import Exit
 
 SILENT = "silent"
-
-
-class Code(IntEnum):
-    """Exit codes: the health of what was asked."""
-
-    OK = 0
-    ERROR = 1
-    NOTHING = 3
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Prints the health of every part and returns a `Code`."""
+    """Prints the health of every part and returns its exit code."""
     endpoint, name = _whom(arguments)
     check_endpoint(endpoint)
     try:
@@ -56,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         parts = [_part(component, health) for component, health in sorted(components.items())]
         print(json.dumps({"rig": rig, "parts": parts}, ensure_ascii=False) if arguments.json else _lines(rig, parts))
     wrong = any(_level(health) in ("error", SILENT) for parts in answers.values() for health in parts.values())
-    return Code.ERROR if wrong else Code.OK
+    return Exit.FAILED if wrong else Exit.OK
 
 
 def _whom(arguments: argparse.Namespace) -> tuple[str, str]:
@@ -68,9 +60,9 @@ def _whom(arguments: argparse.Namespace) -> tuple[str, str]:
     return arguments.connect or endpoint, name if arguments.rig is None else keys.check_name(arguments.rig)
 
 
-def _nothing(reason: str) -> Code:
+def _nothing(reason: str) -> Exit:
     print(f"abs-service: {reason}", file=sys.stderr)
-    return Code.NOTHING
+    return Exit.NOTHING
 
 
 def _level(health: Health | None) -> str:

@@ -13,6 +13,7 @@ from typing import Self
 
 from absmsg.v1.health_pb2 import Health
 
+from abs_service.supervision import log_lines
 from abs_service.supervision.rig_view import RigView
 from abs_service.tracking.tracker_log import EstimateReport
 
@@ -21,6 +22,7 @@ PERIOD_NS = 1_000_000_000
 
 #: Priorities of the journal, which are syslog's.
 _PRIORITIES = {Health.LEVEL_ERROR: "3", Health.LEVEL_WARNING: "4"}
+_LOG_PRIORITIES = {"critical": "2", "error": "3", "warning": "4", "debug": "7"}
 _INFORMATION = "6"
 
 
@@ -65,8 +67,15 @@ class JournalDisplay:
         """Estimates are in the recording."""
 
     def note(self, text: str) -> None:
-        """See `Display`."""
-        self._entry({"MESSAGE": text, "PRIORITY": _INFORMATION})
+        """See `Display`; a record of a log in JSON keeps its level and process."""
+        record = log_lines.parse(text)
+        if not record:
+            self._entry({"MESSAGE": text, "PRIORITY": _INFORMATION})
+            return
+        exception = record.get("fields", {}).get("exception")
+        message = str(record["message"]) + (f"\n{exception}" if exception else "")
+        priority = _LOG_PRIORITIES.get(record.get("level", ""), _INFORMATION)
+        self._entry({"MESSAGE": message, "PRIORITY": priority, "ABS_COMPONENT": str(record.get("process", ""))})
 
     def close(self, view: RigView) -> None:
         """See `Display`."""

@@ -12,6 +12,7 @@ from absmsg.v1.health_pb2 import Health
 from abs_service.bus.contract import Sample
 from abs_service.commands import run
 from abs_service.display import journal
+from abs_service.supervision import log_lines
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView
 from abs_service.supervision.supervisor import Child, State
@@ -124,6 +125,16 @@ def test_notes_and_the_summary_keep_their_lines(written):
     assert written.entries()[0] == {"MESSAGE": "record: a = b\nTraceback:\n  é", "PRIORITY": "6"}
     written.display.close(written.view(5.0))
     assert written.entries()[0]["MESSAGE"].startswith("5.0 s, 0 images, 0 dropped\nsheet: 0 estimates")
+
+
+def test_records_of_a_log_keep_level_process_and_traceback(written):
+    written.entries()
+    written.display.note(log_lines.line(0.0, "warning", "track/sheet", "kernels are stale", {}))
+    written.display.note(log_lines.line(0.0, "critical", "record", "ValueError: x", {"exception": "Traceback:\n  y"}))
+    assert written.entries() == [
+        {"MESSAGE": "kernels are stale", "PRIORITY": "4", "ABS_COMPONENT": "track/sheet"},
+        {"MESSAGE": "ValueError: x\nTraceback:\n  y", "PRIORITY": "2", "ABS_COMPONENT": "record"},
+    ]
 
 
 def test_without_a_journal_the_message_is_kept(tmp_path, capsys):
