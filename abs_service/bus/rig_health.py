@@ -4,10 +4,10 @@ import time
 
 import zenoh
 from absmsg.v1.health_pb2 import Health
-from google.protobuf.message import DecodeError
 
 from abs_service.bus import keys
 from abs_service.bus.session import Role, open_session
+from drivers.encoding.message_check import MessageError, parse_valid
 
 #: Timeout of the connection [ms].
 CONNECT_MS = 1000
@@ -55,8 +55,8 @@ def _complete(health: RigHealth) -> bool:
 def _take(sample: zenoh.Sample, health: RigHealth) -> None:
     name, component = _rig_and_component(sample)
     try:
-        health.setdefault(name, {})[component] = Health.FromString(sample.payload.to_bytes())
-    except DecodeError:
+        health.setdefault(name, {})[component] = parse_valid(Health, sample.payload.to_bytes())
+    except MessageError:
         return  # from a stranger; the component's own will follow, or its silence be told
 
 

@@ -21,6 +21,7 @@ from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.health_words import words
 from abs_service.supervision.exit_codes import Exit
+from drivers.contract.text import printable
 
 SILENT = "silent"
 
@@ -91,5 +92,5 @@ def _lines(rig: str, parts: list[dict[str, Any]]) -> str:
         + "; ".join(text for text in (part["state"], part["reason"]) if text)
         for part in parts
     ]
-    # What comes over the network does not reach the terminal as control characters.
-    return "\n".join("".join(letter if letter.isprintable() else "?" for letter in line).rstrip() for line in lines)
+    # Names are those of keys, which may be anybody's; a message of several lines stays one part's line.
+    return "\n".join(printable(line.replace("\n", " ")).rstrip() for line in lines)

@@ -4,6 +4,7 @@ import json
 import threading
 
 import pytest
+from absmsg.v1.health_pb2 import Health as Message
 
 from abs_service import cli
 from abs_service.bus.contract import EVENTS
@@ -58,10 +59,10 @@ def test_a_rig_that_works_is_described_part_by_part(rig, endpoint, capsys):
 
 @pytest.mark.parametrize(("level", "code"), [(Level.WARNING, 0), (Level.ERROR, 1)])
 def test_the_reason_is_told_and_errors_are_the_exit_code(rig, endpoint, capsys, level, code):
-    rig["capture"].report("device sim", level, "sim: not there\x1b[2J; plug it in")
+    rig["capture"].report("device sim", level, "sim: not there; plug it in")
     found, said = status(endpoint, capsys)
     assert found == code
-    assert f"capture      {level.name.lower():<7}  sim: not there?[2J; plug it in\n" in said.out
+    assert f"capture      {level.name.lower():<7}  sim: not there; plug it in\n" in said.out
 
 
 def test_a_part_that_runs_and_says_nothing_is_an_error(rig, endpoint, capsys):
@@ -82,9 +83,25 @@ def test_scripts_get_counters_too(rig, endpoint, capsys):
     assert (parts["capture"]["level"], parts["capture"]["reason"]) == ("warning", "slow")
 
 
-def test_messages_that_are_no_health_change_nothing(rig, endpoint, open_bus, capsys):
-    open_bus().publisher("health/capture", "absmsg.v1.Health", EVENTS).put(b"\xff\xff")
-    assert status(endpoint, capsys)[0] == 0
+@pytest.mark.parametrize(
+    "payload",
+    [
+        b"\xff\xff",
+        Message(component="track/sheet", level=99).SerializeToString(),  # pyright: ignore[reportArgumentType]
+        Message(component="track/sheet", level=1, message="\x1b[2J").SerializeToString(),
+        Message(component="track/sheet", level=1, gauges={"solve_ms": float("nan")}).SerializeToString(),
+    ],
+)
+def test_what_is_no_health_does_not_count(rig, endpoint, open_bus, capsys, payload):
+    del rig["track/sheet"]
+    stranger, ended = open_bus().publisher("health/track/sheet", "absmsg.v1.Health", EVENTS), threading.Event()
+    thread = threading.Thread(target=lambda: [stranger.put(payload) for _ in iter(lambda: ended.wait(0.05), True)])
+    thread.start()
+    code, said = status(endpoint, capsys)
+    ended.set()
+    thread.join()
+    assert code == 1
+    assert "track/sheet  silent   runs, but sent no health for 1.5 s" in said.out
 
 
 def test_nothing_answers(endpoint, capsys):
