@@ -88,8 +88,8 @@ def test_scripts_get_counters_too(rig, endpoint, capsys):
     [
         b"\xff\xff",
         Message(component="track/sheet", level=99).SerializeToString(),  # pyright: ignore[reportArgumentType]
-        Message(component="track/sheet", level=1, message="\x1b[2J").SerializeToString(),
-        Message(component="track/sheet", level=1, gauges={"solve_ms": float("nan")}).SerializeToString(),
+        Message(component="track/sheet", level=Message.LEVEL_OK, message="\x1b[2J").SerializeToString(),
+        Message(component="track/sheet", level=Message.LEVEL_OK, gauges={"solve_ms": float("nan")}).SerializeToString(),
     ],
 )
 def test_what_is_no_health_does_not_count(rig, endpoint, open_bus, capsys, payload):
