@@ -22,6 +22,7 @@ from abs_service.supervision.exit_codes import Exit
 #: One line of help for each command; kept here so that `--help` imports none of them.
 COMMANDS = {
     "run": "track live: devices, trackers and recorder, supervised, with a status table",
+    "status": "ask a running rig how it is; the exit code says whether it works",
     "replay": "track a recording again, frame by frame",
     "new": "write the rig file for what you have, after some questions",
     "view": "show a running rig in the browser: mesh, points, images, status",

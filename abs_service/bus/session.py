@@ -8,6 +8,8 @@ import zenoh
 
 from drivers.encoding.message_check import LARGEST_IMAGE
 
+#: Where a rig listens unless it is configured otherwise.
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: Lease: a peer without a keep-alive for this long is disconnected [ms].
 LEASE_MS = 2000
 #: Timeout of a client's connection to its router [ms].
@@ -32,13 +34,16 @@ class Role(StrEnum):
     CLIENT = "client"  # connects to it
 
 
-def open_session(endpoint: str, role: Role, shared_memory: bool = True) -> zenoh.Session:
+def open_session(
+    endpoint: str, role: Role, shared_memory: bool = True, connect_timeout_ms: int = CONNECT_TIMEOUT_MS
+) -> zenoh.Session:
     """Opens a session. Close it before the interpreter exits, or zenoh hangs at exit.
 
     Args:
         endpoint: where the router listens, such as tcp/127.0.0.1:7447.
         role: whether to be the router or to connect to it.
         shared_memory: whether large messages pass through shared memory between processes of one host.
+        connect_timeout_ms: timeout of a client's connection [ms].
 
     Raises:
         BusError: the endpoint is malformed or in use, or nothing listens there.
@@ -46,9 +51,11 @@ def open_session(endpoint: str, role: Role, shared_memory: bool = True) -> zenoh
     check_endpoint(endpoint)
     zenoh.init_log_from_env_or("error")
     try:
-        return zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, role, shared_memory))))
+        return zenoh.open(
+            zenoh.Config.from_json5(json.dumps(_settings(endpoint, role, shared_memory, connect_timeout_ms)))
+        )
     except zenoh.ZError as error:
-        raise BusError(f'bus.endpoint = "{endpoint}": {_explain(str(error), role)}') from error
+        raise BusError(f'bus.endpoint = "{endpoint}": {_explain(str(error), role, connect_timeout_ms)}') from error
 
 
 def check_endpoint(endpoint: str) -> str:
@@ -66,23 +73,23 @@ def check_endpoint(endpoint: str) -> str:
     return endpoint
 
 
-def _explain(error: str, role: Role) -> str:
+def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
     if "in use" in error:
         return "the address is in use; is another abs-service running? Stop it or choose another port"
     if role is Role.CLIENT:
-        return f"nothing answers there within {CONNECT_TIMEOUT_MS / 1000:g} s; start `abs-service run` or use --listen"
+        return f"nothing answers there within {connect_timeout_ms / 1000:g} s; start `abs-service run` or use --listen"
     # zenoh appends its own source lines, which are of no use here.
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
 
 
-def _settings(endpoint: str, role: Role, shared_memory: bool) -> dict[str, object]:
+def _settings(endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms: int) -> dict[str, object]:
     listens = role is Role.ROUTER
     return {
         "mode": role.value,
         "listen": {"endpoints": [endpoint] if listens else []},
         "connect": {
             "endpoints": [] if listens else [endpoint],
-            "timeout_ms": CONNECT_TIMEOUT_MS,
+            "timeout_ms": connect_timeout_ms,
             "exit_on_failure": True,
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},

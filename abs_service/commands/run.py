@@ -29,10 +29,12 @@ from abs_service.bus.stamps import WallClock
 from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands import view
 from abs_service.commands.parts import logs, rig_process
+from abs_service.display import journal
+from abs_service.display.journal import JournalDisplay
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
-from abs_service.supervision import gc_tuning, log_lines, parent_watchdog
+from abs_service.supervision import gc_tuning, log_lines, metrics, parent_watchdog, systemd
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
@@ -77,13 +79,17 @@ def run(arguments: argparse.Namespace) -> int:
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),
         closing(starting(display, arguments)) as starts,
+        metrics.served(rig.run.metrics_port) as measure,
     ):
         supervisor = Supervisor(children(rig, path, arguments.view), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
-        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock())
+        notifier = systemd.notifier(os.environ)
+        watchers = (notifier.update, measure)
+        session = RunSession(bus, *about, rig.trackers, supervisor, display, WallClock(), watchers)
         try:
             session.run_until(lambda: stop.is_set() or session.elapsed_s >= arguments.duration)
         finally:
+            notifier.stopping()
             session.stop()
         display.close(session.view())
     refused = supervisor.misconfigured()
@@ -183,9 +189,11 @@ def _pass_on(display: Display, as_json: bool, component: str, line: str) -> None
 
 
 def make_display(as_json: bool) -> Display:
-    """JSON, the live table in a terminal, or plain lines elsewhere."""
+    """JSON, the live table in a terminal, the journal of systemd, or plain lines elsewhere."""
     if as_json:
         return JsonDisplay(sys.stdout, sys.stderr)
+    if journal.is_attached(os.environ, sys.stderr.fileno()):
+        return JournalDisplay(journal.send)
     return TableDisplay(Console()) if sys.stdout.isatty() else PlainDisplay(sys.stdout, sys.stderr)
 
 

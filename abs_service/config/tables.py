@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
+from abs_service.bus.session import DEFAULT_ENDPOINT
 from abs_service.config.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
@@ -21,7 +22,7 @@ class BusTable(Table):
         shared_memory: images travel through shared memory between processes of one host.
     """
 
-    endpoint: Endpoint = "tcp/127.0.0.1:7447"
+    endpoint: Endpoint = DEFAULT_ENDPOINT
     shared_memory: bool = True
 
 
@@ -166,7 +167,7 @@ class RecordTable(Table):
 
 
 class RunTable(Table):
-    """`[run]`: limits and timeouts of the supervisor.
+    """`[run]`: limits and timeouts of the supervisor, and what it tells others.
 
     Attributes:
         max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up.
@@ -175,6 +176,7 @@ class RunTable(Table):
         stall_timeout_s: longest time without health afterwards [s]; a process that exceeds either is restarted. The
             time that it waited for a processor is added, up to `startup_timeout_s`.
         stop_timeout_s: time that all processes together have to end in order before they are killed [s].
+        metrics_port: port of 127.0.0.1 at which Prometheus reads `/metrics`; 0: none. Needs the extra `metrics`.
     """
 
     max_restarts: Annotated[int, Field(ge=0)] = 5
@@ -182,6 +184,7 @@ class RunTable(Table):
     startup_timeout_s: Positive = 180.0
     stall_timeout_s: Positive = 10.0
     stop_timeout_s: Positive = 4.0
+    metrics_port: Annotated[int, Field(ge=0, le=65535)] = 0
 
 
 class ServiceConfig(Table):

@@ -9,6 +9,7 @@ class Exit(IntEnum):
     OK = 0
     FAILED = 1  # something broke; starting again may help
     USER = 2  # the command line, the configuration or the surroundings have to be changed first
+    NOTHING = 3  # nothing answers
     INTERRUPTED = 130  # Ctrl-C before the command could end in order
     PIPE_CLOSED = 141  # the reader of the output has closed it
 

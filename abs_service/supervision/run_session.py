@@ -1,7 +1,7 @@
 """One run of a rig: passes messages to the display and heartbeats to the supervisor."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -43,6 +43,7 @@ class RunSession:
         supervisor: of the processes.
         display: shows the state.
         clock: time.
+        watchers: see the state as often as the display does.
     """
 
     def __init__(
@@ -55,6 +56,7 @@ class RunSession:
         supervisor: Supervisor,
         display: Display,
         clock: WallClock,
+        watchers: Sequence[Callable[[RigView], None]] = (),
     ) -> None:
         self._bus, self._rig, self._endpoint, self._directory = bus, rig, endpoint, directory
         # Before the first estimate, the tracker itself says why there is none.
@@ -64,6 +66,7 @@ class RunSession:
         self._supervisor = supervisor
         self._display = display
         self._clock = clock
+        self._watchers = watchers
         self._begin_ns = self._queried_ns = clock.monotonic()
         self._live = rig_state.RigState(trackers, clock.monotonic)
         self._headers = HeaderFactory(rig, clock)
@@ -120,7 +123,10 @@ class RunSession:
             if arrived is None:
                 break
             self._take(*arrived)
-        self._display.update(self.view())
+        view = self.view()
+        self._display.update(view)
+        for watch in self._watchers:
+            watch(view)
 
     def _request_missing_topologies(self) -> None:
         """Queries topologies that the network dropped: each is sent once, and errors cannot be computed without."""

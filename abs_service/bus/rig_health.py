@@ -1,0 +1,66 @@
+"""Asks what runs at an endpoint: the health of every component of its rigs, and which component sends none."""
+
+import time
+
+import zenoh
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus import keys
+from abs_service.bus.session import Role, open_session
+from drivers.encoding.message_check import MessageError, parse_valid
+
+#: Timeout of the connection [ms].
+CONNECT_MS = 1000
+#: Time in which each component that works publishes its health, which it does once a second [s].
+PATIENCE_S = 1.5
+
+_POLL_S = 0.02
+
+#: Health by rig and component; None of a component that is there and sent none in time.
+RigHealth = dict[str, dict[str, Health | None]]
+
+
+def ask(endpoint: str, rig: str = "*") -> RigHealth:
+    """Listens until every component has published its health, but no longer than `PATIENCE_S`.
+
+    Args:
+        endpoint: where `abs-service run` listens.
+        rig: name of the rig; `*` for every rig there.
+
+    Raises:
+        BusError: the endpoint is malformed, or nothing answers there within `CONNECT_MS`.
+    """
+    health: RigHealth = {}
+    with (
+        open_session(endpoint, Role.CLIENT, shared_memory=False, connect_timeout_ms=CONNECT_MS) as session,
+        session.declare_subscriber(keys.key(rig, keys.health("**"))) as subscriber,
+    ):
+        deadline_s = time.monotonic() + PATIENCE_S
+        for reply in session.liveliness().get(keys.key(rig, keys.live("**")), timeout=PATIENCE_S):
+            if reply.ok is not None:
+                name, component = _rig_and_component(reply.ok)
+                # `run` itself has no token: without it there is no bus.
+                health.setdefault(name, {"run": None})[component] = None
+        while time.monotonic() < deadline_s and not _complete(health):
+            while (sample := subscriber.try_recv()) is not None:
+                _take(sample, health)
+            time.sleep(_POLL_S)
+    return health
+
+
+def _complete(health: RigHealth) -> bool:
+    return bool(health) and all(None not in components.values() for components in health.values())
+
+
+def _take(sample: zenoh.Sample, health: RigHealth) -> None:
+    name, component = _rig_and_component(sample)
+    try:
+        health.setdefault(name, {})[component] = parse_valid(Health, sample.payload.to_bytes())
+    except MessageError:
+        return  # from a stranger; the component's own will follow, or its silence be told
+
+
+def _rig_and_component(sample: zenoh.Sample) -> tuple[str, str]:
+    # abs/<rig>/health/<component> and abs/<rig>/live/<component>
+    _, rig, _, component = str(sample.key_expr).split("/", 3)
+    return rig, component

@@ -1,0 +1,126 @@
+"""What Prometheus reads from a running rig, on loopback: rates, ages, losses by cause, status, restarts, disk."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from abs_service.supervision.rig_view import RigView
+
+if TYPE_CHECKING:
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+
+#: Period in which the numbers are taken [ns]; health comes as often.
+PERIOD_NS = 1_000_000_000
+
+_STATUSES = ("INITIALIZING", "TRACKING", "DEGRADED", "LOST")
+
+#: A number, its name and meaning, and the values of its labels.
+Row = tuple[str, str, dict[str, str], float]
+
+
+class MetricsError(Exception):
+    """The metrics cannot be served; the message names the key, its value and what to do."""
+
+
+@contextmanager
+def served(port: int) -> Iterator[Callable[[RigView], None]]:
+    """Serves what the yielded function is given, at http://127.0.0.1:`port`/metrics; nothing if `port` is 0.
+
+    Raises:
+        MetricsError: the extra `metrics` is not installed, or the port is in use.
+    """
+    if not port:
+        yield _ignore
+        return
+    try:
+        from prometheus_client import CollectorRegistry, start_http_server  # noqa: PLC0415 - an extra
+    except ImportError as error:
+        missing = f"run.metrics_port = {port}: needs prometheus-client; pip install 'abs-service[metrics]'"
+        raise MetricsError(missing) from error
+    snapshot, registry = _Snapshot(), CollectorRegistry()
+    registry.register(snapshot)
+    try:
+        server, thread = start_http_server(port, "127.0.0.1", registry)
+    except OSError as error:
+        raise MetricsError(f"run.metrics_port = {port}: {error.strerror}; choose another port, or 0") from error
+    try:
+        yield snapshot.update
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+class _Snapshot:
+    """The latest numbers: taken in the thread of the rig, read by those of the server."""
+
+    def __init__(self) -> None:
+        self._rows: Sequence[Row] = ()
+        self._next_ns = 0
+
+    def update(self, view: RigView) -> None:
+        """Takes the numbers if the period is over."""
+        if view.now_ns >= self._next_ns:
+            self._next_ns = view.now_ns + PERIOD_NS
+            self._rows = [(name, text, {"rig": view.rig, **labels}, value) for name, text, labels, value in rows(view)]
+
+    def collect(self) -> "Iterator[CounterMetricFamily | GaugeMetricFamily]":
+        """Called by prometheus-client for each request."""
+        from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily  # noqa: PLC0415 - an extra
+
+        families: dict[str, CounterMetricFamily | GaugeMetricFamily] = {}
+        for name, text, labels, value in self._rows:
+            kind = CounterMetricFamily if name.endswith("_total") else GaugeMetricFamily
+            family = families.setdefault(name, kind(name, text, labels=list(labels)))
+            family.add_metric(list(labels.values()), value)
+        yield from families.values()
+
+
+def rows(view: RigView) -> Iterator[Row]:
+    """All numbers of a rig. Losses are in `abs_count_total`, with the names that docs/reliability.md explains."""
+    yield from _of_components(view)
+    for stream in view.streams:
+        yield "abs_stream_rate_hertz", "rate of a stream of images", {"stream": stream.name}, stream.rate_hz
+        if stream.age_ms is not None:
+            age = {"stream": stream.name}
+            yield "abs_stream_age_seconds", "age of the image last tracked", age, stream.age_ms * 1e-3
+    for name, log in view.live.trackers.items():
+        tracker = {"tracker": name}
+        yield "abs_estimates_total", "estimates of a tracker", tracker, log.estimates
+        if log.last is None:
+            continue
+        for status in _STATUSES:
+            labels = tracker | {"status": status}
+            yield "abs_tracker_status", "1 for the status of the last estimate", labels, log.last.status == status
+        yield "abs_solve_seconds", "duration of the last search", tracker, log.last.solve_ms * 1e-3
+        if log.last.age_ms is not None:
+            age_s = log.last.age_ms * 1e-3
+            yield (
+                "abs_estimate_age_seconds",
+                "from the exposure to the publication of the last estimate",
+                tracker,
+                age_s,
+            )
+    for child in view.children:
+        yield "abs_restarts_total", "restarts of a process", {"component": child.component}, child.restarts
+
+
+def _of_components(view: RigView) -> Iterator[Row]:
+    for component, received in view.live.received.items():
+        labels = {"component": component}
+        yield "abs_health_level", "1: OK, 2: WARNING, 3: ERROR", labels, received.health.level
+        age_s = (view.now_ns - received.t_ns) * 1e-9
+        yield "abs_health_age_seconds", "time since the last health, sent every second", labels, age_s
+        for name, number in received.health.counters.items():
+            yield "abs_count_total", "counters of health, by name", labels | {"name": name}, number
+        for name, value in received.health.gauges.items():
+            if math.isfinite(value):
+                yield "abs_gauge", "gauges of health, by name, which ends in the unit", labels | {"name": name}, value
+    recorder = view.live.health("record")
+    if "free_bytes" in recorder.gauges:
+        yield "abs_disk_free_bytes", "room on the disk of the recordings", {}, recorder.gauges["free_bytes"]
+
+
+def _ignore(view: RigView) -> None:
+    pass

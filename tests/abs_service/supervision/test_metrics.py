@@ -1,0 +1,129 @@
+"""What Prometheus reads, through its own parser; and what stands in its way."""
+
+import socket
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus.contract import Sample
+from abs_service.supervision import metrics
+from abs_service.supervision.rig_state import RigState
+from abs_service.supervision.rig_view import RigView
+from abs_service.supervision.supervisor import Child
+from abs_service.tracking.tracker_log import EstimateReport
+
+S = 1_000_000_000
+NOW_NS = 100 * S
+
+
+def view(now_ns=NOW_NS, **capture):
+    """A rig with one tracker, a recorder that was started twice, and the health of its devices as given."""
+    live = RigState(["sheet"], lambda: NOW_NS)
+    for health in (
+        Health(component="capture", level=Health.LEVEL_OK, **capture),
+        Health(component="record", level=Health.LEVEL_WARNING, gauges={"free_bytes": 5e9}),
+    ):
+        live.take(Sample(f"health/{health.component}", Health.DESCRIPTOR.full_name, health.SerializeToString()))
+    log = live.trackers["sheet"]
+    log.estimates = 12
+    log.last = EstimateReport("sheet", 1, "", "DEGRADED", (), (), (), None, None, None, 8.0, 20.0, 1, 1, 0)
+    log.exposure_ns = {"tof": NOW_NS - S // 4}
+    children = [Child("record", (), 1, restarts=2)]
+    return RigView("demo", "", Path(), live, children, 1.0, now_ns, "")
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def read(port):
+    """Reads all numbers by name and labels, as Prometheus does."""
+    parser = pytest.importorskip("prometheus_client.parser", reason="needs the extra metrics")
+
+    def read():
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as answer:
+            text = answer.read().decode()
+        found = [sample for family in parser.text_string_to_metric_families(text) for sample in family.samples]
+        return {
+            (sample.name, *(f"{key}={value}" for key, value in sorted(sample.labels.items()))): sample.value
+            for sample in found
+        }
+
+    return read
+
+
+def test_prometheus_reads_rates_ages_losses_status_restarts_and_disk(read, port):
+    with metrics.served(port) as update:
+        assert read() == {}
+        counters = {"published.tof/depth/image": 30, "dropped.tof/depth/image": 4}
+        update(
+            view(counters=counters, gauges={"rate_hz.tof/depth/image": 29.5, "device.sim.temperature_c": float("nan")})
+        )
+        found = read()
+    assert found == {
+        ("abs_health_level", "component=capture", "rig=demo"): 1,
+        ("abs_health_level", "component=record", "rig=demo"): 2,
+        ("abs_health_age_seconds", "component=capture", "rig=demo"): 0,
+        ("abs_health_age_seconds", "component=record", "rig=demo"): 0,
+        ("abs_count_total", "component=capture", "name=published.tof/depth/image", "rig=demo"): 30,
+        ("abs_count_total", "component=capture", "name=dropped.tof/depth/image", "rig=demo"): 4,
+        ("abs_gauge", "component=capture", "name=rate_hz.tof/depth/image", "rig=demo"): 29.5,
+        ("abs_gauge", "component=record", "name=free_bytes", "rig=demo"): 5e9,
+        ("abs_stream_rate_hertz", "rig=demo", "stream=tof/depth"): 29.5,
+        ("abs_stream_age_seconds", "rig=demo", "stream=tof/depth"): 0.25,
+        ("abs_estimates_total", "rig=demo", "tracker=sheet"): 12,
+        **{("abs_tracker_status", "rig=demo", f"status={status}", "tracker=sheet"): float(status == "DEGRADED")
+           for status in ("INITIALIZING", "TRACKING", "DEGRADED", "LOST")},
+        ("abs_solve_seconds", "rig=demo", "tracker=sheet"): 0.008,
+        ("abs_estimate_age_seconds", "rig=demo", "tracker=sheet"): 0.02,
+        ("abs_restarts_total", "component=record", "rig=demo"): 2,
+        ("abs_disk_free_bytes", "rig=demo"): 5e9,
+    }  # fmt: skip
+
+
+def test_numbers_are_taken_once_a_second(read, port):
+    key = ("abs_count_total", "component=capture", "name=frames", "rig=demo")
+    with metrics.served(port) as update:
+        update(view(counters={"frames": 1}))
+        update(view(NOW_NS + S // 2, counters={"frames": 2}))
+        assert read()[key] == 1
+        update(view(NOW_NS + S, counters={"frames": 3}))
+        assert read()[key] == 3
+
+
+def test_only_loopback_is_answered_and_nobody_after_the_end(read, port):
+    with metrics.served(port):
+        assert read() == {}
+        # An address of this host which a server for all addresses would answer.
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(("127.0.0.2", port), 5)
+    with pytest.raises(urllib.error.URLError):
+        read()
+
+
+def test_a_port_in_use_is_named(read, port):
+    with (
+        metrics.served(port),
+        pytest.raises(metrics.MetricsError, match=rf"run.metrics_port = {port}: Address already"),
+        metrics.served(port),
+    ):
+        pass
+
+
+def test_the_missing_extra_is_named(monkeypatch, port):
+    monkeypatch.setitem(sys.modules, "prometheus_client", None)
+    with pytest.raises(metrics.MetricsError, match=r"abs-service\[metrics\]"), metrics.served(port):
+        pass
+
+
+def test_none_by_default():
+    with metrics.served(0) as update:
+        update(view())
