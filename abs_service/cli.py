@@ -31,7 +31,7 @@ COMMANDS = {
     "calibrate": "calibrate intrinsics, extrinsics and noise of a rig's sensors",
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
     "import": "turn a folder of images into a recording",
-    "export": "copy a recording with raw images, which viewers show",
+    "export": "write a recording for viewers, or its estimates as CSV, NPZ, OBJ or PLY",
     "recover": "recover truncated or damaged recordings",
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",

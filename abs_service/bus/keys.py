@@ -41,6 +41,11 @@ def info(image_topic: str) -> str:
     return image_topic.removesuffix("image") + "info"
 
 
+def points(image_topic: str) -> str:
+    """Topic of the foxglove.PointCloud of a stream's depth images."""
+    return image_topic.removesuffix("image") + "points"
+
+
 def calibration(sensor: str) -> str:
     """Topic of a sensor's foxglove.CameraCalibration."""
     return f"{sensor}/calibration"
@@ -64,6 +69,11 @@ def state(tracker: str) -> str:
 def mesh(tracker: str) -> str:
     """Topic of a tracker's deformed vertices."""
     return f"{tracker}/mesh"
+
+
+def scene(tracker: str) -> str:
+    """Topic of a tracker's mesh as a foxglove.SceneUpdate."""
+    return f"{tracker}/scene"
 
 
 def topology(tracker: str) -> str:

@@ -19,13 +19,14 @@ from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.capture.device_supervisor import DeviceSupervisor
+from abs_service.capture.point_clouds import PointCloudPublisher
 from abs_service.commands.parts import rig_devices, rig_process
 from abs_service.config import plugins
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.message_header import CALIBRATION, CONFIG, MODEL, TRANSFORMS
 from calib.camera import Camera
-from drivers.contract.device import AddressError, Device
+from drivers.contract.device import AddressError, Device, Sink
 from drivers.opening import open_device
 
 #: Time that the devices have to close [s].
@@ -51,16 +52,21 @@ def run(arguments: argparse.Namespace) -> int:
             clock_offsets.answer(bus, headers)
         metadata = MetadataPublisher(bus, headers, rig)
         publishers = {name: FramePublisher(bus, headers, name) for name in rig.devices}
+        view_hz = {name: table.view_hz for name, table in rig.sensors.items()}
+        points = {
+            name: PointCloudPublisher(bus, clock, view_hz, metadata.camera, publisher)
+            for name, publisher in publishers.items()
+        }
         source = str(arguments.config or "demo.toml")
-        supervisors = [_supervisor(name, rig, source, metadata, publishers[name], health) for name in rig.devices]
+        supervisors = [_supervisor(name, rig, source, metadata, points[name], health) for name in rig.devices]
         for supervisor in supervisors:
             supervisor.start()
-        _watch(stop, supervisors, lambda: tick(metadata, publishers, health, clock))
+        _watch(stop, supervisors, lambda: tick(metadata, publishers, points, health, clock))
         for supervisor in supervisors:
             supervisor.close(CLOSE_S)
-        for publisher in publishers.values():
+        for publisher in (*publishers.values(), *points.values()):
             publisher.close()
-        _count(publishers, health)
+        _count(publishers, points, health)
         health.publish()
     errors = [supervisor.fatal_error for supervisor in supervisors if supervisor.fatal_error]
     if any(isinstance(error, AddressError) for error in errors):
@@ -75,7 +81,7 @@ def _supervisor(
     rig: config.ServiceConfig,
     source: str,
     metadata: "MetadataPublisher",
-    publisher: FramePublisher,
+    sink: Sink,
     health: Health,
 ) -> DeviceSupervisor:
     def on_open(device: Device) -> None:
@@ -88,7 +94,7 @@ def _supervisor(
         rig.devices[name].uri,
         lambda uri: open_device(uri, time.monotonic_ns),
         on_open,
-        publisher,
+        sink,
         rig.heads(name),
         health,
         time.monotonic_ns,
@@ -105,7 +111,11 @@ def _watch(stop: threading.Event, supervisors: list[DeviceSupervisor], tick: Cal
 
 
 def tick(
-    metadata: "MetadataPublisher", publishers: Mapping[str, FramePublisher], health: Health, clock: WallClock
+    metadata: "MetadataPublisher",
+    publishers: Mapping[str, FramePublisher],
+    points: Mapping[str, PointCloudPublisher],
+    health: Health,
+    clock: WallClock,
 ) -> None:
     """Once a second: follows the wall clock, publishes new metadata and the health."""
     if not health.due():
@@ -117,12 +127,14 @@ def tick(
         health.report("clock", Level.WARNING, f"the wall clock was set by {change_ns / 1e9:+.3f} s; stamps follow it")
     else:
         health.report("clock", Level.OK)
-    _count(publishers, health)
+    _count(publishers, points, health)
     metadata.publish()
     health.tick()
 
 
-def _count(publishers: Mapping[str, FramePublisher], health: Health) -> None:
+def _count(publishers: Mapping[str, FramePublisher], points: Mapping[str, PointCloudPublisher], health: Health) -> None:
+    for clouds in points.values():
+        health.count_up_to(clouds.dropped, "dropped.")
     for publisher in publishers.values():
         health.count_up_to(publisher.dropped, "dropped.")
         health.count_up_to(publisher.published, "published.")
@@ -159,6 +171,11 @@ class MetadataPublisher:
         with self._lock:
             self._cameras |= cameras
         self.publish()
+
+    def camera(self, sensor: str) -> Camera:
+        """Camera of a sensor whose device was opened."""
+        with self._lock:
+            return self._cameras[sensor]
 
     def publish(self) -> None:
         """Publishes all metadata, stamped now."""

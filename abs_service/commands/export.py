@@ -1,40 +1,110 @@
-"""Copies a recording with its images as they were published, for Foxglove, Rerun and other programs.
+"""Writes a recording in the format of another program, chosen by the suffix of --out.
 
-  abs-service export recordings/x.mcap                  writes recordings/x_raw.mcap
-  abs-service export recordings/x.mcap --out other.mcap
+  abs-service export recordings/x.mcap                         x_view.mcap, for Foxglove, Lichtblick and Rerun
+  abs-service export recordings/x.mcap --out x.csv             Θ, σ and status, one row for each estimate
+  abs-service export recordings/x.mcap --out x.npz             times, Θ, vertices, covariances, faces for NumPy
+  abs-service export recordings/x.mcap --out meshes/sheet.ply  one mesh for each estimate, or .obj
 
-With `record.depth_codec` or `record.color_codec` = "lossless", a recording holds images in fewer bytes, which
-abs-service reads and viewers do not.
+A copy for viewers has depth in metres along the optical axis, meshes as foxglove.SceneUpdate and points as
+foxglove.PointCloud; images of every codec become raw ones. To track again, `replay` the recording itself.
 """
 
 import argparse
 import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
-from abs_service.recording.export import ExportError, export
+from abs_service.api.errors import ArgumentError
+from abs_service.api.estimate import Estimate
+from abs_service.api.recording import Recording
+from abs_service.commands.parts.progress import bars
+from abs_service.export import arrays, series, table, viewers
+from abs_service.export.errors import ExportError
 from abs_service.supervision.exit_codes import Exit
+from abs_service.wire.estimate_messages import STATE
+from drivers.replay.contents import scan
+
+#: Rate of the meshes and points for viewers [Hz].
+VIEW_HZ = 5.0
+
+_WRITERS: Mapping[str, Callable[[Iterable[Estimate], Path], int]] = {
+    ".csv": table.write,
+    ".npz": arrays.write,
+    ".obj": series.write,
+    ".ply": series.write,
+}
+#: Formats of several files, whose folder is the output.
+_SERIES = (".obj", ".ply")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the arguments of `abs-service export`."""
-    parser.add_argument("recording", metavar="FILE.mcap", type=Path, help="a recording")
-    parser.add_argument("--out", metavar="FILE.mcap", type=Path, help="the copy (default: FILE_raw.mcap beside it)")
+    parser.add_argument("recording", metavar="FILE.mcap", type=Path, help="a recording, or what `replay` wrote")
+    parser.add_argument("--out", metavar="PATH", type=Path, help="what to write (default: FILE_view.mcap beside it)")
+    parser.add_argument("--tracker", metavar="NAME", default="", help="whose estimates, if there are several")
+    parser.add_argument(
+        "--view-hz",
+        metavar="HZ",
+        type=float,
+        default=VIEW_HZ,
+        help=f"largest rate of meshes and points for viewers (default: {VIEW_HZ:g}; 0: none)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Copies one recording."""
+    """Exports one recording."""
     source: Path = arguments.recording
-    path: Path = arguments.out or source.with_name(f"{source.stem}_raw.mcap")
+    path: Path = arguments.out or source.with_name(f"{source.stem}_view.mcap")
+    if path.suffix not in (".mcap", *_WRITERS):
+        raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join(_WRITERS)}")
+    if not 0 <= arguments.view_hz <= 1000:
+        raise ExportError(f"--view-hz {arguments.view_hz:g}: must be 0 to 1000")
     if path.exists():
         raise ExportError(f"{path} is there already; name another file with --out")
-    active = path.with_name(f"{path.name}.active")
     try:
-        with active.open("xb") as target:
-            count = export(source, target)
-        os.replace(active, path)
+        if path.suffix in _SERIES:
+            print(f"{path.parent}: {_write_estimates(source, arguments.tracker, path.suffix, path)}")
+            return Exit.OK
+        active = path.with_name(f"{path.name}.active")
+        try:
+            if path.suffix == ".mcap":
+                done = _write_view(source, arguments.view_hz, active)
+            else:
+                done = _write_estimates(source, arguments.tracker, path.suffix, active)
+            os.replace(active, path)
+        finally:
+            active.unlink(missing_ok=True)
     except OSError as error:
         raise ExportError(f"{error.filename or path}: {error.strerror}") from None
-    finally:
-        active.unlink(missing_ok=True)
-    print(f"{path}: {count} messages, {path.stat().st_size / 1e6:.1f} MB")
+    print(f"{path}: {done}, {path.stat().st_size / 1e6:.1f} MB")
     return Exit.OK
+
+
+def _write_view(source: Path, view_hz: float, path: Path) -> str:
+    contents = scan(source)
+    total = sum(topic.count for topic in contents.topics.values())
+    with path.open("xb") as target, bars() as progress:
+        task = progress.add_task("messages", total=total)
+        written, notes = viewers.export(source, contents, target, view_hz, lambda: progress.advance(task))
+    for note in notes:
+        print(f"abs-service: note: {note}", file=sys.stderr)
+    return f"{written} messages"
+
+
+def _write_estimates(source: Path, tracker: str, suffix: str, path: Path) -> str:
+    recording = Recording(source)
+    if recording.truncated:
+        print(
+            f"abs-service: note: {source} was never finished; what follows is up to where it breaks off",
+            file=sys.stderr,
+        )
+    try:
+        estimates = recording.estimates(tracker)
+    except ArgumentError as error:
+        raise ExportError(f"{error}; `abs-service replay` makes estimates") from None
+    name = tracker or recording.trackers[0]
+    counts = {topic.name.split("/")[1]: topic.count for topic in scan(source).topics.values() if topic.schema == STATE}
+    with bars() as progress:
+        written = _WRITERS[suffix](progress.track(estimates, counts[name], description="estimates"), path)
+    return f"{written} estimates of {name}"

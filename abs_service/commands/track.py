@@ -24,7 +24,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
-from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
+from abs_service.tracking.estimate_publisher import EstimatePublisher
+from abs_service.tracking.live_tracker import FrameSetQueue, LiveTracker
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession, streams
@@ -111,7 +112,9 @@ def _live(
     return LiveTracker(
         tracking,
         FrameSetQueue(frames, synchroniser, time.monotonic_ns),
-        EstimatePublisher(bus, headers, name, wiring.model_name(settings, name), rig.calib_id),
+        EstimatePublisher(
+            bus, headers, name, wiring.model_name(settings, name), rig.calib_id, settings.trackers[name].view_hz
+        ),
         health,
         NoiseMonitor(health),
         time.monotonic_ns,

@@ -12,6 +12,7 @@ from abs_service.config.table import Table
 from abs_service.config.values import DeviceUri, Endpoint, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Rate = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
 
 
 class BusTable(Table):
@@ -52,6 +53,7 @@ class SensorTable(Table):
         range_m: measuring range of a depth sensor [m]; without it, the objective's `range_m` counts.
         no_return: probability that a depth sensor has no return from a surface.
         depth: systematic error of its distances.
+        view_hz: rate of the points that are published of a depth sensor for viewers [Hz]; 0 for none.
         time_offset_ms: offset that is added to the times of its exposures to agree with the other sensors' [ms].
     """
 
@@ -64,6 +66,7 @@ class SensorTable(Table):
     range_m: Positive | None = None
     no_return: Annotated[Any, SettingsOf("calib.no_return")] = Field(default={})
     depth: DepthTable = DepthTable()
+    view_hz: Rate = 0.0
     time_offset_ms: FiniteFloat = 0.0
 
 
@@ -108,6 +111,7 @@ class TrackerTable(Table):
         optimizer: search for the deformation of least cost.
         budget_ms: time that the live search may take per frame set [ms]; replay does not look at the clock.
         budget_evaluations: number of candidates whose cost a search may compute per frame set, live and in replay.
+        view_hz: rate of the meshes that are published for viewers, as triangles with colours [Hz]; 0 for none.
     """
 
     sensors: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -125,6 +129,7 @@ class TrackerTable(Table):
     optimizer: Annotated[Any, Plugin("abs_service.tracker.optimizers")] = Field(default={"type": "hybrid"})
     budget_ms: Positive = 24.0
     budget_evaluations: Annotated[int, Field(ge=1)] = 100_000
+    view_hz: Rate = 0.0
 
 
 class RecordTable(Table):

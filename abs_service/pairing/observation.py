@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 from abs_service.pairing.images import Image
+from calib.camera import Camera
+from drivers.contract.frame import Frame
 
 
 class ObservationError(ValueError):
@@ -35,3 +37,17 @@ class Observation:
     images: dict[str, Image]
     sources: dict[str, Source]
     missing: tuple[str, ...]
+
+
+def check_size(frame: Frame, camera: Camera) -> None:
+    """Refuses a frame of another size than the images of its sensor's camera.
+
+    Raises:
+        ObservationError: names both sizes.
+    """
+    height, width = frame.data.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise ObservationError(
+            f"{frame.sensor}/{frame.stream} is {width} × {height} pixels, but the camera model of "
+            f"sensors.{frame.sensor} is for {camera.width} × {camera.height}"
+        )

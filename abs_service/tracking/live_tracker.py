@@ -4,22 +4,17 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from statistics import median
 
-from absmsg.v1.common_pb2 import Header
-
-from abs_service.bus import keys
 from abs_service.bus.clock_offsets import ClockOffsets, Offset
-from abs_service.bus.contract import MESH, STATE, Bus
 from abs_service.bus.frames import DEPTH, FrameSubscriber
 from abs_service.bus.health import Health, Level
-from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracking.estimate_publisher import EstimatePublisher
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.monitors.silence_monitor import SilenceMonitor
 from abs_service.tracking.session import TrackingSession
-from abs_service.wire import estimate_messages
-from abs_service.wire.estimate_messages import Effort, Identity
+from abs_service.wire.estimate_messages import Effort
 from drivers.contract.frame import FrameSet
 
 #: Timeout of the wait for a frame [s]; bounds the reaction time to a stop request.
@@ -106,41 +101,6 @@ class FrameSetQueue:
             return False
         interval_ns = (self._waiting[-1].stamp_ns - self._waiting[0].stamp_ns) / (len(self._waiting) - 1)
         return median(self._durations_ns) < interval_ns
-
-
-class EstimatePublisher:
-    """Publishes the estimates of one tracker, its meshes, and each new mesh's topology."""
-
-    def __init__(self, bus: Bus, headers: HeaderFactory, tracker: str, model: str, calib_id: str):
-        self._headers = headers
-        self._state = bus.publisher(keys.state(tracker), estimate_messages.STATE, STATE)
-        self._mesh = bus.publisher(keys.mesh(tracker), estimate_messages.MESH, MESH)
-        self._topology = bus.latched_publisher(keys.topology(tracker), estimate_messages.TOPOLOGY)
-        self._identity = Identity(tracker, model, "", calib_id, 0)
-        self._seq = 0
-
-    def publish(
-        self, estimate: Estimate, tracking: TrackingSession, effort: Effort, host_clock: str, offset: Offset
-    ) -> None:
-        """Publishes an estimate, after the topology of its mesh if that is new.
-
-        Args:
-            estimate, tracking, effort: what is published.
-            host_clock: which clock the frames' times are of.
-            offset: of that clock; stamps need it.
-        """
-        if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
-            self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
-            # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
-            header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
-            self._topology.put(estimate_messages.topology(header, tracking.mesh, self._identity).SerializeToString())
-        header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
-        self._state.put(estimate_messages.state(header, estimate, self._identity, effort).SerializeToString())
-        self._mesh.put(estimate_messages.mesh(header, estimate, self._identity).SerializeToString())
-        self._seq += 1
-
-    def _header(self, t_host_ns: int, host_clock: str, offset: Offset, seq: int) -> Header:
-        return self._headers.elsewhere(t_host_ns, host_clock, t_host_ns + offset.ns, seq, keys.RIG_FRAME)
 
 
 class LiveTracker:

@@ -1,9 +1,8 @@
 """Observations from frame sets: every sensor's frames are decoded as its kind of measurement says."""
 
 from abs_service.pairing.images import Image
-from abs_service.pairing.observation import Observation, ObservationError, Source
+from abs_service.pairing.observation import Observation, Source, check_size
 from abs_service.tracker.measurements import measurement
-from calib.camera import Camera
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 
@@ -28,7 +27,7 @@ class Observer:
         for name, sensor in self._rig.sensors.items():
             members = {frame.kind: frame for frame in frames.frames.values() if frame.sensor == sensor.head}
             for frame in members.values():
-                _check_size(frame, sensor.camera)
+                check_size(frame, sensor.camera)
             needed = self._needed[name]
             if members.keys() >= set(needed):
                 images[name] = self._decoders[name](members)
@@ -39,12 +38,3 @@ class Observer:
 
 def _source(frame: Frame) -> Source:
     return Source(frame.seq, frame.t_host_ns, frame.t_sigma_ns)
-
-
-def _check_size(frame: Frame, camera: Camera) -> None:
-    height, width = frame.data.shape[:2]
-    if (width, height) != (camera.width, camera.height):
-        raise ObservationError(
-            f"{frame.sensor}/{frame.stream} is {width} × {height} pixels, but the camera model of "
-            f"sensors.{frame.sensor} is for {camera.width} × {camera.height}"
-        )

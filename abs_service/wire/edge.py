@@ -15,7 +15,13 @@ from absmsg.v1 import (
     sensor_model_pb2,
     surface_truth_pb2,
 )
-from foxglove_schemas_protobuf import CameraCalibration_pb2, FrameTransforms_pb2, RawImage_pb2
+from foxglove_schemas_protobuf import (
+    CameraCalibration_pb2,
+    FrameTransforms_pb2,
+    PointCloud_pb2,
+    RawImage_pb2,
+    SceneUpdate_pb2,
+)
 from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import Message
 
@@ -142,6 +148,8 @@ SCHEMAS: Mapping[str, type[Message]] = {
         surface_truth_pb2.SurfaceTruth,
         CameraCalibration_pb2.CameraCalibration,
         FrameTransforms_pb2.FrameTransforms,
+        SceneUpdate_pb2.SceneUpdate,
+        PointCloud_pb2.PointCloud,
         common_pb2.Header,
         command_pb2.Reinitialize,
         command_pb2.CommandAnswer,

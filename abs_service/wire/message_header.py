@@ -12,7 +12,13 @@ from absmsg.v1 import (
     sensor_model_pb2,
     surface_truth_pb2,
 )
-from foxglove_schemas_protobuf import CameraCalibration_pb2, FrameTransforms_pb2, RawImage_pb2
+from foxglove_schemas_protobuf import (
+    CameraCalibration_pb2,
+    FrameTransforms_pb2,
+    PointCloud_pb2,
+    RawImage_pb2,
+    SceneUpdate_pb2,
+)
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -51,7 +57,7 @@ def _of_header(message: Any) -> MessageHeader:
     return MessageHeader(_ns(message.header.stamp), message.header.seq)
 
 
-def _of_calibration(message: Any) -> MessageHeader:
+def _of_timestamp(message: Any) -> MessageHeader:
     return MessageHeader(_ns(message.timestamp), 0)
 
 
@@ -60,13 +66,20 @@ def _of_transforms(message: Any) -> MessageHeader:
     return MessageHeader(max(stamps, default=0), 0)
 
 
+def _of_scene(message: Any) -> MessageHeader:
+    stamps = [_ns(part.timestamp) for part in (*message.entities, *message.deletions)]
+    return MessageHeader(max(stamps, default=0), 0)
+
+
 _PARSERS: Mapping[str, tuple[type[Message], Callable[[Any], MessageHeader]]] = {
     **{message.DESCRIPTOR.full_name: (message, _of_header) for message in _WITH_HEADER},
     CameraCalibration_pb2.CameraCalibration.DESCRIPTOR.full_name: (
         CameraCalibration_pb2.CameraCalibration,
-        _of_calibration,
+        _of_timestamp,
     ),
     FrameTransforms_pb2.FrameTransforms.DESCRIPTOR.full_name: (FrameTransforms_pb2.FrameTransforms, _of_transforms),
+    PointCloud_pb2.PointCloud.DESCRIPTOR.full_name: (PointCloud_pb2.PointCloud, _of_timestamp),
+    SceneUpdate_pb2.SceneUpdate.DESCRIPTOR.full_name: (SceneUpdate_pb2.SceneUpdate, _of_scene),
 }
 
 IMAGE = RawImage_pb2.RawImage.DESCRIPTOR.full_name
@@ -74,6 +87,8 @@ INFO = frame_info_pb2.FrameInfo.DESCRIPTOR.full_name
 
 CALIBRATION = CameraCalibration_pb2.CameraCalibration.DESCRIPTOR.full_name
 TRANSFORMS = FrameTransforms_pb2.FrameTransforms.DESCRIPTOR.full_name
+POINTS = PointCloud_pb2.PointCloud.DESCRIPTOR.full_name
+SCENE = SceneUpdate_pb2.SceneUpdate.DESCRIPTOR.full_name
 MODEL = sensor_model_pb2.SensorModel.DESCRIPTOR.full_name
 CONFIG = sensor_model_pb2.Config.DESCRIPTOR.full_name
 TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name

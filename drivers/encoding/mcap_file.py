@@ -19,7 +19,9 @@ from foxglove_schemas_protobuf import (  # noqa: F401
     CameraCalibration_pb2,
     CompressedImage_pb2,
     FrameTransforms_pb2,
+    PointCloud_pb2,
     RawImage_pb2,
+    SceneUpdate_pb2,
 )
 from google.protobuf import descriptor_pool
 from google.protobuf.descriptor import FileDescriptor

@@ -24,7 +24,7 @@ LARGEST, LARGEST_IMAGE = 1 << 24, 1 << 28
 LONGEST_FILE = 1 << 20
 #: Most entries of a map, and most texts or messages in a list.
 MOST_ENTRIES = 2000
-#: Most points of a truth: each of its surfaces is searched for the vertices of every estimate.
+#: Most points of a truth, whose surfaces are searched for the vertices of every estimate, or of a mesh for viewers.
 MOST_POINTS = 1 << 18
 #: Largest image [pixels along a side].
 LARGEST_SIDE = 1 << 14
@@ -49,6 +49,9 @@ _RANGES: Mapping[str, tuple[int, int]] = {
     "foxglove.RawImage.width": (0, LARGEST_SIDE),
     "foxglove.RawImage.height": (0, LARGEST_SIDE),
 }
+
+#: Lists of which only the length is checked: points and colours that nobody but a viewer reads.
+_VIEWED = frozenset(f"foxglove.TriangleListPrimitive.{name}" for name in ("points", "colors"))
 
 #: Numbers that are used without a look: neither NaN nor infinite. Of others, NaN and infinity mean unknown.
 _FINITE = frozenset(
@@ -122,6 +125,8 @@ def _check_fields(message: Message) -> None:
             entry = field.message_type.fields_by_name
             _check_values(entry["key"], value)
             _check_values(entry["value"], value.values())
+        elif name in _VIEWED:
+            _check_count(name, len(value), MOST_POINTS)
         elif field.is_repeated:
             if field.cpp_type in (FieldDescriptor.CPPTYPE_MESSAGE, FieldDescriptor.CPPTYPE_STRING):
                 _check_count(name, len(value))
@@ -157,9 +162,9 @@ def _require_all(name: str, values: Iterable[Any], holds: Callable[[Any], bool],
         raise MessageError(cause, f"{name} = {odd} {rule}")
 
 
-def _check_count(name: str, number: int) -> None:
-    if number > MOST_ENTRIES:
-        raise MessageError("size", f"{name} has {number} entries, {MOST_ENTRIES} are allowed")
+def _check_count(name: str, number: int, most: int = MOST_ENTRIES) -> None:
+    if number > most:
+        raise MessageError("size", f"{name} has {number} entries, {most} are allowed")
 
 
 def _require(holds: bool, reason: str) -> None:

@@ -1,6 +1,6 @@
 """Recordings of any simulated rig, written without processes and clocks."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
@@ -37,6 +37,7 @@ def write_take(
     toml: str = "",
     finish: bool = True,
     encode_image: ImageEncoder = unchanged,
+    add: Callable[[McapFile, int], None] = lambda file, k: None,
 ) -> Path:
     """Records exposures of a simulation.
 
@@ -48,6 +49,7 @@ def write_take(
         toml: configuration of the rig; none is attached if it is empty.
         finish: whether the recording ends as it should.
         encode_image: as the recorder's.
+        add: writes more after each exposure.
     """
     with path.open("wb") as stream:
         file = McapFile(stream, chunk_size=400_000)
@@ -62,6 +64,7 @@ def write_take(
             for frame in frames:
                 if frame.sensor in names:
                     _write_frame(file, replace(frame, sensor=names[frame.sensor]), encode_image)
+            add(file, k)
         file.finish() if finish else file.flush()
     return path
 

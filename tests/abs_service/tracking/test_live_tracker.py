@@ -8,6 +8,7 @@ import pytest
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh, MeshTopology
 from absmsg.v1.health_pb2 import Health as Message
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from abs_service.bus import keys
 from abs_service.bus.clock_offsets import ClockOffsets, answer
@@ -18,7 +19,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.regions import box
 from abs_service.tracker.optimizers import cma
-from abs_service.tracking.live_tracker import EstimatePublisher, FrameSetQueue, LiveTracker
+from abs_service.tracking.estimate_publisher import EstimatePublisher
+from abs_service.tracking.live_tracker import FrameSetQueue, LiveTracker
 from abs_service.tracking.monitors.noise_monitor import NoiseMonitor
 from abs_service.tracking.session import TrackingSession, streams
 from drivers.contract.frame import Kind
@@ -34,7 +36,7 @@ MEMBERS = streams(RIG.sensors.values())
 class Bench:
     """A live tracker on a loopback bus with a clock that only the test moves."""
 
-    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, **parts):
+    def __init__(self, budget_ms=1e6, tolerance_ns=12_000_000, view_hz=0.0, **parts):
         self.now_ns = self.tick_ns = 0
         self.bus = LoopbackBus()
         self.wall = WallClock(monotonic=lambda: self.now_ns, wall=lambda: self.now_ns + 10**18)
@@ -47,7 +49,7 @@ class Bench:
         self.live = LiveTracker(
             self.tracking,
             self.sets,
-            EstimatePublisher(self.bus, self.headers, "sheet", "nurbs", RIG.calib_id),
+            EstimatePublisher(self.bus, self.headers, "sheet", "nurbs", RIG.calib_id, view_hz),
             self.health,
             NoiseMonitor(self.health),
             self.clock,
@@ -395,3 +397,16 @@ def test_on_one_host_the_age_has_no_error(bench):
     bench.expose(0)
     bench.live.process_next()
     assert bench.states[0].age_error_ms == 0
+
+
+def test_viewers_get_scenes_at_their_own_rate():
+    bench = Bench(view_hz=1e9 / (2 * (SIMULATION.time_ns(1) - SIMULATION.time_ns(0))))
+    for k in range(4):
+        bench.expose(k)
+        bench.live.process_next()
+    scenes, meshes = bench.sent("sheet/scene", SceneUpdate), bench.sent("sheet/mesh", DeformedMesh)
+    assert len(scenes) == 2
+    points = scenes[1].entities[0].triangles[0].points
+    np.testing.assert_array_equal(
+        [(one.x, one.y, one.z) for one in points], np.frombuffer(meshes[2].vertices_f32, "<f4").reshape(-1, 3)
+    )

@@ -20,11 +20,15 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.wire.checked_bus import CheckedBus
 from abs_service.wire.edge import MOST_PER_S, MOST_TOPICS, Edge
+from abs_service.wire.viewer_messages import point_cloud, scene_update
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.wire.golden.freeze import BINARY, published
 from tests.abs_service.wire.hostile import INFO, MODEL, VALID, samples
 
 S = 1_000_000_000
+
+SHEET = DeformedMesh(tracker="sheet", vertices_f32=np.ones((3000, 3), "<f4").tobytes())
+FLAT = MeshTopology(tracker="sheet", faces_u32=np.array([[0, 1, 2]], "<u4").tobytes())
 
 
 def sample(topic, message, attachment=None):
@@ -53,6 +57,8 @@ def image(attachment=None, width=2):
         sample("sheet/state", DeformationState(tracker="sheet", age_ms=math.nan, log_likelihood=-math.inf)),
         sample("config", Config(toml="x" * 100_000)),
         sample("clock/there", Header(host_clock="there", t_host_ns=-5)),
+        sample("sheet/scene", scene_update(SHEET, FLAT, DeformationState.STATUS_LOST)),
+        sample("tof/depth/points", point_cloud("tof", 5, np.ones((3000, 3), np.float32))),
         Sample("schema", sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema()),
     ],
     ids=lambda good: good.topic,

@@ -1,0 +1,5 @@
+"""What is wrong with an export."""
+
+
+class ExportError(Exception):
+    """A recording that cannot be exported, or an output that cannot be written; names the file and the problem."""

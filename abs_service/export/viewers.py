@@ -1,0 +1,62 @@
+"""Copies of recordings that viewers show: images as they were published, depth in metres, meshes and points."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.reader import McapReader, make_reader
+
+from abs_service.export.errors import ExportError
+from abs_service.export.viewer_copy import ViewerCopy
+from calib.camera import Camera
+from drivers.encoding import codec
+from drivers.encoding.mcap_file import McapFile, McapFileError
+from drivers.replay import Recording
+from drivers.replay.contents import DAMAGE, Contents, RecordingError
+
+
+def export(
+    source: Path, contents: Contents, target: BinaryIO, view_hz: float, advance: Callable[[], None]
+) -> tuple[int, tuple[str, ...]]:
+    """Copies a recording for viewers; see `ViewerCopy`.
+
+    Args:
+        source: a finished recording.
+        contents: of it.
+        target: where the copy is written.
+        view_hz: largest rate of the meshes and points that are added [Hz]; 0 for none.
+        advance: called for each message that was read.
+
+    Returns:
+        Number of messages written, and what could not be converted.
+
+    Raises:
+        ExportError: the recording is damaged, unfinished, or holds what is no message of ours.
+        OSError: it cannot be read, or the copy cannot be written.
+    """
+    if contents.truncated:
+        raise ExportError(f"{source}: the recording was not finished; `abs-service recover` saves what it can")
+    with source.open("rb") as stream:
+        try:
+            copy = ViewerCopy(McapFile(target), _cameras(source), contents, view_hz)
+            _copy(make_reader(stream, validate_crcs=True), copy, advance)
+        except (*DAMAGE, codec.CodecError, McapFileError) as error:
+            raise ExportError(f"{source}: {error}; `abs-service recover` saves what it can") from error
+    return copy.written, copy.notes
+
+
+def _cameras(source: Path) -> Mapping[str, Camera]:
+    """Cameras by sensor; none in a file without images, as `abs-service replay` writes."""
+    try:
+        return Recording(source).cameras
+    except RecordingError:
+        return {}
+
+
+def _copy(reader: McapReader, copy: ViewerCopy, advance: Callable[[], None]) -> None:
+    for attachment in reader.iter_attachments():
+        copy.file.attach(attachment.name, attachment.media_type, attachment.data, attachment.log_time)
+    for schema, channel, message in reader.iter_messages(log_time_order=False):
+        copy.add(channel.topic, schema.name if schema else "", message)
+        advance()
+    copy.finish()

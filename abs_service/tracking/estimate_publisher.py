@@ -1,0 +1,66 @@
+"""Publishes what a tracker finds: estimates, meshes, their topologies, and scenes for viewers."""
+
+from absmsg.v1.common_pb2 import Header
+from absmsg.v1.deformed_mesh_pb2 import MeshTopology
+
+from abs_service.bus import keys
+from abs_service.bus.clock_offsets import Offset
+from abs_service.bus.contract import IMAGES, MESH, STATE, Bus
+from abs_service.bus.stamps import HeaderFactory
+from abs_service.tracker.estimate import Estimate
+from abs_service.tracking.session import TrackingSession
+from abs_service.wire import estimate_messages
+from abs_service.wire.estimate_messages import Effort, Identity
+from abs_service.wire.message_header import SCENE
+from abs_service.wire.viewer_messages import ViewRate, scene_update
+
+
+class EstimatePublisher:
+    """Publishes the estimates of one tracker, its meshes, and each new mesh's topology.
+
+    Args:
+        bus, headers: where, and what writes the headers.
+        tracker: its name.
+        model: type of its deformation model.
+        calib_id: hash of its rig's calibration.
+        view_hz: largest rate of the scenes [Hz]; 0 for none.
+    """
+
+    def __init__(self, bus: Bus, headers: HeaderFactory, tracker: str, model: str, calib_id: str, view_hz: float):
+        self._headers = headers
+        self._state = bus.publisher(keys.state(tracker), estimate_messages.STATE, STATE)
+        self._mesh = bus.publisher(keys.mesh(tracker), estimate_messages.MESH, MESH)
+        self._topology = bus.latched_publisher(keys.topology(tracker), estimate_messages.TOPOLOGY)
+        self._scene = bus.publisher(keys.scene(tracker), SCENE, IMAGES)
+        self._view_rate = ViewRate(view_hz)
+        self._topology_message = MeshTopology()
+        self._identity = Identity(tracker, model, "", calib_id, 0)
+        self._seq = 0
+
+    def publish(
+        self, estimate: Estimate, tracking: TrackingSession, effort: Effort, host_clock: str, offset: Offset
+    ) -> None:
+        """Publishes an estimate, after the topology of its mesh if that is new.
+
+        Args:
+            estimate, tracking, effort: what is published.
+            host_clock: which clock the frames' times are of.
+            offset: of that clock; stamps need it.
+        """
+        if tracking.mesh is not None and tracking.mesh_version != self._identity.mesh_version:
+            self._identity = estimate_messages.with_mesh(self._identity, tracking.mesh, tracking.mesh_version)
+            # Numbered by itself, or a recorder would take the estimates in between for topologies that it missed.
+            header = self._header(tracking.made_ns, host_clock, offset, tracking.mesh_version)
+            self._topology_message = estimate_messages.topology(header, tracking.mesh, self._identity)
+            self._topology.put(self._topology_message.SerializeToString())
+        header = self._header(estimate.t_host_ns, host_clock, offset, self._seq)
+        state = estimate_messages.state(header, estimate, self._identity, effort)
+        mesh = estimate_messages.mesh(header, estimate, self._identity)
+        self._state.put(state.SerializeToString())
+        self._mesh.put(mesh.SerializeToString())
+        if self._view_rate.due(estimate.t_host_ns):
+            self._scene.put(scene_update(mesh, self._topology_message, state.status).SerializeToString())
+        self._seq += 1
+
+    def _header(self, t_host_ns: int, host_clock: str, offset: Offset, seq: int) -> Header:
+        return self._headers.elsewhere(t_host_ns, host_clock, t_host_ns + offset.ns, seq, keys.RIG_FRAME)
