@@ -16,10 +16,13 @@ GHOST, CAMERA, POINT, CAMERA_M = (150, 160, 175), (80, 160, 220), (150, 175, 205
 STALE = (70, 70, 70)
 
 #: Diameter of a point, as a share of the distance between neighbours.
-POINT_SHARE = 0.15
+POINT_SHARE = 0.1
 
 #: Where the eye of the first view is, seen from the middle of the mesh, in units of the mesh's extent.
-EYE = np.array([0.75, -0.65, -1.5])
+EYE = np.array([0.65, -0.6, -1.4])
+
+#: Vertical field of view [rad].
+FOV = 0.75
 
 
 class Scene:
@@ -98,6 +101,7 @@ class Scene:
         """Aims the first view of every browser at the mesh, from behind the cameras."""
         middle = view.vertices.mean(axis=0)
         eye = middle + EYE * float(np.linalg.norm(np.ptp(view.vertices, axis=0)))
-        self._server.initial_camera.position, self._server.initial_camera.look_at = eye, middle
+        first = self._server.initial_camera
+        first.position, first.look_at, first.fov = eye, middle, FOV
         for client in self._server.get_clients().values():
-            client.camera.position, client.camera.look_at = eye, middle
+            client.camera.position, client.camera.look_at, client.camera.fov = eye, middle, FOV
