@@ -32,6 +32,7 @@ COMMANDS = {
     "stiffness": "bending stiffness of a strip that hangs from a gripper, from a recording",
     "import": "turn a folder of images into a recording",
     "export": "write a recording for viewers, or its estimates as CSV, NPZ, OBJ or PLY",
+    "info": "describe recordings: sensors, rates, gaps, losses, tracking, sizes",
     "recover": "recover truncated or damaged recordings",
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
