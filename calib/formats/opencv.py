@@ -4,6 +4,7 @@ One camera is at the top level (`camera_matrix`, `distortion_coefficients`, as i
 `M1, D1, M2, D2` with `R, T` (stereo_calib.cpp), several in a map each.
 """
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,6 +38,11 @@ FISHEYE_COEFFICIENTS = 4
 #: Names of a fisheye as `distortion_model`: ours, OpenCV's and those of ROS.
 FISHEYE_NAMES = (KannalaBrandt.name, "fisheye", "equidistant", "kannala_brandt", "kannala_brandt4")
 
+#: Most values in a file, and what begins one in which others may be: OpenCV's parser recurses, its stack ends beyond
+#: 20,000.
+MOST_NODES = 10_000
+_NESTING = re.compile(r"[\[{<:]|-(?![\d.])")
+
 _SIZES = ("img_size", "image_size", "imageSize", "size")
 _WIDTHS = ("image_width", "image_Width", "width")
 _HEIGHTS = ("image_height", "image_Height", "height")
@@ -52,6 +58,8 @@ def read(text: str, hints: Hints) -> Content:
     Raises:
         FormatError: no camera, or an image size that neither the text nor the hints contain.
     """
+    if len(_NESTING.findall(text)) > MOST_NODES:
+        raise FormatError(f"more than {MOST_NODES} values, which no calibration has")
     try:
         storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     except (cv2.error, SystemError) as error:  # a constructor's exception becomes the cause of a SystemError

@@ -11,11 +11,12 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from zstandard import ZstdError
 
 from drivers.contract.device import DeviceError
+from drivers.encoding import mcap_chunk
 
 #: Exceptions of the MCAP reader and its decompressors for truncated or corrupt bytes.
 DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)
@@ -84,7 +85,7 @@ def scan(path: Path) -> Contents:
 def read_chunk(stream: BinaryIO, place: ChunkLocation) -> list[McapRecord]:
     """The records of a chunk; raises one of `DAMAGE` if it is corrupt."""
     stream.seek(place.offset + _RECORD_HEADER)
-    return breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+    return mcap_chunk.records(Chunk.read(ReadDataStream(stream)))
 
 
 def _summary(path: Path, stream: BinaryIO) -> Summary | None:
@@ -130,7 +131,7 @@ def _scan_records(stream: BinaryIO) -> Contents:
         if not isinstance(record, Chunk):
             continue
         try:
-            contents = breakup_chunk(record, validate_crc=True)
+            contents = mcap_chunk.records(record)
         except DAMAGE:
             damaged += 1
             continue
