@@ -19,7 +19,10 @@ from drivers.contract.device import DeviceError
 from drivers.encoding import mcap_chunk
 
 #: Exceptions of the MCAP reader and its decompressors for truncated or corrupt bytes.
-DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)
+DAMAGE = (
+    *(McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error),
+    *(KeyError, MemoryError, OverflowError),  # a channel that is nowhere defined, a record that claims to be huge
+)
 
 #: Bytes of opcode and length before the content of a record.
 _RECORD_HEADER = 9
@@ -72,7 +75,7 @@ def scan(path: Path) -> Contents:
     """Reads the contents of a file, fast if it has an index.
 
     Raises:
-        RecordingError: the file cannot be read, or is not MCAP.
+        RecordingError: the file cannot be read, is not MCAP, or has a damaged attachment.
     """
     try:
         with path.open("rb") as stream:
@@ -80,6 +83,9 @@ def scan(path: Path) -> Contents:
             return _scan_records(stream) if summary is None else _from_index(summary, stream)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
+    except DAMAGE as error:
+        what = f"{path}: an attachment is damaged ({type(error).__name__} {error})"
+        raise RecordingError(f"{what}; `abs-service recover` saves the rest") from error
 
 
 def read_chunk(stream: BinaryIO, place: ChunkLocation) -> list[McapRecord]:
