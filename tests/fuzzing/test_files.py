@@ -145,7 +145,7 @@ def test_a_damaged_file_is_read_or_refused(target: Target, tmp_path: Path) -> No
         derandomize=not SECONDS,
         phases=[Phase.generate] if SECONDS else [Phase.generate, Phase.shrink],
         database=None,
-        suppress_health_check=list(HealthCheck),
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
     )
     @given(damaged(target.valid))
     def one(data: bytes) -> None:
