@@ -30,6 +30,7 @@ from abs_service.config import addresses, plugins
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem
 from abs_service.supervision.exit_codes import Exit, is_for_user
+from calib.files import limited
 from drivers.contract.capabilities import StreamInfo
 from drivers.replay import Recording
 
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
         preview_option.check(arguments.picture)
     try:
         rig = rig_process.load_config(arguments)
-        toml = arguments.config.read_text(encoding="utf-8") if arguments.config else ""
+        toml = limited.text(arguments.config) if arguments.config else ""
         found = describe(rig, str(arguments.config or "demo.toml"), toml, arguments.replay)
         written = _draw_previews(rig, arguments) if arguments.picture else []
     except (config.ConfigError, CheckError, HarmlessError, PictureOptionError) as error:

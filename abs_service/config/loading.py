@@ -1,7 +1,6 @@
 """TOML text to configuration and back."""
 
 import json
-import tomllib
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -15,9 +14,7 @@ from abs_service.config.errors import ConfigError, allowed_at, error_of
 from abs_service.config.merging import merge, without_calibrated
 from abs_service.config.problems import ProblemsError, from_pydantic
 from abs_service.config.tables import ServiceConfig
-
-#: Largest file of a configuration [bytes].
-LARGEST = 1 << 20
+from calib.files import limited, nested
 
 
 def load(path: Path) -> ServiceConfig:
@@ -27,11 +24,7 @@ def load(path: Path) -> ServiceConfig:
         ConfigError: the file cannot be read or used; names all that is wrong with it.
     """
     try:
-        with path.open("rb") as stream:
-            content = stream.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise ConfigError(f"{path}: larger than {LARGEST} bytes, which no rig file is")
-        text = content.decode("utf-8")
+        text = limited.text(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
@@ -57,11 +50,9 @@ def loads(text: str, source: str, base: Path) -> ServiceConfig:
         ConfigError: names all that is wrong.
     """
     try:
-        file = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        file = nested.toml(text)
+    except ValueError as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
-    except RecursionError:
-        raise ConfigError(f"{source}: its tables are nested too deeply") from None
     return from_tables(file, source, base, text)
 
 

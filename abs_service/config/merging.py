@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from pydantic import ValidationError
 from abs_service.config.calibration import SHARED, CalibratedSensor, CalibrationFile, CalibrationOrigin, SensorOrigin
 from abs_service.config.errors import ConfigError, allowed_at, error_of
 from abs_service.config.problems import Key, Problem, allowed_instead, dotted, from_pydantic
+from calib.files import limited, nested
 
 
 def load_calibration(path: Path) -> CalibrationFile:
@@ -66,7 +66,7 @@ def without_calibrated(problems: Iterable[Problem]) -> list[Problem]:
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return limited.read(path, limited.LARGEST_TEXT)
     except OSError as error:
         raise ConfigError(f"{path}: the calibration cannot be read: {error.strerror}") from None
 
@@ -75,7 +75,7 @@ def _parse(path: Path, content: bytes) -> CalibrationFile:
     text = ""
     try:
         text = content.decode("utf-8")
-        file = tomllib.loads(text)
+        file = nested.toml(text)
         # JSON in strict mode is TOML's own type system, as for the rig's own file.
         tables = json.dumps(file, default=str)
         return CalibrationFile.model_validate_json(tables, strict=True, context={"base": path.resolve().parent})

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.reader import McapReader, make_reader
+from mcap.reader import make_reader
+from mcap.records import Message
 
 from abs_service.export.errors import ExportError
 from abs_service.export.viewer_copy import ViewerCopy
@@ -12,7 +13,7 @@ from calib.camera import Camera
 from drivers.encoding import codec
 from drivers.encoding.mcap_file import McapFile, McapFileError
 from drivers.replay import Recording
-from drivers.replay.contents import DAMAGE, Contents, RecordingError
+from drivers.replay.contents import DAMAGE, Contents, RecordingError, read_chunk
 
 
 def export(
@@ -39,7 +40,7 @@ def export(
     with source.open("rb") as stream:
         try:
             copy = ViewerCopy(McapFile(target), _cameras(source), contents, view_hz)
-            _copy(make_reader(stream, validate_crcs=True), copy, advance)
+            _copy(stream, contents, copy, advance)
         except (*DAMAGE, codec.CodecError, McapFileError) as error:
             raise ExportError(f"{source}: {error}; `abs-service recover` saves what it can") from error
     return copy.written, copy.notes
@@ -53,10 +54,13 @@ def _cameras(source: Path) -> Mapping[str, Camera]:
         return {}
 
 
-def _copy(reader: McapReader, copy: ViewerCopy, advance: Callable[[], None]) -> None:
-    for attachment in reader.iter_attachments():
+def _copy(stream: BinaryIO, contents: Contents, copy: ViewerCopy, advance: Callable[[], None]) -> None:
+    for attachment in make_reader(stream).iter_attachments():
         copy.file.attach(attachment.name, attachment.media_type, attachment.data, attachment.log_time)
-    for schema, channel, message in reader.iter_messages(log_time_order=False):
-        copy.add(channel.topic, schema.name if schema else "", message)
-        advance()
+    for place in contents.chunks:
+        for record in read_chunk(stream, place):
+            if isinstance(record, Message):
+                topic = contents.topics[record.channel_id]
+                copy.add(topic.name, topic.schema, record)
+                advance()
     copy.finish()

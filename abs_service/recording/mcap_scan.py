@@ -8,16 +8,16 @@ from io import BytesIO
 
 from mcap.opcode import Opcode
 from mcap.records import Chunk, McapRecord
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
+
+from drivers.encoding import mcap_chunk
 
 _PREFIX = struct.Struct("<BQ")  # opcode, length of what follows
 _CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size and checksum, length of the compression's name
 _COMPRESSIONS = (b"", b"lz4", b"zstd")
 _OPCODES = frozenset(int(opcode) for opcode in Opcode)
 _COPIED = frozenset({Opcode.ATTACHMENT, Opcode.CHANNEL, Opcode.CHUNK, Opcode.MESSAGE, Opcode.METADATA, Opcode.SCHEMA})
-#: A chunk that claims to hold more is damaged [bytes].
-_LARGEST_CHUNK = 1 << 30
 
 
 Data = bytes | mmap.mmap
@@ -60,11 +60,8 @@ class RecordScanner:
 
     def open_chunk(self, chunk: Chunk) -> list[McapRecord]:
         """The records in a chunk; none, and counted, if the chunk is damaged."""
-        if chunk.uncompressed_size > _LARGEST_CHUNK:
-            self.damaged += 1
-            return []
         try:
-            return breakup_chunk(chunk, validate_crc=True)
+            return mcap_chunk.records(chunk)
         except Exception:  # whatever a decompressor or parser makes of damaged bytes
             self.damaged += 1
             return []

@@ -11,6 +11,7 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
+from calib.files import nested
 from calib.formats.content import (
     Content,
     FormatError,
@@ -42,7 +43,7 @@ def read(text: str, hints: Hints) -> Content:
         FormatError: invalid text, or a lens that cannot be expressed.
     """
     try:
-        eeprom = json.loads(text)
+        eeprom = nested.json(text)
         tables = {int(socket): table for socket, table in eeprom["cameraData"] if table.get("intrinsicMatrix")}
         links = {socket: _link(table["extrinsics"]) for socket, table in tables.items()}
         cameras: dict[str, Camera] = {}

@@ -11,6 +11,7 @@ import yaml
 
 from calib import pose
 from calib.camera import Camera
+from calib.files import nested
 from calib.formats.content import (
     Content,
     FormatError,
@@ -39,9 +40,9 @@ def read(text: str, hints: Hints) -> Content:
         FormatError: not a chain of pinhole cameras.
     """
     try:
-        chain = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise FormatError(f"not YAML: {error}") from error
+        chain = nested.yaml(text)
+    except ValueError as error:
+        raise FormatError(str(error)) from error
     tables = {key: chain[key] for key in _cams(chain)}
     if not tables:
         raise FormatError("no camera chain: cam0 is missing")

@@ -32,7 +32,7 @@ def read(text: str, hints: Hints) -> Content:
     """
     try:
         model: Any = ast.literal_eval(text.strip())
-    except (ValueError, SyntaxError, RecursionError) as error:
+    except (ValueError, SyntaxError, RecursionError, MemoryError) as error:
         raise FormatError(f"no camera model of mrcal: {error}") from error
     try:
         kind, intrinsics, size = (

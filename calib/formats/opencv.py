@@ -12,6 +12,7 @@ import numpy as np
 
 from calib import pose
 from calib.camera import Camera
+from calib.formats import file_storage
 from calib.formats.content import (
     Content,
     FormatError,
@@ -52,15 +53,7 @@ def read(text: str, hints: Hints) -> Content:
     Raises:
         FormatError: no camera, or an image size that neither the text nor the hints contain.
     """
-    try:
-        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-    except (cv2.error, SystemError) as error:  # a constructor's exception becomes the cause of a SystemError
-        raise FormatError("not a FileStorage of OpenCV: YAML whose first line is %YAML:1.0, XML or JSON") from error
-    try:
-        # The tree is freed with the storage, so it is copied to plain values first.
-        root = _plain(storage.root())
-    finally:
-        storage.release()
+    root = file_storage.parse(text)
     if not isinstance(root, dict):
         raise FormatError("an empty FileStorage")
     if "M1" in root and "M2" in root:
@@ -100,19 +93,6 @@ def write(cameras: Mapping[str, Camera], dialect: int = cv2.FILE_STORAGE_FORMAT_
         if len(cameras) > 1:
             storage.endWriteStruct()
     return Written(storage.releaseAndGetString())
-
-
-def _plain(node: Any) -> Any:
-    if node.isMap():
-        keys = node.keys()
-        if "data" in keys and "rows" in keys:
-            return node.mat()
-        return {key: _plain(node.getNode(key)) for key in keys}
-    if node.isSeq():
-        return [_plain(node.at(index)) for index in range(node.size())]
-    if node.isString():
-        return node.string()
-    return node.real() if node.isReal() or node.isInt() else None
 
 
 def _find(table: Mapping[str, Any], keys: tuple[str, ...]) -> Any:

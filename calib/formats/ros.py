@@ -7,6 +7,7 @@ import numpy as np
 import yaml
 
 from calib.camera import Camera
+from calib.files import nested
 from calib.formats.content import (
     Content,
     FormatError,
@@ -39,12 +40,13 @@ def read(text: str, hints: Hints) -> Content:
         FormatError: the text is not a CameraInfo.
     """
     try:
-        info = yaml.safe_load(text)
+        info = nested.yaml(text)
+    except ValueError as error:
+        raise FormatError(str(error)) from error
+    try:
         matrix = focal(_numbers(info["camera_matrix"], 9).reshape(3, 3))
         lens = _lens(info.get("distortion_model", "plumb_bob"), _numbers(info["distortion_coefficients"]))
         one = camera((info["image_width"], info["image_height"]), matrix, lens)
-    except yaml.YAMLError as error:
-        raise FormatError(f"not YAML: {error}") from error
     except KeyError as error:
         raise FormatError(f"{error.args[0]} is missing") from None
     except (TypeError, AttributeError) as error:

@@ -15,6 +15,7 @@ from calib.camera import Camera
 from drivers.azure import calibration
 from drivers.azure.calibration import CalibrationError
 from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.encoding import image_size
 from drivers.encoding.foreign_recording import ForeignRecordingError
 
 #: Sensor, stream and kind by the title of a track.
@@ -131,7 +132,8 @@ def color(encoding: str, content: bytes, camera: Camera) -> NDArray[np.generic]:
 
 
 def _jpeg(content: bytes, camera: Camera) -> Any:
-    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR) if content else None
+    image_size.check(content)
+    return cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
 
 
 def _nv12(content: bytes, camera: Camera) -> Any:

@@ -17,7 +17,8 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import NDArray
 
 from drivers.contract.frame import ENCODINGS
-from drivers.encoding import codec, pixel_filter, raw_image
+from drivers.encoding import codec, image_size, pixel_filter, raw_image
+from drivers.encoding.message_check import LARGEST_IMAGE
 from drivers.encoding.parsing import CodecError, parse_message, pixels_of, shape_of
 from drivers.encoding.pixel_filter import Filter, PixelFilterError, Predictor
 
@@ -29,9 +30,6 @@ SCHEMAS = frozenset({codec.IMAGE_SCHEMA, ENCODED_SCHEMA, JPEG_SCHEMA})
 
 #: Quality of JPEG images, of 100.
 QUALITY = 95
-
-#: A larger image is damaged [bytes].
-_LARGEST = 1 << 30
 
 #: From a serialized foxglove.RawImage to the full name of a message and that message.
 ImageEncoder = Callable[[bytes], tuple[str, bytes]]
@@ -143,7 +141,7 @@ def _pixels(message: EncodedImage) -> NDArray[Any]:
     if message.encoding not in ENCODINGS:
         raise CodecError(f"{name}: encoding {message.encoding!r} is none of {sorted(ENCODINGS)}")
     dtype, shape = ENCODINGS[message.encoding][0], shape_of(message)
-    if not 0 < math.prod(shape) * dtype.itemsize <= _LARGEST:
+    if not 0 < math.prod(shape) * dtype.itemsize <= LARGEST_IMAGE:
         raise CodecError(f"{name}: an image of {message.width} × {message.height} pixels is empty or too large")
     chosen = Filter(Predictor(message.predictor), message.green_subtracted)
     try:
@@ -169,7 +167,12 @@ def _jpeg(picture: RawImage) -> CompressedImage:
 
 def _of_jpeg(message: CompressedImage) -> bytes:
     """The serialized RawImage of a colour image, whatever the order of the channels was."""
-    pixels = cv2.imdecode(np.frombuffer(message.data, "u1"), cv2.IMREAD_COLOR_RGB) if message.data else None
+    try:
+        image_size.check(message.data)
+        pixels = cv2.imdecode(np.frombuffer(message.data, "u1"), cv2.IMREAD_COLOR_RGB)
+    except (image_size.ImageSizeError, cv2.error) as error:
+        kind = message.format or "compressed"
+        raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {kind} image: {error}") from error
     if pixels is None:
         raise CodecError(f"{message.frame_id}: {len(message.data)} bytes are no {message.format or 'compressed'} image")
     height, width = pixels.shape[:2]

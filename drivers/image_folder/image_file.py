@@ -7,8 +7,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.files import limited
+from drivers.encoding import image_size
 from drivers.image_folder.listing import ImageFolderError
 
+#: Largest file [bytes].
+LARGEST = 1 << 28
 #: First bytes of a format, what its last part begins with, and what ends it: decoders make up what is missing.
 _ENDS = ((b"\x89PNG", b"IDAT", b"IEND"), (b"\xff\xd8", b"\xff\xda", b"\xff\xd9"))
 #: Formats that can be read, for messages.
@@ -22,13 +26,19 @@ def read(path: Path) -> NDArray[Any]:
         ImageFolderError: it is no image, or a part of it is missing; names the file.
     """
     try:
-        content = path.read_bytes()
+        content = limited.read(path, LARGEST)
     except OSError as error:
         raise ImageFolderError(f"{path}: cannot be read: {error.strerror}") from error
     for first, last, end in _ENDS:
         if content.startswith(first) and content.rfind(end) <= content.rfind(last):
             raise ImageFolderError(f"{path}: the image is truncated: its end is missing")
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED) if content else None
+    try:
+        image_size.check(content)
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_UNCHANGED)
+    except image_size.ImageSizeError as error:
+        raise ImageFolderError(f"{path}: cannot be read as an image, {error}; {READABLE} can") from error
+    except cv2.error:  # a check of OpenCV's own
+        image = None
     if image is None:
         raise ImageFolderError(f"{path}: cannot be read as an image; {READABLE} can")
     return image

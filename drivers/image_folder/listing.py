@@ -5,6 +5,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from calib.files import limited
+
+#: Largest list of images [bytes].
+LARGEST_LIST = 1 << 26
+
 
 class ImageFolderError(Exception):
     """A folder or file that cannot be imported; names it and the problem."""
@@ -59,7 +64,7 @@ def by_list(folder: Path, name: str) -> list[ImageFile]:
         ImageFolderError: missing list, malformed line, or missing file; names the line.
     """
     try:
-        lines = (folder / name).read_text(encoding="utf-8").splitlines()
+        lines = limited.read(folder / name, LARGEST_LIST).decode().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ImageFolderError(f"{folder / name}: cannot be read: {getattr(error, 'strerror', 'not text')}") from error
     times: dict[Path, int] = {}

@@ -6,11 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from calib.camera import Camera
+from calib.files import limited
 from drivers.contract.frame import ENCODINGS, Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.o3r import tof_info
 from drivers.o3r.chunks import Chunk, ChunkError, ChunkType, messages
 from drivers.o3r.tof_info import TofInfo
+
+#: Largest file, which is read as a whole [bytes].
+LARGEST = 1 << 32
 
 #: Name of the only sensor.
 SENSOR = "depth"
@@ -42,7 +46,7 @@ class O3rBuffers:
     def __init__(self, path: Path) -> None:
         self._path = path
         try:
-            self._exposures = list(messages(path.read_bytes()))
+            self._exposures = list(messages(limited.read(path, LARGEST)))
             lacking = [kind.name for chunks in self._exposures for kind in _NEEDED if kind not in chunks]
             if lacking or not self._exposures:
                 raise ChunkError(f"there is no chunk {lacking[0] if lacking else 'at all'}")

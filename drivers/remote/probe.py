@@ -1,13 +1,13 @@
 """Sensors and streams of a remote rig, from its metadata and its first frames."""
 
 import threading
-import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from absmsg.v1.sensor_model_pb2 import Config, SensorModel
 
 from calib.camera import Camera
+from calib.files import nested
 from drivers.contract.capabilities import ClockInfo, StreamInfo
 from drivers.contract.device import DeviceError, DeviceInfo
 from drivers.contract.discovery import Found, choose
@@ -98,8 +98,8 @@ class _Seen:
 def _configured(link: Link, rig: str) -> tuple[str, ...]:
     """Sensors in the rig's configuration; their metadata may be published one after the other."""
     try:
-        configs = [tomllib.loads(parse_valid(Config, payload).toml) for payload in link.query(rig, "config")]
-    except (CodecError, RecursionError, tomllib.TOMLDecodeError) as error:
+        configs = [nested.toml(parse_valid(Config, payload).toml) for payload in link.query(rig, "config")]
+    except ValueError as error:
         raise DeviceError(f'rig "{rig}" announces a configuration that is not understood: {error}') from error
     tables = [table for config in configs if isinstance(table := config.get("sensors"), dict)]
     sensors = tuple(sorted({name for table in tables for name in table}))

@@ -11,14 +11,18 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.reader import SeekingReader
 from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Schema
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.stream_reader import StreamReader
 from mcap.summary import Summary
 from zstandard import ZstdError
 
 from drivers.contract.device import DeviceError
+from drivers.encoding import mcap_chunk
 
 #: Exceptions of the MCAP reader and its decompressors for truncated or corrupt bytes.
-DAMAGE = (McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error)
+DAMAGE = (
+    *(McapError, ZstdError, EOFError, RuntimeError, ValueError, struct.error),
+    *(KeyError, MemoryError, OverflowError),  # a channel that is nowhere defined, a record that claims to be huge
+)
 
 #: Bytes of opcode and length before the content of a record.
 _RECORD_HEADER = 9
@@ -71,7 +75,7 @@ def scan(path: Path) -> Contents:
     """Reads the contents of a file, fast if it has an index.
 
     Raises:
-        RecordingError: the file cannot be read, or is not MCAP.
+        RecordingError: the file cannot be read, is not MCAP, or has a damaged attachment.
     """
     try:
         with path.open("rb") as stream:
@@ -79,12 +83,15 @@ def scan(path: Path) -> Contents:
             return _scan_records(stream) if summary is None else _from_index(summary, stream)
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from error
+    except DAMAGE as error:
+        what = f"{path}: an attachment is damaged ({type(error).__name__} {error})"
+        raise RecordingError(f"{what}; `abs-service recover` saves the rest") from error
 
 
 def read_chunk(stream: BinaryIO, place: ChunkLocation) -> list[McapRecord]:
     """The records of a chunk; raises one of `DAMAGE` if it is corrupt."""
     stream.seek(place.offset + _RECORD_HEADER)
-    return breakup_chunk(Chunk.read(ReadDataStream(stream)), validate_crc=True)
+    return mcap_chunk.records(Chunk.read(ReadDataStream(stream)))
 
 
 def _summary(path: Path, stream: BinaryIO) -> Summary | None:
@@ -130,7 +137,7 @@ def _scan_records(stream: BinaryIO) -> Contents:
         if not isinstance(record, Chunk):
             continue
         try:
-            contents = breakup_chunk(record, validate_crc=True)
+            contents = mcap_chunk.records(record)
         except DAMAGE:
             damaged += 1
             continue

@@ -9,6 +9,9 @@ from mcap.records import Message
 
 from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk
 
+#: Latest time that is told from others [ns].
+LAST_NS = (1 << 63) - 1
+
 
 def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tuple[Topic, Message]]:
     """Messages of the given schemas by log time; ties in the order in which they were written.
@@ -23,7 +26,7 @@ def messages(path: Path, contents: Contents, schemas: Set[str]) -> Iterator[tupl
     """
     wanted = {channel for channel, topic in contents.topics.items() if topic.schema in schemas}
     # A message can be yielded as soon as no unread chunk starts earlier.
-    starts = np.array([*(chunk.start_ns for chunk in contents.chunks), np.iinfo(np.int64).max], np.int64)
+    starts = np.array([*(min(chunk.start_ns, LAST_NS) for chunk in contents.chunks), LAST_NS], np.int64)
     earliest = np.minimum.accumulate(starts[::-1])[::-1]
     held: list[tuple[int, int, int, Message]] = []
     with path.open("rb") as stream:

@@ -87,6 +87,9 @@ def read(path: Path, text: str, name: str, hints: Hints) -> Content:
         return READERS[name](text, hints)
     except FormatError as error:
         raise ExchangeError(f"{path}: {error}") from error
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        # Each reader says what it misses; this is what else a damaged file can hold in place of a number or a table.
+        raise ExchangeError(f"{path}: not of the form of {name}: {type(error).__name__}: {error}") from error
 
 
 def write(path: Path, name: str, cameras: Mapping[str, Camera]) -> Written:

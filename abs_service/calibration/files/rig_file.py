@@ -17,6 +17,7 @@ from abs_service.calibration.files import toml_text
 from abs_service.report.provenance import Provenance
 from calib import pose
 from calib.camera import Camera
+from calib.files import limited
 
 
 class RigFileError(Exception):
@@ -136,13 +137,16 @@ def read_covariance(path: Path, sha256: str) -> Covariance:
         RigFileError: it cannot be read, or its hash differs.
     """
     try:
-        content = path.read_bytes()
+        content = limited.read(path, limited.LARGEST_ARRAYS)
     except OSError as error:
         raise RigFileError(f"{path}: the covariances cannot be read: {error.strerror}") from error
     if hashlib.sha256(content).hexdigest() != sha256:
         raise RigFileError(f"{path}: not the covariances of this calibration, for which the hash must be {sha256}")
-    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+    try:
+        arrays = limited.unpacked(content)
         return Covariance(tuple(arrays["names"].tolist()), arrays["covariance"])
+    except (KeyError, ValueError) as error:
+        raise RigFileError(f"{path}: the covariances cannot be read: {error}") from error
 
 
 def camera_table(camera: Camera) -> dict[str, Any]:

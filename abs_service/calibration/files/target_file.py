@@ -1,6 +1,5 @@
 """Board description in TOML: `kind = "charuco"`, counts, lengths in metres, or in millimetres as `square_mm`."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -10,6 +9,7 @@ import tomli_w
 
 from abs_service.config.problems import ABSENT, Problem, allowed_instead
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError
+from calib.files import limited, nested
 
 #: Values of `kind`.
 KINDS: Mapping[str, type[Target]] = {
@@ -34,10 +34,10 @@ def read(path: Path) -> Target:
         TargetFileError: unreadable file or invalid description.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = nested.toml(limited.text(path))
     except OSError as error:
         raise TargetFileError(f"{path}: cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise TargetFileError(f"{path}: is not TOML: {error}") from error
     return from_table(table, str(path))
 

@@ -1,7 +1,6 @@
 """Reads calibrations from calibration files and rig files."""
 
 import os
-import tomllib
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from abs_service.config import plugins
 from abs_service.config.calibration import CovarianceTable, ProvenanceTable, SensorEvidence
 from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera
+from calib.files import limited, nested
 
 #: What a camera table is put on when all of it is there.
 
@@ -53,7 +53,7 @@ def load(path: Path) -> RigCalibration:
 
 def _raw(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return nested.toml(limited.text(path))
     except (OSError, ValueError):
         return {}  # reported when it is read as a calibration
 

@@ -30,6 +30,7 @@ from abs_service.config.problems import allowed_instead
 from abs_service.report import provenance
 from abs_service.supervision.exit_codes import Exit
 from calib.camera import Camera
+from calib.files import limited
 from calib.formats import opencv, plausibility
 from calib.formats.content import Content, Hints
 from calib.formats.resizing import resized
@@ -104,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _read(path: Path, options: Options) -> Content:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = limited.text(path)
     except OSError as error:
         raise ConvertError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

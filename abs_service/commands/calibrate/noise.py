@@ -30,7 +30,6 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
@@ -44,6 +43,7 @@ from abs_service.config import plugins
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, to_json
 from abs_service.supervision.exit_codes import Exit
+from abs_service.tracker.detection.segments.within import load_mask
 from calib.camera import Camera
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.static_board import StaticBoard
@@ -168,10 +168,10 @@ def _region(arguments: argparse.Namespace, shape: Sequence[int]) -> NDArray[np.b
         region[:] = False
         region[max(top, 0) : bottom + 1, max(left, 0) : right + 1] = True
     if arguments.mask is not None:
-        mask = cv2.imread(str(arguments.mask), cv2.IMREAD_GRAYSCALE)
-        if mask is None or mask.shape != (height, width):
+        mask = load_mask(arguments.mask, "--mask")
+        if mask.shape != (height, width):
             raise NoiseOptionError(f"--mask {arguments.mask}: must be an image of {width} × {height} pixels")
-        region &= mask > 0
+        region &= mask
     if not region.any():
         raise NoiseOptionError(f"--box, --mask: they leave nothing of the image of {width} × {height} pixels")
     return region

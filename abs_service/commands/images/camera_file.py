@@ -1,7 +1,6 @@
 """The camera file of `abs-service import`: which sensors took the images, as TOML or JSON."""
 
 import json
-import tomllib
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,6 +11,7 @@ from abs_service.config.camera import PoseTable
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, from_pydantic
 from calib.camera import Camera
+from calib.files import limited, nested
 from calib.lenses.by_name import LensName, lens_of
 
 Size = Annotated[int, Field(ge=1, le=65535)]
@@ -94,9 +94,9 @@ def load(path: Path) -> CameraFile:
     """
     toml = ""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = limited.text(path)
         toml = "" if path.suffix == ".json" else text
-        content = json.loads(text) if path.suffix == ".json" else tomllib.loads(toml)
+        content = nested.json(text) if path.suffix == ".json" else nested.toml(toml)
         # Through JSON, because there a list may stand for a tuple.
         return CameraFile.model_validate_json(json.dumps(content), strict=True)
     except OSError as error:

@@ -35,13 +35,13 @@ camera file says what took them; without a table `color` in it there are no colo
 
 import argparse
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from abs_service.commands.images import camera_file, frame_numbers, import_file
 from abs_service.commands.images.camera_file import CameraFile
 from abs_service.supervision.exit_codes import Exit
+from calib.files import limited, nested
 from drivers.contract.frame import Geometry
 from drivers.encoding.foreign_recording import ForeignRecording
 from drivers.image_folder.images import ColorImages, DepthImages, ImageFolder, Images
@@ -127,13 +127,13 @@ def _rig(path: Path | None) -> bytes:
     if path is None:
         return b""
     try:
-        text = path.read_bytes()
-        tomllib.loads(text.decode())
+        text = limited.text(path)
+        nested.toml(text)
     except OSError as error:
         raise ImportOptionError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:
         raise ImportOptionError(f"{path}: not TOML: {error}") from error
-    return text
+    return text.encode()
 
 
 def _streams(arguments: argparse.Namespace, cameras: CameraFile) -> Mapping[str, Images]:

@@ -1,12 +1,11 @@
 """Arrays of region and pixel polynomials in an .npz file."""
 
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from numpy.typing import NDArray
 
+from calib.files import limited
 from calib.noise.base import NoiseError
 
 #: Lower bound of the deviation in files without `least_sigma` [m].
@@ -49,9 +48,8 @@ def arrays(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
         NoiseError: unreadable file, or a required array is missing.
     """
     try:
-        with file.open("rb") as stream, NpzFile(stream) as archive:
-            found = dict(archive)
-    except (OSError, ValueError, BadZipFile) as error:
+        found = limited.arrays(file)
+    except (OSError, ValueError) as error:
         raise NoiseError(f"file = {str(file)!r} cannot be read as .npz: {error}") from error
     if missing := required - set(found):
         raise NoiseError(f"file = {str(file)!r} lacks the array(s) {sorted(missing)}")

@@ -19,6 +19,7 @@ from mcap.reader import make_reader
 
 from calib import pose
 from calib.camera import Camera
+from calib.files import limited
 from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak.cameras import eeprom
@@ -88,7 +89,7 @@ def poses(path: Path) -> Poses:
     file = (path if path.is_dir() else path.parent) / CALIBRATION
     try:
         if file.is_file():
-            return eeprom.parse(file.read_bytes())
+            return eeprom.parse(limited.read(file, limited.LARGEST_TEXT))
     except OSError as error:
         raise ForeignRecordingError(f"{file}: cannot be read: {error.strerror}") from error
     messages = map(_first, files(path))

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
+from drivers.image_folder import image_file
+from drivers.image_folder.listing import ImageFolderError
 
 #: Pixels (height, width) of the object in a view.
 Select = Callable[[DepthView], NDArray[np.bool_]]
@@ -53,9 +54,11 @@ def load_mask(file: Path, key: str) -> NDArray[np.bool_]:
     Raises:
         DetectionError: the file is missing or no image.
     """
-    image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise DetectionError(f"{key} = {str(file)!r} is missing or no image")
+    try:
+        image = image_file.read(file)
+    except ImageFolderError as error:
+        reason = str(error).removeprefix(f"{file}: ")
+        raise DetectionError(f"{key} = {str(file)!r}: {reason}") from error
     if image.ndim == 3:
         image = image[..., 3] if image.shape[2] == 4 else image.max(axis=2)
     return np.asarray(image > 0)

@@ -178,5 +178,5 @@ def test_a_mask_that_cannot_be_read_is_named(tmp_path, content):
     path = tmp_path / "mask.png"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(DetectionError, match=r"mask\.png' is missing or no image"):
+    with pytest.raises(DetectionError, match=r"file = .*mask\.png': cannot be read"):
         mask.Settings(path).build()

@@ -175,7 +175,7 @@ REGIONS = {
 
 @pytest.mark.parametrize("name", REGIONS)
 def test_a_missing_limit_is_named_when_the_region_is_built(name, tmp_path):
-    with pytest.raises(DetectionError, match=r"within = .*no\.png' is missing or no image"):
+    with pytest.raises(DetectionError, match=r"within = .*no\.png': cannot be read"):
         REGIONS[name](within=tmp_path / "no.png").build()
 
 

@@ -1,0 +1,88 @@
+"""Reads files up to a size. What is no regular file, such as a pipe or a device, has no size and is refused."""
+
+import errno
+import io
+import os
+import stat
+import zlib
+from pathlib import Path
+from zipfile import BadZipFile, ZipFile
+
+from numpy.lib.npyio import NpzFile
+from numpy.typing import NDArray
+
+#: Largest text: a configuration, a calibration, a list of images [bytes].
+LARGEST_TEXT = 1 << 20
+#: Largest file with the arrays of a noise model or of covariances, compressed or not [bytes].
+LARGEST_ARRAYS = 1 << 28
+
+
+def read(path: Path, largest: int) -> bytes:
+    """The content of a file.
+
+    Args:
+        path: the file.
+        largest: number of bytes that it may have.
+
+    Raises:
+        OSError: it cannot be read, is no regular file, or is larger.
+    """
+    with open(path, "rb", opener=_without_waiting) as stream:
+        about = os.fstat(stream.fileno())
+        if not stat.S_ISREG(about.st_mode):
+            raise OSError(errno.EINVAL, "it is no regular file", str(path))
+        content = stream.read(largest + 1) if about.st_size <= largest else b""
+        if max(about.st_size, len(content)) > largest:
+            raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
+        return content
+
+
+def text(path: Path) -> str:
+    """The text of a file, in UTF-8.
+
+    Raises:
+        OSError: as `read`.
+        UnicodeDecodeError: other bytes.
+    """
+    return read(path, LARGEST_TEXT).decode("utf-8")
+
+
+def arrays(path: Path) -> dict[str, NDArray]:
+    """The arrays of an .npz file, by name.
+
+    Raises:
+        OSError: as `read`.
+        ValueError: it is no .npz, or its arrays are too large together.
+    """
+    return unpacked(read(path, LARGEST_ARRAYS))
+
+
+def unpacked(content: bytes) -> dict[str, NDArray]:
+    """The arrays in the bytes of an .npz file, by name.
+
+    Raises:
+        ValueError: they are none, or too large together.
+    """
+    try:
+        with ZipFile(io.BytesIO(content)) as parts:
+            size = sum(part.file_size for part in parts.infolist())
+        if size > LARGEST_ARRAYS:
+            raise ValueError(f"its arrays have {size} bytes, {LARGEST_ARRAYS} are allowed")
+        with NpzFile(io.BytesIO(content)) as archive:
+            return dict(archive)
+    # What NumPy and zlib make of damaged bytes, and of an array that claims to be larger than its part of the file.
+    except (
+        BadZipFile,
+        EOFError,
+        KeyError,
+        MemoryError,
+        NotImplementedError,
+        OSError,
+        RuntimeError,
+        zlib.error,
+    ) as error:
+        raise ValueError(f"damaged: {error}") from error
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # or to open a pipe would wait for somebody who writes to it
