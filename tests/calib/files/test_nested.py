@@ -28,5 +28,5 @@ def test_what_people_write_is_read() -> None:
 
 @pytest.mark.parametrize("part", ["[", "{b: ", "- ", "-", "a: "])
 def test_a_storage_that_ends_the_stack_of_opencv_is_refused(part: str) -> None:
-    with pytest.raises(FormatError, match="not a FileStorage|no camera"):
+    with pytest.raises(FormatError, match=r"not a FileStorage|no camera"):
         opencv.read("%YAML:1.0\n---\na:\n  " + part * 100_000, Hints("x"))
