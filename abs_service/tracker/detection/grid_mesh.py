@@ -23,8 +23,10 @@ LEAST_RADIUS_PX = 1.5
 #: Distances around a grid point that deviate by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
 
-#: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces.
-LONGEST_SIDE = 5.0
+#: A triangle with a side longer than this multiple of the typical side spans a jump between two surfaces. A vertex at a
+#: jump takes a mean of both surfaces, so one side shows only a part of it (decision 0007); a plane's sides are no
+#: longer than that, at any slant up to 70°.
+LONGEST_SIDE = 3.0
 
 #: A connected component with a smaller share of the vertices is an island and removed: the rim of the region often
 #: shows background, which cannot be bound to a smooth surface.

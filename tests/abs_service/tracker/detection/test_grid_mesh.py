@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from abs_service.pairing.images import ColorImage
 from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
@@ -100,6 +102,40 @@ def test_no_face_spans_a_jump_in_distance():
     assert np.ptp(z[mesh.faces], axis=1).max() < 0.02
     assert z.min() < 1.02
     assert z.max() > 1.18
+
+
+FINE = Camera(320, 240, 275.0, 275.0, 160.0, 120.0)
+COLUMN, ROW = np.meshgrid(np.arange(FINE.width, dtype=float), np.arange(FINE.height, dtype=float))
+BLOCK = (np.abs(COLUMN - 160) < 30) & (np.abs(ROW - 120) < 28)
+
+
+def fine_mesh(z: np.ndarray, seed: int):
+    """Mesh with cells of 2.4 px, 5 mm, of an object with these z (height, width) [m], measured with 0.5 mm of noise."""
+    noisy = z + 0.5e-3 * np.random.default_rng(seed).standard_normal(z.shape)
+    distance = np.where(BLOCK, noisy, np.nan) * FINE.lookup.ray_length
+    return grid_mesh(InitialDetection(distance.astype(np.float32), FINE, 600))
+
+
+@pytest.mark.parametrize("step", [0.032, 0.04, 0.06])
+@pytest.mark.parametrize("place", range(12))
+def test_two_surfaces_are_apart_wherever_their_jump_lies_between_the_pixels(step, place):
+    """Vertices at a jump are means of both surfaces, and may make a staircase of it."""
+    turn = 0.25 * place
+    far = (ROW - 119 - 0.37 * place) * np.cos(turn) + (COLUMN - 160) * np.sin(turn) < 0
+    mesh = fine_mesh(0.6 + step * far, place)
+    z, edges = mesh.vertices[:, 2], mesh.edges
+    part = connected_components(coo_array((np.ones(len(edges)), edges.T), shape=(len(z), len(z))), directed=False)[1]
+    near, beyond = (set(part[np.abs(z - level) < 0.1 * step]) for level in (0.6, 0.6 + step))
+    assert near
+    assert beyond
+    assert not near & beyond
+
+
+@pytest.mark.parametrize("slant", [0, 45, 60, 70])
+def test_a_plane_has_no_jumps_however_it_is_slanted(slant):
+    slope = np.tan(np.deg2rad(slant)) * (ROW - 120) / FINE.fy
+    faces = len(fine_mesh(0.6 / np.maximum(1 - slope, 0.5), 1).faces)
+    assert faces > 0.98 * len(fine_mesh(np.full(ROW.shape, 0.6), 1).faces)
 
 
 def test_a_hole_in_the_object_is_a_hole_in_the_mesh():
