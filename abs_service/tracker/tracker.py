@@ -105,7 +105,7 @@ class Tracker:
         vertices = np.ascontiguousarray(surface.vertices[0].T)
         known = self._uncertainty.estimate(frame, theta, surface, covariance)
         fits, shape = frame.fits(theta), self._shape_judge.judge(vertices, known.vertices, known.unheld_m)
-        verdict, reasons = status.judge(fits, observation.missing, shape, self._limits)
+        verdict, reasons = status.judge(fits, observation.missing, shape, self._posterior.motion.surprise, self._limits)
         if verdict == Status.TRACKING:
             self._last_tracked = theta
         return Estimate(

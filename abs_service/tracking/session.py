@@ -56,7 +56,7 @@ class TrackingSession:
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
         self._vertex_offsets: VertexOffsets = FixedOffsets()
-        self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status.degraded_rim)
+        self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
         self._reinitialize_requested = False
@@ -125,7 +125,7 @@ class TrackingSession:
         self._host_clock = host_clock
         self._tracker = None
         self._region = self._plan.region.build()
-        self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status.degraded_rim)
+        self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status)
         self._growth_due = False
 
     def _detect_again(self, tracker: Tracker, requested: bool, observation: Observation) -> None:

@@ -43,6 +43,7 @@ class RimFit:
         visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.
         outside: of these, beside the object: the mesh hangs over the outline.
         inside: of these, far inside the outline: measured surface of the object continues beyond the mesh.
+        off_m: mean distance of the visible ones from the outline [m], zero for those that are on it.
         occluded: on free edges, but not visible.
         covered: on edges that something hid in the first image.
         uncovered: of these, measured surface of the object now continues beyond the mesh.
@@ -51,6 +52,7 @@ class RimFit:
     visible: int = 0
     outside: int = 0
     inside: int = 0
+    off_m: float = 0.0
     occluded: int = 0
     covered: int = 0
     uncovered: int = 0

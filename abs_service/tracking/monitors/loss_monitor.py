@@ -5,9 +5,9 @@ from typing import Annotated
 
 from annotated_types import Ge, Gt
 
+from abs_service.tracker import status
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.status import rim_share
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Settings:
             an empty scene has surfaces, too.
         grow_s: time for which the object must be seen to continue beyond edges of the mesh that something hid at first
             before a new, larger mesh is made [s].
-        misfit_s: time for which too many of the free edges (`status.degraded_rim`) must lie off the object's outline
-            before a new mesh is made [s].
+        misfit_s: time for which the free edges must lie off the object's outline (`status.degraded_rim`,
+            `status.degraded_rim_m`) before a new mesh is made [s].
     """
 
     after_s: Annotated[float, Ge(0)] = 0.5
@@ -43,11 +43,11 @@ class LossMonitor:
 
     Args:
         settings: its settings.
-        off_share: share of the free edges off the outline above which a mesh is misplaced.
+        limits: thresholds of the status, which say when a mesh is misplaced.
     """
 
-    def __init__(self, settings: Settings, off_share: float):
-        self._off_share = off_share
+    def __init__(self, settings: Settings, limits: status.Settings):
+        self._limits = limits
         self._settings = settings
         self._lost_ns: int | None = None
         self._tried_ns: int | None = None
@@ -73,7 +73,7 @@ class LossMonitor:
 
     def with_hysteresis(self, estimate: Estimate) -> Estimate:
         """The estimate with hysteresis: the first good estimates after a loss are DEGRADED."""
-        off = rim_share(estimate.fits) > self._off_share
+        off = status.is_misplaced(estimate.fits, estimate.shape, self._limits)
         self._off_ns = (self._off_ns or estimate.t_host_ns) if off else None
         if estimate.status == Status.LOST:
             self._lost_ns = estimate.t_host_ns if self._lost_ns is None else self._lost_ns

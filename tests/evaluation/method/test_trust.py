@@ -1,9 +1,12 @@
 """The statistics of the experiment on trust."""
 
-import numpy as np
+from dataclasses import replace
 
-from evaluation.method.trust import SLIDE_FRAME, Followed, Slide, creep
-from evaluation.scenes.bent_sheet import INTERVAL_S, swing
+import numpy as np
+import pytest
+
+from evaluation.method.trust import FARTHEST_M, SLIDE_FRAME, Followed, Slide, creep, follow
+from evaluation.scenes.bent_sheet import INTERVAL_S, SheetMotion, SheetScene, SheetState, render_frames, swing
 
 
 def test_a_frame_is_wrong_if_it_claims_tracking_beyond_three_deviations_and_five_millimetres():
@@ -22,3 +25,25 @@ def test_a_slide_moves_the_sheet_along_itself_from_its_frame_on():
     moved = np.subtract(slide(after).center, swing(after).center)
     np.testing.assert_allclose(np.linalg.norm(moved), 0.04, rtol=1e-9)
     np.testing.assert_allclose(np.subtract(creep(INTERVAL_S).center, creep(0).center), [2e-3, 0, 0], atol=1e-12)
+
+
+def back(t: float) -> SheetState:
+    """Swings, and lies 80 mm farther back along itself from the 25th frame on, in which it is bent."""
+    state = swing(t)
+    first, last = state.points(np.array([[-1e-3, 0.0], [1e-3, 0.0]]))
+    x, y, z = state.center - 0.08 * (t > 23.5 * INTERVAL_S) * (last - first) / np.linalg.norm(last - first)
+    return replace(state, center=(float(x), float(y), float(z)))
+
+
+@pytest.mark.parametrize(("motion", "frame"), [(Slide(0.06), SLIDE_FRAME), (back, 24)])
+def test_a_sheet_that_jumps_before_nothing_is_not_said_to_be_tracked_while_the_mesh_is_elsewhere(
+    motion: SheetMotion, frame: int
+):
+    """The first is wrong in one frame, in which only the surprise tells; the second for good, as its edges tell."""
+    scene = SheetScene("jumps", motion)
+    frames = render_frames(scene, range(frame + 8), np.random.default_rng(31))
+    empty = [replace(one, distance=np.where(one.distance > FARTHEST_M, np.nan, one.distance)) for one in frames]
+    found = follow(empty, scene.sigma)
+    assert found.error_m[frame] > 0.01
+    assert not found.wrong.any()
+    assert found.tracking[:frame].all()

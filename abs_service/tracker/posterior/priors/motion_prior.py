@@ -39,12 +39,15 @@ class MotionPrior:
         predicted: predicted parameters (dim,) of the current frame.
         reach_m: radius around the predicted surface within which the surface is searched [m].
         speed: standard deviation v of the rate of change around the predicted one, per direction of Θ [m/s].
+        surprise: root mean square innovation of the last estimate, in v and per determined parameter; 0 in the first
+            frame.
     """
 
     def __init__(self, rest: NDArray[np.float64], metric: ChangeMetric, settings: Settings):
         self.predicted = rest
         self.reach_m = np.inf
         self.speed = self._next_speed = settings.speed
+        self.surprise = 0.0
         self._settings, self._metric = settings, metric
         self._theta = rest
         self._velocity = np.zeros_like(rest)
@@ -120,6 +123,7 @@ class MotionPrior:
             speed = self._innovations.update(
                 self._innovation(theta), self._metric.root @ self._velocity, determined, self._elapsed_s
             )
+            self.surprise = speed / self.speed
             self._next_speed = self._limited(max(MARGIN * speed, LAG_MARGIN * np.sqrt(self._innovations.lasting)))
 
     def cost(self, thetas: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -179,9 +179,12 @@ class RimOutline:
 
     def fit(self, surface: Surface) -> RimFit:
         """Agreement of the edges of a population of one with the outline."""
-        far = max(OFF_PX, FARTHEST * self._deviation)
-        away = self._inside_at(self._locate(surface)[0].astype(np.float64))
-        known = ~np.isnan(away)
+        far, points = max(OFF_PX, FARTHEST * self._deviation), self._locate(surface)[0].astype(np.float64)
+        away = self._inside_at(points)
+        known, off = ~np.isnan(away), np.abs(away) > far
+        # Outside, distances are known up to `far`; how much farther, nothing tells.
+        pixel_m = np.linalg.norm(points - self._camera.center, axis=1) / self._camera.fx
+        off_m = np.where(off, np.maximum(away, -far), 0.0)[known] * pixel_m[known]
         covered = np.flatnonzero(self.classes == RimClass.OCCLUDED)
         vertices = surface.vertices[0].T.astype(np.float64)
         outer, inner = vertices[self._rim.outer[covered]], vertices[self._rim.inner[covered]]
@@ -190,6 +193,7 @@ class RimOutline:
             visible=int(np.count_nonzero(known)),
             outside=int(np.count_nonzero(away < -far)),
             inside=int(np.count_nonzero(away > far)),
+            off_m=float(np.mean(np.abs(off_m))) if known.any() else 0.0,
             occluded=self._hidden + int(np.count_nonzero(~known)),
             covered=len(covered),
             uncovered=int(np.count_nonzero(beyond > 0)),

@@ -279,6 +279,17 @@ def test_a_sheet_that_hangs_over_the_outline_or_ends_inside_it_is_told():
     assert off.visible > off.outside + off.inside
 
 
+def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
+    """The sheet is 40 mm longer to the right than when the mesh was made; above and below, the edges are on it."""
+    found = outline(picture())
+    look(found, np.minimum(picture(), picture(by=0.04)))
+    here, y = found.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
+    nearest = np.minimum(0.04, 0.1 - np.abs(y))
+    off = nearest > FARTHEST * 0.5 / CAMERA.fx  # beyond the bound of the cost
+    assert (here.outside, here.inside) == (0, np.count_nonzero(off))
+    assert here.off_m == pytest.approx(nearest[off].sum() / here.visible, rel=0.1)
+
+
 def test_the_surface_hides_its_own_edge():
     """A sheet that is rolled up: the vertices of the far end lie behind the near one."""
     rolled = replace(MESH, vertices=MESH.vertices * (1.0, 1.0, 1.0) + (MESH.vertices[:, :1] > 0.1) * (0.0, 0.0, 0.05))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from abs_service.tracker.estimate import Estimate, Status
+from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.status import Settings as Limits
 from abs_service.tracker.terms.base import RimFit, SensorFit
 from abs_service.tracking.monitors.loss_monitor import LossMonitor, Settings
 from abs_service.tracking.session import TrackingSession
@@ -14,24 +16,24 @@ from tests.abs_service.tracker.scenes import sheet
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
 
 FRAME_NS = 33_000_000
-OFF_SHARE = 0.3
+LIMITS = Limits(degraded_rim=0.3, degraded_rim_m=0.005)
 SHEET = simulate("simulated://sheet?seed=1")
 
 
 def estimate(k: int, status: Status, reasons: tuple[str, ...] = ()) -> Estimate:
     nothing = np.zeros(0)
     made = Estimate(**dict.fromkeys((field.name for field in dataclasses.fields(Estimate)), nothing))  # pyright: ignore
-    return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons)
+    return dataclasses.replace(made, t_host_ns=k * FRAME_NS, status=status, reasons=reasons, shape=ShapeQuality())
 
 
 def test_a_tracked_object_needs_no_attempt():
-    monitor = LossMonitor(Settings(), OFF_SHARE)
+    monitor = LossMonitor(Settings(), LIMITS)
     assert [monitor.with_hysteresis(estimate(k, Status.TRACKING)).status for k in range(3)] == [Status.TRACKING] * 3
     assert not monitor.attempt_due(10**12)
 
 
 def test_attempts_are_due_after_a_delay_and_then_periodically():
-    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1), OFF_SHARE)
+    monitor = LossMonitor(Settings(after_s=0.2, every_s=0.1), LIMITS)
     tries = []
     for k in range(1, 16):
         if monitor.attempt_due(k * FRAME_NS):
@@ -41,7 +43,7 @@ def test_attempts_are_due_after_a_delay_and_then_periodically():
 
 
 def test_a_good_estimate_restarts_the_delay():
-    monitor = LossMonitor(Settings(after_s=0.1), OFF_SHARE)
+    monitor = LossMonitor(Settings(after_s=0.1), LIMITS)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     monitor.with_hysteresis(estimate(1, Status.DEGRADED, ("no frame from color",)))
     monitor.with_hysteresis(estimate(9, Status.LOST))
@@ -49,9 +51,10 @@ def test_a_good_estimate_restarts_the_delay():
     assert monitor.attempt_due(13 * FRAME_NS)
 
 
-def test_a_mesh_that_stays_off_its_outline_is_made_anew():
-    monitor, tries = LossMonitor(Settings(misfit_s=0.2), OFF_SHARE), []
-    off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, RimFit(visible=60, outside=12, inside=12)),)
+@pytest.mark.parametrize("rim", [RimFit(visible=60, outside=12, inside=12), RimFit(visible=60, inside=6, off_m=0.01)])
+def test_a_mesh_that_stays_off_its_outline_is_made_anew(rim):
+    monitor, tries = LossMonitor(Settings(misfit_s=0.2), LIMITS), []
+    off = (SensorFit("tof", 300, 0, 300, 300, 0.0, 1.0, rim),)
     for k in range(1, 20):
         if monitor.attempt_due(k * FRAME_NS):
             tries.append(k)
@@ -60,7 +63,7 @@ def test_a_mesh_that_stays_off_its_outline_is_made_anew():
 
 
 def test_after_a_loss_the_first_good_estimates_are_degraded():
-    monitor = LossMonitor(Settings(confirm=3), OFF_SHARE)
+    monitor = LossMonitor(Settings(confirm=3), LIMITS)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     after = [monitor.with_hysteresis(estimate(k, Status.TRACKING)) for k in range(1, 5)]
     assert [e.status for e in after] == [Status.DEGRADED, Status.DEGRADED, Status.TRACKING, Status.TRACKING]
@@ -69,7 +72,7 @@ def test_after_a_loss_the_first_good_estimates_are_degraded():
 
 
 def test_objects_of_another_size_are_rejected():
-    monitor = LossMonitor(Settings(size_ratio=2.0), OFF_SHARE)
+    monitor = LossMonitor(Settings(size_ratio=2.0), LIMITS)
     lost = sheet(size=(0.3, 0.2))
     assert lost.area == pytest.approx(0.06, rel=0.05)
     assert not monitor.differs_in_size(sheet(size=(0.25, 0.2)), lost)
@@ -123,11 +126,11 @@ def test_reinitialize_makes_a_new_mesh_in_the_next_frame():
 
 
 def test_the_mesh_is_kept_for_keep_s_after_the_loss():
-    monitor = LossMonitor(Settings(keep_s=1.0), OFF_SHARE)
+    monitor = LossMonitor(Settings(keep_s=1.0), LIMITS)
     assert not monitor.keeps_mesh(0)
     monitor.with_hysteresis(estimate(0, Status.LOST))
     assert monitor.keeps_mesh(FRAME_NS)
     assert not monitor.keeps_mesh(1_100_000_000)
-    lost_for_good = LossMonitor(Settings(), OFF_SHARE)
+    lost_for_good = LossMonitor(Settings(), LIMITS)
     lost_for_good.with_hysteresis(estimate(0, Status.LOST))
     assert not lost_for_good.keeps_mesh(FRAME_NS)

@@ -231,3 +231,12 @@ def test_a_sudden_motion_widens_the_prior_of_its_own_frame():
     assert motion.widen(motion.predicted + np.array([0.5, 0.0]))
     assert motion.speed == Settings().speed
     assert not motion.widen(motion.predicted + 1.0)
+
+
+def test_an_estimate_that_the_widest_prior_holds_back_is_a_surprise():
+    motion = prior(speed=0.3)
+    assert motion.surprise == 0.0
+    follow(motion, [0.01] * 3)  # 0.01 m in a frame is as far as the prior allows for
+    assert motion.surprise == pytest.approx(1 / np.sqrt(2), rel=0.01)  # in one of two parameters
+    follow(motion, [0.05], begin=4)
+    assert motion.surprise == pytest.approx(5 / np.sqrt(2), rel=0.01)
