@@ -107,9 +107,8 @@ class SparseView:
         seen = self.synthesize(predicted)
         stride = self.camera.width + 2
         row, column = np.divmod(seen.pixel[0], stride)
-        rendered = self.render(predicted)
         inside = seen.pixel[0] > 0
-        front = np.where(inside, rendered[(row - 1) * inside, (column - 1) * inside], np.float32(np.inf))
+        front = np.where(inside, self._front(predicted, (row - 1) * inside, (column - 1) * inside), np.float32(np.inf))
         facing = np.einsum("in,in->n", predicted.normals[0], self._sight(predicted)) < 0
         self._hidden = ~facing | (front < seen.distance[0] - HIDING_M)
 
@@ -152,6 +151,13 @@ class SparseView:
             image = self._raster.render(surface.vertices[0])
             self._rendered = (surface, image)
         return image
+
+    def _front(
+        self, surface: Surface, rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> NDArray[np.float32]:
+        """What `render` returns for a surface at pixels (k,); of an image that nobody needs, no more is rendered."""
+        last, image = self._rendered
+        return image[rows, columns] if last is surface else self._raster.render_at(surface.vertices[0], rows, columns)
 
     def _sight(self, surface: Surface) -> NDArray[np.float64]:
         """Lines of sight (3, n) from the camera to the vertices of a population of one [m]."""

@@ -25,6 +25,7 @@ class Raster:
         self._faces = np.ascontiguousarray(faces, np.int32)
         self._ray_length = camera.lookup.ray_length.astype(np.float32)
         self._nearness = np.zeros(self._ray_length.shape, np.float32)
+        self._unwanted = np.full(self._ray_length.shape, np.float32(np.inf))
         self._distance = np.full(self._ray_length.shape, np.float32(np.inf))
         self._box = np.s_[0:0, 0:0]
 
@@ -41,6 +42,19 @@ class Raster:
         with np.errstate(divide="ignore"):
             np.divide(self._ray_length[self._box], self._nearness[self._box], out=self._distance[self._box])
         return self._distance
+
+    def render_at(
+        self, vertices: NDArray[np.float32], rows: NDArray[np.intp], columns: NDArray[np.intp]
+    ) -> NDArray[np.float32]:
+        """The same distances (k,) [m] at some pixels alone, with rows (k,) and columns (k,) inside the image."""
+        place, inverse_z = self._projection.project(np.ascontiguousarray(vertices[None], np.float32))
+        nearness = self._unwanted
+        nearness[rows, columns] = 0
+        _nearest(place[0], inverse_z[0], self._faces, nearness)
+        with np.errstate(divide="ignore"):
+            distance = self._ray_length[rows, columns] / nearness[rows, columns]
+        nearness[rows, columns] = np.inf
+        return distance
 
     def _around(self, place: NDArray[np.float32], inverse_z: NDArray[np.float32]) -> tuple[slice, slice]:
         """Rows and columns in which the projected vertices (1, n, 2) lie."""
@@ -65,7 +79,7 @@ def _nearest(
         place: pixel coordinates (n, 2) of the vertices.
         inverse_z: their 1/z (n,), NaN where the camera cannot see them; linear in the image (exactly for a pinhole).
         faces: vertex indices (m, 3).
-        nearness: result, zeros at the start where the mesh may be.
+        nearness: result, at the start zeros where the mesh may be; pixels that are infinite are passed over.
     """
     height, width = nearness.shape
     for f in range(faces.shape[0]):
@@ -83,6 +97,8 @@ def _nearest(
         last_column = min(int(np.floor(max(ax, bx, cx))), width - 1)
         for row in range(first_row, last_row + 1):
             for column in range(first_column, last_column + 1):
+                if nearness[row, column] == np.inf:
+                    continue
                 at_b = ((column - ax) * (cy - ay) - (row - ay) * (cx - ax)) / area
                 at_c = ((bx - ax) * (row - ay) - (by - ay) * (column - ax)) / area
                 at_a = 1 - at_b - at_c

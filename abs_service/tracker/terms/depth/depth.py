@@ -79,10 +79,10 @@ class DepthTerm:
         window = self._synthesizer.window(self.sensor, predicted, reach_m)
         texture = self._synthesizer.texture(self.sensor, self._render(image, window))
         texels = within(texture, window)
+        expected = self._view.render(predicted)[window]
         self._view.look(predicted)
         distance = np.empty(texels.shape[:2], np.float32)
         distances(texels, distance)
-        expected = self._view.render(predicted)[window]
         height, width = texture.shape[0] - 2, texture.shape[1] - 2
         missing = np.isnan(distance)
         single = dropouts(missing)
@@ -109,9 +109,9 @@ class DepthTerm:
 
     def foreground(self) -> NDArray[np.float64]:
         """Points (k, 3) [m] of occluders."""
-        rows, columns = np.nonzero(self._foreground)
-        if not len(rows):
+        if not self._foreground.any():
             return np.zeros((0, 3))
+        rows, columns = np.nonzero(self._foreground)
         camera, (top, left) = self._view.camera, corner(self._window)
         sight = camera.directions(np.stack([left + columns, top + rows], axis=-1))
         return pose.transform(camera.T_rs, sight * self._distance[rows, columns, None])
