@@ -12,6 +12,8 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+from abs_service import cli
+from abs_service.bus.security.mutual_tls import MutualTls
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
 
@@ -88,14 +90,42 @@ def open_bus(endpoint):
         bus.close()
 
 
+@pytest.fixture(scope="session")
+def keys(tmp_path_factory):
+    """A folder with the certificates of a lab whose rig is called localhost, as `abs-service keys` makes them."""
+    folder = tmp_path_factory.mktemp("lab") / "keys"
+    assert cli.main(["keys", str(folder), "--host", "localhost"]) == 0
+    return folder
+
+
+@pytest.fixture
+def secured(keys, endpoint):
+    """Opens buses of the rig "demo" with mutual TLS, by the names of their certificates. All are closed afterwards."""
+    opened = []
+
+    def secured(name, role=Role.CLIENT):
+        security = MutualTls(keys / "authority.pem", keys / f"{name}.pem", keys / f"{name}.key")
+        opened.append(ZenohBus.open("demo", encrypted(endpoint), role, security=security))
+        return opened[-1]
+
+    yield secured
+    for bus in reversed(opened):
+        bus.close()
+
+
+def encrypted(endpoint: str) -> str:
+    """The same port of this host with TLS; certificates are for names."""
+    return endpoint.replace("tcp/127.0.0.1", "tls/localhost")
+
+
 @pytest.fixture
 def launch():
-    """Starts `abs-service ARGUMENTS` as a process of its own; whatever still runs after the test is killed."""
+    """Starts `abs-service ARGUMENTS`, or another program in Python; whatever still runs after the test is killed."""
     started = []
 
-    def launch(*arguments, **settings):
+    def launch(*arguments, program=("-m", "abs_service"), **settings):
         process = subprocess.Popen(
-            [sys.executable, "-m", "abs_service", *map(str, arguments)],
+            [sys.executable, *program, *map(str, arguments)],
             env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
             stderr=subprocess.PIPE,
             text=True,

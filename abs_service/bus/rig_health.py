@@ -6,6 +6,7 @@ import zenoh
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
+from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import Role, open_session
 from drivers.encoding.message_check import MessageError, parse_valid
 
@@ -20,19 +21,21 @@ _POLL_S = 0.02
 RigHealth = dict[str, dict[str, Health | None]]
 
 
-def ask(endpoint: str, rig: str = "*") -> RigHealth:
+def ask(endpoint: str, rig: str = "*", security: NoSecurity | MutualTls = NO_SECURITY) -> RigHealth:
     """Listens until every component has published its health, but no longer than `PATIENCE_S`.
 
     Args:
         endpoint: where `abs-service run` listens.
         rig: name of the rig; `*` for every rig there.
+        security: of its bus.
 
     Raises:
         BusError: the endpoint is malformed, or nothing answers there within `CONNECT_MS`.
+        TlsError: a file of `security` cannot be used.
     """
     health: RigHealth = {}
     with (
-        open_session(endpoint, Role.CLIENT, shared_memory=False, connect_timeout_ms=CONNECT_MS) as session,
+        open_session(endpoint, Role.CLIENT, False, CONNECT_MS, security) as session,
         session.declare_subscriber(keys.key(rig, keys.health("**"))) as subscriber,
     ):
         deadline_s = time.monotonic() + PATIENCE_S

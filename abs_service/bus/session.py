@@ -1,12 +1,17 @@
 """Opens zenoh sessions: explicit endpoints, no discovery, actionable errors."""
 
 import json
+import logging
 import re
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
 import zenoh
 
+from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from drivers.encoding.message_check import LARGEST_IMAGE
+
+_log = logging.getLogger(__name__)
 
 #: Where a rig listens unless it is configured otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -20,7 +25,14 @@ SHARED_MEMORY_POOL_BYTES = 30 << 20
 #: A larger message is refused before it is put together: an image of `message_check.LARGEST_IMAGE` and its attachment.
 LARGEST_MESSAGE_BYTES = LARGEST_IMAGE + (1 << 20)
 
+#: Time before the end of a certificate from which on each start warns of it.
+CERTIFICATE_ENDS = timedelta(days=30)
+
 _ENDPOINT = re.compile(r"(tcp|tls|quic|udp|ws)/(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/?#\[\]]+):(?P<port>\d{1,5})([?#]\S*)?")
+
+
+#: Least levels of zenoh's log, which tells of refused clients in warnings.
+LOG_LEVELS = "error,zenoh_link_tls=warn"
 
 
 class BusError(Exception):
@@ -35,7 +47,11 @@ class Role(StrEnum):
 
 
 def open_session(
-    endpoint: str, role: Role, shared_memory: bool = True, connect_timeout_ms: int = CONNECT_TIMEOUT_MS
+    endpoint: str,
+    role: Role,
+    shared_memory: bool = True,
+    connect_timeout_ms: int = CONNECT_TIMEOUT_MS,
+    security: NoSecurity | MutualTls = NO_SECURITY,
 ) -> zenoh.Session:
     """Opens a session. Close it before the interpreter exits, or zenoh hangs at exit.
 
@@ -44,21 +60,28 @@ def open_session(
         role: whether to be the router or to connect to it.
         shared_memory: whether large messages pass through shared memory between processes of one host.
         connect_timeout_ms: timeout of a client's connection [ms].
+        security: who may connect, and what they may do then.
 
     Raises:
         BusError: the endpoint is malformed or in use, or nothing listens there.
+        TlsError: a file of `security` cannot be used.
     """
-    check_endpoint(endpoint)
-    zenoh.init_log_from_env_or("error")
+    check_endpoint(endpoint, security)
+    own = security.check(endpoint, role is Role.ROUTER)
+    if own and own.ends - datetime.now(UTC) < CERTIFICATE_ENDS:
+        _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
+    zenoh.init_log_from_env_or(LOG_LEVELS)
     try:
-        return zenoh.open(
-            zenoh.Config.from_json5(json.dumps(_settings(endpoint, role, shared_memory, connect_timeout_ms)))
-        )
+        settings = _settings(endpoint, role, shared_memory, connect_timeout_ms, security)
+        return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
-        raise BusError(f'bus.endpoint = "{endpoint}": {_explain(str(error), role, connect_timeout_ms)}') from error
+        reason = _explain(str(error), role, connect_timeout_ms)
+        if role is Role.CLIENT:
+            reason = security.refusal(endpoint) or reason
+        raise BusError(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 
-def check_endpoint(endpoint: str) -> str:
+def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY) -> str:
     """Returns `endpoint` if it can be one.
 
     Raises:
@@ -70,6 +93,8 @@ def check_endpoint(endpoint: str) -> str:
             f'bus.endpoint = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
             "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
         )
+    if security.link and match[1] != "tls":
+        raise BusError(f'bus.endpoint = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')
     return endpoint
 
 
@@ -82,7 +107,9 @@ def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
     return "cannot listen there: " + re.sub(r"\s+at /\S+\.rs:\d+\.", "", error)
 
 
-def _settings(endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms: int) -> dict[str, object]:
+def _settings(
+    endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms: int, security: NoSecurity | MutualTls
+) -> dict[str, object]:
     listens = role is Role.ROUTER
     return {
         "mode": role.value,
@@ -95,7 +122,11 @@ def _settings(endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by
         "transport": {
-            "link": {"tx": {"lease": LEASE_MS}, "rx": {"max_message_size": LARGEST_MESSAGE_BYTES}},
+            "link": {
+                "tx": {"lease": LEASE_MS},
+                "rx": {"max_message_size": LARGEST_MESSAGE_BYTES},
+                **security.link,
+            },
             "shared_memory": {
                 "enabled": shared_memory,
                 "transport_optimization": {
@@ -106,4 +137,5 @@ def _settings(endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms
                 },
             },
         },
+        **(security.router if listens else {}),
     }

@@ -11,6 +11,8 @@ from zenoh import ext
 
 from abs_service.bus import keys
 from abs_service.bus.contract import EVENTS, Priority, Publisher, Qos, Sample, Subscription
+from abs_service.bus.security import link_log
+from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import Role, open_session
 from drivers.contract.callbacks import from_non_daemon_thread
 
@@ -44,10 +46,20 @@ class ZenohBus:
         self._kept: list[Subscription] = []
 
     @classmethod
-    def open(cls, rig: str, endpoint: str, role: Role, shared_memory: bool = True) -> Self:
+    def open(
+        cls,
+        rig: str,
+        endpoint: str,
+        role: Role,
+        shared_memory: bool = True,
+        security: NoSecurity | MutualTls = NO_SECURITY,
+    ) -> Self:
         """Opens a session and a bus on it; errors as in `open_session`."""
         keys.check_name(rig)  # before there is a session to be closed
-        return cls(open_session(endpoint, role, shared_memory), rig)
+        bus = cls(open_session(endpoint, role, shared_memory, security=security), rig)
+        if role is Role.ROUTER and security.link:
+            bus._keep(from_non_daemon_thread(lambda: link_log.declare(bus._session)))
+        return bus
 
     def publisher(self, topic: str, message: str, qos: Qos) -> Publisher:
         """See `contract.Bus.publisher`."""
@@ -88,8 +100,9 @@ class ZenohBus:
         key = self._key(topic)
 
         def on_query(query: zenoh.Query) -> None:
-            if query.payload is None:
-                return  # somebody asks what there is
+            if query.payload is None or str(query.key_expr) != key:
+                # Somebody asks what there is. Access control does not see a command in a query with wildcards.
+                return
             command = Sample(topic, _message(query.encoding), query.payload.to_bytes())
             query.reply(key, answer(command), encoding=f"{ENCODING};{message}")
 

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(rig.name, clock)
-    with rig_process.open_bus(rig, arguments) as bus:
+    with rig_process.open_bus(rig, arguments, "capture") as bus:
         health = Health(bus, "capture", headers)
         bus.declare_liveliness("capture")
         bus.answer_queries(keys.SCHEMA, sensor_metadata.SCHEMA_MESSAGE, sensor_metadata.schema)

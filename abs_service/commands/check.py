@@ -21,6 +21,8 @@ from typing import Any
 
 from abs_service import config, wiring
 from abs_service.bus import keys
+from abs_service.bus.security import roles
+from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.commands import replay
 from abs_service.commands.parts import data_rates, device_checks, disk, harmless_devices, preview_option, rig_process
 from abs_service.commands.parts.device_checks import CheckError
@@ -93,6 +95,10 @@ def describe(rig: config.ServiceConfig, source: str, toml: str = "", recording: 
         for name in rig.trackers:
             with _noting(("trackers", name, "sensors"), problems):
                 replay.recorded_rig(rig, name, Recording(recording))
+    try:
+        rig.bus.security(*roles.NAMES).check(rig.bus.endpoint, listens=False)
+    except TlsError as error:
+        problems.append(Problem(("bus", "tls", error.key), error.problem, error.value))
     if problems:
         lines = located(problems, toml)
         raise CheckError("\n".join([f"{source}: cannot work", *(f"  {line}" for line in lines)]))

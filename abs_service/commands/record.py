@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(rig.name, clock)
-    with rig_process.open_bus(rig, arguments) as bus:
+    with rig_process.open_bus(rig, arguments, "recorder") as bus:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
         # In parallel: it may take minutes.

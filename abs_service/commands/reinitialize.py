@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = rig_process.load_config(arguments)
     name = arguments.tracker or next(iter(settings.trackers), "")
     wiring.plan(settings, name)
-    with rig_process.open_bus(settings, arguments) as bus:
+    with rig_process.open_bus(settings, arguments, "operator") as bus:
         return request(bus, name, HeaderFactory(settings.name, WallClock()))
 
 

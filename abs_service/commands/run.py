@@ -26,7 +26,6 @@ from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
-from abs_service.bus.zenoh_bus import ZenohBus
 from abs_service.commands import view
 from abs_service.commands.parts import logs, rig_process
 from abs_service.display import journal
@@ -34,14 +33,13 @@ from abs_service.display.journal import JournalDisplay
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import TableDisplay
 from abs_service.recording import folder
-from abs_service.supervision import gc_tuning, log_lines, metrics, parent_watchdog, systemd
+from abs_service.supervision import log_lines, metrics, parent_watchdog, systemd
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.standby import Standby
 from abs_service.supervision.supervisor import Child, Limits, Supervisor
-from abs_service.wire.checked_bus import CheckedBus
 
 #: Receives the lines of a child's output, with its name.
 PassOn = Callable[[str, str], None]
@@ -71,10 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     if rig.record.enabled:
         folder.check(rig.record.directory)
     stop = rig_process.stop_on_signals()
-    gc_tuning.shorten_switch_interval()  # what the router passes on may have to wait for the threads of this process
-    where = (rig.bus.endpoint, Role.ROUTER)
     with (
-        CheckedBus(ZenohBus.open(rig.name, *where, rig.bus.shared_memory), time.monotonic_ns) as bus,
+        rig_process.open_bus_at(rig.bus.endpoint, Role.ROUTER, rig, arguments) as bus,
         file(rig) as path,
         make_display(as_json=arguments.json) as display,
         _logging_to(display, logs.on_stderr(arguments)) if not arguments.log_file else nullcontext(),

@@ -17,6 +17,8 @@ from typing import Any
 from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys, rig_health
+from abs_service.bus.security import roles
+from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
 from abs_service.display.health_words import words
@@ -36,10 +38,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Prints the health of every part and returns its exit code."""
-    endpoint, name = _whom(arguments)
-    check_endpoint(endpoint)
+    endpoint, name, security = _whom(arguments)
+    check_endpoint(endpoint, security)
     try:
-        answers = rig_health.ask(endpoint, name)
+        answers = rig_health.ask(endpoint, name, security)
     except BusError as error:
         return _nothing(str(error))
     if not answers:
@@ -52,13 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     return Exit.FAILED if wrong else Exit.OK
 
 
-def _whom(arguments: argparse.Namespace) -> tuple[str, str]:
-    """Endpoint and name of the rig; `*` for any."""
-    endpoint, name = DEFAULT_ENDPOINT, "*"
+def _whom(arguments: argparse.Namespace) -> tuple[str, str, NoSecurity | MutualTls]:
+    """Endpoint and name of the rig, `*` for any, and who it is that asks."""
+    endpoint, name, security = DEFAULT_ENDPOINT, "*", NO_SECURITY
     if arguments.config:
         rig = rig_process.load_config(arguments)
-        endpoint, name = rig.bus.endpoint, rig.name
-    return arguments.connect or endpoint, name if arguments.rig is None else keys.check_name(arguments.rig)
+        endpoint, name, security = rig.bus.endpoint, rig.name, rig.bus.security(roles.RIG, *roles.READERS)
+    return arguments.connect or endpoint, name if arguments.rig is None else keys.check_name(arguments.rig), security
 
 
 def _nothing(reason: str) -> Exit:

@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     stop = rig_process.stop_on_signals()
     clock = WallClock()
     headers = HeaderFactory(settings.name, clock)
-    with rig_process.open_bus(settings, arguments) as bus:
+    with rig_process.open_bus(settings, arguments, "tracker") as bus:
         health = Health(bus, f"track/{name}", headers)
         bus.declare_liveliness(f"track/{name}")
         rigs: SimpleQueue[Rig] = SimpleQueue()

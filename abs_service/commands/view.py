@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     rig = rig_process.load_config(arguments)
     stop = rig_process.stop_on_signals()
     headers = HeaderFactory(rig.name, WallClock())
-    with rig_process.open_bus(rig, arguments) as bus:
+    with rig_process.open_bus(rig, arguments, "viewer", "operator") as bus:
         health = Health(bus, "view", headers)
 
         def reinitialize(tracker: str) -> str:

@@ -5,26 +5,14 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
-from abs_service.bus.session import DEFAULT_ENDPOINT
+from abs_service.config.bus import BusTable
 from abs_service.config.calibration import CalibrationOrigin, DepthTable
 from abs_service.config.camera import CameraTable
 from abs_service.config.table import Table
-from abs_service.config.values import DeviceUri, Endpoint, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
+from abs_service.config.values import DeviceUri, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Rate = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]
-
-
-class BusTable(Table):
-    """`[bus]`: transport between the processes of a rig.
-
-    Attributes:
-        endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
-        shared_memory: images travel through shared memory between processes of one host.
-    """
-
-    endpoint: Endpoint = DEFAULT_ENDPOINT
-    shared_memory: bool = True
 
 
 class DeviceTable(Table):

@@ -5,14 +5,23 @@ import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from types import FrameType
 
 from abs_service import config
+from abs_service.bus.security import roles
+from abs_service.bus.security.mutual_tls import TlsError
 from abs_service.bus.session import Role
 from abs_service.bus.zenoh_bus import ZenohBus
+from abs_service.commands.parts import library_output
 from abs_service.supervision import gc_tuning
 from abs_service.wire.checked_bus import CheckedBus
+
+
+class SecurityError(Exception):
+    """A file of `[bus.tls]` that cannot be used; the message names the rig file, key, value and what is wrong."""
 
 
 def add_config(parser: argparse.ArgumentParser) -> None:
@@ -39,16 +48,38 @@ def load_config(arguments: argparse.Namespace) -> config.ServiceConfig:
     return config.load(arguments.config) if arguments.config else config.load_default()
 
 
-def open_bus(rig: config.ServiceConfig, arguments: argparse.Namespace) -> CheckedBus:
-    """The bus that the configuration and the arguments describe; close it before the process ends.
+def open_bus(
+    rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
+) -> AbstractContextManager[CheckedBus]:
+    """The bus that the configuration and the arguments describe.
+
+    Args:
+        rig: the configuration.
+        arguments: the arguments.
+        names: that its certificate may have beside `rig`, see `roles`.
 
     Raises:
         BusError: it cannot be opened.
+        SecurityError: a file of `[bus.tls]` cannot be used.
     """
-    gc_tuning.shorten_switch_interval()
     role = Role.ROUTER if arguments.listen else Role.CLIENT
-    endpoint = arguments.listen or arguments.connect or rig.bus.endpoint
-    return CheckedBus(ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory), time.monotonic_ns)
+    return open_bus_at(arguments.listen or arguments.connect or rig.bus.endpoint, role, rig, arguments, *names)
+
+
+@contextmanager
+def open_bus_at(
+    endpoint: str, role: Role, rig: config.ServiceConfig, arguments: argparse.Namespace, *names: str
+) -> Iterator[CheckedBus]:
+    """`open_bus` at a given endpoint, in a given role."""
+    gc_tuning.shorten_switch_interval()
+    # Zenoh says on standard output which clients it refuses.
+    with library_output.logged() if role is Role.ROUTER and rig.bus.tls else nullcontext():
+        try:
+            bus = ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory, rig.bus.security(*names, roles.RIG))
+        except TlsError as error:
+            raise SecurityError(f"{arguments.config or 'demo.toml'}: {error}") from None
+        with CheckedBus(bus, time.monotonic_ns) as checked:
+            yield checked
 
 
 def stop_on_signals() -> threading.Event:

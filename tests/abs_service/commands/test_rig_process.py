@@ -6,8 +6,12 @@ import signal
 
 import pytest
 
+from abs_service import config
 from abs_service.bus.session import BusError
 from abs_service.commands.parts import rig_process
+from abs_service.commands.parts.rig_process import SecurityError
+from abs_service.config.bus import BusTable, TlsTable
+from tests.conftest import encrypted
 
 
 @pytest.fixture
@@ -40,15 +44,33 @@ def parse(*arguments):
 def test_one_process_may_listen_and_others_connect_to_a_given_endpoint(endpoint):
     rig = rig_process.load_config(parse())
     with (
-        rig_process.open_bus(rig, parse("--listen", endpoint)),
-        rig_process.open_bus(rig, parse("--connect", endpoint)) as bus,
+        rig_process.open_bus(rig, parse("--listen", endpoint), "capture"),
+        rig_process.open_bus(rig, parse("--connect", endpoint), "viewer") as bus,
     ):
         assert bus.query("**", 0.1) == []
 
 
 def test_an_endpoint_of_the_command_line_is_checked_like_that_of_the_file():
-    with pytest.raises(BusError, match='"nowhere": not an endpoint'):
-        rig_process.open_bus(rig_process.load_config(parse()), parse("--connect", "nowhere"))
+    rig = rig_process.load_config(parse())
+    with (
+        pytest.raises(BusError, match='"nowhere": not an endpoint'),
+        rig_process.open_bus(rig, parse("--connect", "nowhere"), "viewer"),
+    ):
+        pass
+
+
+def test_a_certificate_that_is_of_no_use_to_a_process_is_named_with_its_file(keys, endpoint, tmp_path):
+    tls = {"authority": "authority.pem", "certificate": "viewer.pem", "key": "viewer.key"}
+    rig = config.load_default()
+    bus = BusTable(endpoint=encrypted(endpoint), tls=TlsTable(**{key: keys / file for key, file in tls.items()}))
+    arguments = parse("rig.toml")
+    with (
+        pytest.raises(
+            SecurityError, match=r'^rig\.toml: bus\.tls\.certificate = ".*": its name is "viewer"; .* tracker or rig'
+        ),
+        rig_process.open_bus(rig.model_copy(update={"bus": bus}), arguments, "tracker"),
+    ):
+        pass
 
 
 def test_a_process_cannot_both_listen_and_connect(endpoint, capsys):

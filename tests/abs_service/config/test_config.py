@@ -110,6 +110,10 @@ CASES = {
         "record.compression = \"gzip\": must be 'none', 'lz4' or 'zstd'",
     ),
     "an endpoint without a port": ('[bus]\nendpoint = "tcp/here"\n', "an endpoint is protocol/address:port"),
+    "mutual TLS on an endpoint without": (
+        '[bus.tls]\nauthority = "a"\ncertificate = "b"\nkey = "c"\n',
+        "must begin with tls/, because there is a table [bus.tls]",
+    ),
     "an endpoint with too high a port": (
         '[bus]\nendpoint = "tcp/here:70000"\n',
         "an endpoint is protocol/address:port",

@@ -1,0 +1,53 @@
+"""The tables `[bus]` and `[bus.tls]` of a configuration file."""
+
+from typing import Self
+
+from pydantic import model_validator
+
+from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
+from abs_service.bus.session import DEFAULT_ENDPOINT
+from abs_service.config.problems import Problem, ProblemsError
+from abs_service.config.table import Table
+from abs_service.config.values import Endpoint, RelativePath
+
+
+class TlsTable(Table):
+    """`[bus.tls]`: encryption, and who may publish and ask what; the endpoint begins with `tls/` then.
+
+    Attributes:
+        authority: certificate of the authority that signed those of all hosts, like the others in PEM format.
+        certificate: this host's; its common name says what it may do: `rig`, `capture`, `tracker`, `recorder`,
+            `viewer` or `operator` (hosts.md).
+        key: its private key.
+    """
+
+    authority: RelativePath
+    certificate: RelativePath
+    key: RelativePath
+
+
+class BusTable(Table):
+    """`[bus]`: transport between the processes of a rig.
+
+    Attributes:
+        endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
+        shared_memory: images travel through shared memory between processes of one host.
+        tls: mutual TLS; without it, whoever reaches the endpoint may do everything.
+    """
+
+    endpoint: Endpoint = DEFAULT_ENDPOINT
+    shared_memory: bool = True
+    tls: TlsTable | None = None
+
+    @model_validator(mode="after")
+    def _encrypted(self) -> Self:
+        if self.tls and not self.endpoint.startswith("tls/"):
+            problem = "must begin with tls/, because there is a table [bus.tls]"
+            raise ProblemsError([Problem(("endpoint",), problem, self.endpoint)])
+        return self
+
+    def security(self, *names: str) -> NoSecurity | MutualTls:
+        """Who may connect, for a process whose certificate has one of these names."""
+        if self.tls is None:
+            return NO_SECURITY
+        return MutualTls(self.tls.authority, self.tls.certificate, self.tls.key, names)

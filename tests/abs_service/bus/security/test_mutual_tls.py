@@ -1,0 +1,134 @@
+"""Files of mutual TLS that cannot be used, and clients that are refused, are explained."""
+
+import shutil
+import subprocess
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from abs_service import cli
+from abs_service.bus import session
+from abs_service.bus.security.mutual_tls import MutualTls, TlsError
+from abs_service.bus.session import BusError, Role, check_endpoint, open_session
+from tests.conftest import encrypted
+
+
+@pytest.fixture
+def lab(keys, tmp_path):
+    """A copy of the certificates, to be spoilt."""
+    return shutil.copytree(keys, tmp_path / "keys")
+
+
+def tls(folder, name="viewer", key=None):
+    return MutualTls(folder / "authority.pem", folder / f"{name}.pem", folder / f"{key or name}.key")
+
+
+def openssl(*arguments):
+    subprocess.run(["openssl", *map(str, arguments)], check=True, capture_output=True)
+
+
+def expire(folder, name):
+    """Signs a certificate anew that ended yesterday."""
+    request = folder / "request"
+    openssl("req", "-new", "-key", folder / f"{name}.key", "-subj", f"/CN={name}", "-out", request)
+    authority = ("-CA", folder / "authority.pem", "-CAkey", folder / "authority.key")
+    openssl("x509", "-req", "-in", request, *authority, "-days", "-1", "-out", folder / f"{name}.pem")
+
+
+def test_what_is_right_has_a_name_and_an_end(keys):
+    for name in ("viewer", "rig"):
+        found = tls(keys, name).check("tls/localhost:1", listens=name == "rig")
+        assert found.name == name
+        assert timedelta(days=364) < found.ends - datetime.now(UTC) < timedelta(days=366)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda lab: (lab / "viewer.key").unlink(), r'bus\.tls\.key = ".*viewer\.key": cannot be read: No such file'),
+        (lambda lab: (lab / "authority.pem").unlink(), r"bus\.tls\.authority = .*: cannot be read: No such file"),
+        (lambda lab: (lab / "viewer.pem").write_text("x"), r"bus\.tls\.certificate = .*: holds no certificate in PEM"),
+        (lambda lab: (lab / "authority.pem").write_text(""), r"bus\.tls\.authority = .*: holds no certificate in PEM"),
+        (lambda lab: (lab / "viewer.key").write_text("x"), r"bus\.tls\.key = .*: holds no private key in PEM"),
+        (
+            lambda lab: shutil.copy(lab / "rig.key", lab / "viewer.key"),
+            r"bus\.tls\.key = .*: does not belong to .*viewer\.pem",
+        ),
+        (
+            lambda lab: expire(lab, "viewer"),
+            r"bus\.tls\.certificate = .*viewer\.pem.*: others refuse it, by .*authority\.pem: certificate has expired",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(spoil, message, lab):
+    spoil(lab)
+    with pytest.raises(TlsError, match=message):
+        tls(lab).check("tls/localhost:1", listens=False)
+
+
+def test_a_certificate_of_another_authority_is_not_used(keys, tmp_path):
+    assert cli.main(["keys", str(tmp_path / "other"), "--only", "viewer"]) == 0
+    shutil.copy(keys / "authority.pem", tmp_path / "other")
+    with pytest.raises(
+        TlsError, match=r"bus\.tls\.certificate = .*: others refuse it, by .*: unable to get local issuer"
+    ):
+        tls(tmp_path / "other").check("tls/localhost:1", listens=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "endpoint", "message"),
+    [
+        ("rig", "tls/rig.lab:1", "Hostname mismatch, certificate is not valid for 'rig.lab'"),
+        ("rig", "tls/127.0.0.1:1", "IP address mismatch, certificate is not valid for '127.0.0.1'"),
+        ("viewer", "tls/localhost:1", "unsuitable certificate purpose"),
+    ],
+)
+def test_who_listens_has_a_certificate_for_its_host(name, endpoint, message, keys):
+    with pytest.raises(TlsError, match=message):
+        tls(keys, name).check(endpoint, listens=True)
+
+
+def test_a_name_that_is_no_role_is_refused(lab):
+    request, authority = lab / "request", ("-CA", lab / "authority.pem", "-CAkey", lab / "authority.key")
+    openssl("req", "-new", "-key", lab / "viewer.key", "-subj", "/CN=guest", "-out", request)
+    openssl("x509", "-req", "-in", request, *authority, "-out", lab / "viewer.pem")
+    with pytest.raises(TlsError, match='its name is "guest"; this process needs rig or capture or tracker or'):
+        tls(lab).check("tls/localhost:1", listens=False)
+
+
+def test_a_certificate_that_ends_soon_is_warned_of(keys, endpoint, caplog, monkeypatch):
+    open_session(encrypted(endpoint), Role.ROUTER, security=tls(keys, "rig")).close()
+    assert caplog.text == ""
+    monkeypatch.setattr(session, "CERTIFICATE_ENDS", timedelta(days=400))
+    open_session(encrypted(endpoint), Role.ROUTER, security=tls(keys, "rig")).close()
+    assert 'the certificate "rig" ends on 20' in caplog.text
+
+
+def test_tls_wants_an_endpoint_of_tls(keys):
+    with pytest.raises(BusError, match=r'bus\.endpoint = "tcp/localhost:1": must begin with tls/'):
+        check_endpoint("tcp/localhost:1", tls(keys))
+
+
+def test_a_client_that_does_not_trust_the_router_says_so(tmp_path, secured, endpoint, monkeypatch):
+    monkeypatch.setattr(session, "CONNECT_TIMEOUT_MS", 500)
+    secured("rig", Role.ROUTER)
+    assert cli.main(["keys", str(tmp_path / "new"), "--only", "viewer"]) == 0
+    message = f'bus.endpoint = "{encrypted(endpoint)}": its certificate is refused here: '
+    with pytest.raises(BusError, match=message):
+        open_session(encrypted(endpoint), Role.CLIENT, security=tls(tmp_path / "new"))
+
+
+def test_a_router_that_refuses_a_client_says_why(keys, lab, secured, endpoint):
+    """A client that trusts the router, but is of another authority."""
+    secured("rig", Role.ROUTER)
+    assert cli.main(["keys", str(lab / "new"), "--only", "viewer"]) == 0
+    mixed = MutualTls(keys / "authority.pem", lab / "new" / "viewer.pem", lab / "new" / "viewer.key")
+    assert mixed.refusal(encrypted(endpoint)).startswith("it refuses this certificate: tls")
+    assert tls(keys).refusal("tls/localhost:9") == ""
+
+
+def test_a_client_without_tls_is_refused(secured, endpoint, monkeypatch):
+    monkeypatch.setattr(session, "CONNECT_TIMEOUT_MS", 500)
+    secured("rig", Role.ROUTER)
+    with pytest.raises(BusError, match="nothing answers there"):
+        open_session(endpoint.replace("127.0.0.1", "localhost"), Role.CLIENT)
