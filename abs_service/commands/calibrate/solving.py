@@ -18,7 +18,7 @@ from abs_service.calibration.shots import corner_extraction, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import calibrations, live
+from abs_service.commands.calibrate import calibrations, live, skipping
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
@@ -89,6 +89,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--every", metavar="S", type=float, default=0.5, help="least time between shots of a recording (%(default)g)"
     )
+    skipping.add_argument(parser)
     parser.add_argument(
         "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
     )
@@ -105,7 +106,7 @@ def material(arguments: argparse.Namespace) -> Material:
     """Detects the board in all images, with progress on the terminal.
 
     Raises:
-        SolveOptionError: incompatible options.
+        SolveOptionError, SkipError: incompatible options.
         UnusableImagesError: no board, or too few views; the message says why.
         TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
         ViewsAlikeError, MirroredSensorError: the views do not allow a calibration.
@@ -121,7 +122,7 @@ def material(arguments: argparse.Namespace) -> Material:
         known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
         is_live = live.is_live(arguments.source)
         seen, shot = BoardObservations(), None
-        for shot in shots:
+        for shot in skipping.kept(shots, arguments.skip, arguments.source):
             new = corner_extraction.see(target, shot, cameras)
             if is_live and not live.adds(new, seen):
                 continue
