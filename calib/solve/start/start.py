@@ -63,7 +63,8 @@ def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first
     """
     for simpler in sensor.lens.simpler:  # numerator and denominator of a rational lens are redundant without distortion
         if first.lens.is_pinhole:
-            first = fit_camera(name, replace(sensor, lens=simpler), views, first)
+            fixed = tuple(each for each in sensor.fixed if each in simpler.fixable)
+            first = fit_camera(name, replace(sensor, lens=simpler, fixed=fixed), views, first)
     boards = {view.shot: found[0].T_sb for view in views if (found := pose_candidates(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")
