@@ -11,9 +11,9 @@ from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import adjust
 from calib.solve.bundle.formulation import Formulation, formulate, groups_of
-from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters, Layout
-from calib.solve.bundle.lens_parameters import kind_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters, Layout
+from calib.solve.bundle.parameters.lens_parameters import kind_of
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates

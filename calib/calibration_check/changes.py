@@ -14,7 +14,7 @@ from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle import rotations
-from calib.solve.bundle.layout import POSE
+from calib.solve.bundle.parameters.layout import POSE
 from calib.solve.validation.contradictions import Contradiction, contradictions
 
 #: Minimum number of common shots of two sensors.

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 from calib.solve.start.start import start

@@ -20,7 +20,7 @@ from calib.calibration_check.changes import PairChange, contradicting, pair_chan
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.bundle.state import SensorState
+from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.
 MOST_SHOTS = 40

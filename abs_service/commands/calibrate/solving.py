@@ -20,7 +20,7 @@ from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
 from calib.formats.plausibility import baselines
-from calib.solve.bundle.lens_parameters import KINDS, LensKind, kind_of
+from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation.verdict import assess

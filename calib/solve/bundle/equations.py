@@ -12,9 +12,9 @@ from calib.camera import CameraError
 from calib.lenses.lens import LensError
 from calib.solve.bundle import motion, rotations
 from calib.solve.bundle.blocks import Corners, JacobianBlocks, Planes
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Layout
 from calib.solve.bundle.motion import ShotPoses, ViewPoses
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, Layout
+from calib.solve.bundle.parameters.state import State
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from functools import cached_property
 from calib.board.distinct import distinct_poses
 from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters
-from calib.solve.bundle.lens_parameters import ASPECT, BROWN_CONRADY, MATRIX, LensKind
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters
+from calib.solve.bundle.parameters.lens_parameters import ASPECT, BROWN_CONRADY, MATRIX, LensKind
 
 
 class TaskError(ValueError):

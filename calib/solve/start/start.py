@@ -11,7 +11,7 @@ from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, search
 from calib.solve.bundle.formulation import formulate
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, registration
 from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates

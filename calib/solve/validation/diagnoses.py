@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.board.views import CornerView
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Parameter
 from calib.solve.start.board_poses import pose_candidates

@@ -17,9 +17,9 @@ from calib import pose
 from calib.camera import Camera
 from calib.solve.bundle import rotations
 from calib.solve.bundle.blocks import by_intrinsics, directions_by_intrinsics
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, FreeParameters, Layout
-from calib.solve.bundle.lens_parameters import MATRIX
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, FreeParameters, Layout
+from calib.solve.bundle.parameters.lens_parameters import MATRIX
+from calib.solve.bundle.parameters.state import State
 from calib.solve.solution import Solution
 from calib.solve.validation.support import supported
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calib.solve.bundle.formulation import formulate
-from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL
+from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, RATIONAL
 from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
 from calib.solve.start.start import start

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle.lens_parameters import MATRIX, PRIOR_SIGMA, LensKind
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.lens_parameters import MATRIX, PRIOR_SIGMA, LensKind
+from calib.solve.bundle.parameters.state import SensorState, State
 
 POSE = ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
 DEPTH_TERMS = ("depth_offset", "depth_scale")
