@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from abs_service.calibration.files import corner_file, target_file
+from abs_service.calibration.files import corner_file, mrcal_corners, target_file
 from abs_service.calibration.files.rig_file import SensorCalibration
 from abs_service.calibration.shots import corner_extraction, unseen
 from abs_service.calibration.shots.corner_extraction import BoardObservations
@@ -16,6 +16,7 @@ from abs_service.calibration.shots.shots import Shot
 from abs_service.commands.calibrate import calibrations, live, skipping
 from calib.board import coverage
 from calib.board.distinct import counts_of, distinct_poses
+from calib.board.target import Target
 from calib.camera import Camera
 from calib.solve.weights import shared
 from drivers.replay.recording import Recording
@@ -55,12 +56,12 @@ def material(arguments: argparse.Namespace) -> Material:
     """
     if arguments.out.exists():
         raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
-    if (arguments.source is None) == (not arguments.images):
+    if (arguments.source is None or mrcal_corners.is_vnl(arguments.source)) == (not arguments.images):
         raise SolveOptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
     target = target_file.read(arguments.target)
     known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
-    if corner_file.is_corner_file(arguments.source):
-        seen = corner_file.read(arguments.source, target)
+    if corner_file.is_corner_file(arguments.source) or mrcal_corners.is_vnl(arguments.source):
+        seen = _saved(arguments, target, known)
         numbers = sorted({view.shot for view in seen.corners})
         shots = skipping.kept([Shot(number, {}) for number in numbers], arguments.skip, None)
         return _checked(seen.of_shots([shot.number for shot in shots]), known, (arguments.source,))
@@ -80,7 +81,24 @@ def material(arguments: argparse.Namespace) -> Material:
     if shot is not None and not seen.corners:
         raise UnusableImagesError(unseen.reason(target, seen, shot))
     corner_file.write(seen, corner_file.path_beside(arguments.out))
+    if arguments.corners is not None:
+        mrcal_corners.write(seen, target, arguments.corners)
     return _checked(seen, known, data)
+
+
+def _saved(arguments: argparse.Namespace, target: Target, known: Mapping[str, SensorCalibration]) -> BoardObservations:
+    """Detections of a file; those of mrcal need names of the pictures and sizes of the images."""
+    if corner_file.is_corner_file(arguments.source):
+        return corner_file.read(arguments.source, target)
+    patterns, given = named(arguments.images, "--images"), named(arguments.size, "--size")
+    sizes = {name: (each.camera.width, each.camera.height) for name, each in known.items() if name in patterns}
+    for name in patterns:
+        width, _, height = given.get(name, "").partition("x")
+        if width.isdecimal() and height.isdecimal():
+            sizes[name] = (int(width), int(height))
+        if name not in sizes:
+            raise SolveOptionError(f"--size {name}=WxH: {arguments.source} does not say how large its images are")
+    return mrcal_corners.read(arguments.source, target, patterns, sizes)
 
 
 def _checked(seen: BoardObservations, known: Mapping[str, SensorCalibration], data: tuple[Path, ...]) -> Material:

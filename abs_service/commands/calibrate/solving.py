@@ -47,11 +47,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SOURCE",
         nargs="?",
         type=Path,
-        help="recording (.mcap), corners (.npz), or rig (.toml): live",
+        help="recording (.mcap), corners (.npz, .vnl), or rig (.toml): live",
     )
     parser.add_argument(
         "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
     )
+    parser.add_argument(
+        "--size",
+        metavar="NAME=WxH",
+        action="append",
+        default=[],
+        help="of its images, for mrcal's corners; repeatable",
+    )
+    parser.add_argument("--corners", metavar="FILE.vnl", type=Path, help="also write the corners for mrcal")
     parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
     parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")

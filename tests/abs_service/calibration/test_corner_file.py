@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from abs_service import cli
-from abs_service.calibration.files import corner_file, target_file
+from abs_service.calibration.files import corner_file, mrcal_corners, target_file
 from abs_service.calibration.files.corner_file import CornerFileError
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.commands.calibrate import calibrations
 from calib.board.target import Chessboard
+from calib.formats import vnl
 from tests.calib.solve import board_views
 
 BOARD = Chessboard(board_views.COLUMNS, board_views.ROWS, board_views.SQUARE)
@@ -84,3 +85,45 @@ def test_what_cannot_be_fixed_is_named(
         assert cli.main(["calibrate", "rig", *given, "--fix", fix, "--out", str(tmp_path / "x.toml")]) == 2
         assert why in capsys.readouterr().err
     assert not (tmp_path / "x.toml").exists()
+
+
+VNL = """## mrgingham
+# filename x y level
+images/left-1.png - -
+images/left-2.png 10.5 20 0
+images/left-2.png 30 20.25 -
+images/left-2.png 30 40.25 -1
+"""
+
+
+def test_a_table_of_mrcal_has_points_that_are_missing_or_ignored() -> None:
+    read = vnl.read(VNL)
+    assert [*read] == ["images/left-1.png", "images/left-2.png"]
+    np.testing.assert_array_equal(read["images/left-2.png"], [[10.5, 20], [np.nan] * 2, [np.nan] * 2])
+    for wrong, why in (("a 1 2 0\n", "line 1"), ("# filename x y level\na 1 b 0\n", "line 2"), ("", "legend")):
+        with pytest.raises(vnl.VnlError, match=why):
+            vnl.read(wrong)
+
+
+def test_corners_of_mrcal_are_solved_without_images(
+    seen: BoardObservations, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "corners.vnl"
+    mrcal_corners.write(seen, BOARD, path)
+    read = mrcal_corners.read(path, BOARD, {name: f"{name}-*" for name in seen.sizes}, seen.sizes)
+    for own, other in zip(read.corners, seen.corners, strict=True):
+        assert (own.sensor, own.shot) == (other.sensor, other.shot)
+        np.testing.assert_allclose(own.points_b, other.points_b)
+        np.testing.assert_allclose(own.pixels, other.pixels, atol=1e-6)
+    target_file.write(BOARD, tmp_path / "board.toml")
+    common = ["calibrate", "intrinsics", str(path), "--target", str(tmp_path / "board.toml")]
+    common += ["--out", str(tmp_path / "x.toml")]
+    given = [*common, "--images", "color=color-*"]
+    assert cli.main(given) == 2
+    assert "--size color=WxH" in capsys.readouterr().err
+    given += ["--size", "color=1280x720"]
+    assert cli.main([*common, "--images", "c=left-*", "--size", "c=1280x720"]) == 2
+    assert "has a name that --images matches; names: " in capsys.readouterr().err
+    assert cli.main(given) in (0, 1)
+    truth = board_views.three_heads()["color"].camera
+    assert calibrations.load(tmp_path / "x.toml").sensors["color"].camera.fx == pytest.approx(truth.fx, rel=0.01)
