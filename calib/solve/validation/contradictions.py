@@ -86,7 +86,7 @@ def contradictions(solution: Solution) -> list[Contradiction]:
     found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
     if len(found) > _MOST * len(solution.task.shots):
         return []
-    return sorted(found, key=lambda one: -one.miss / max(one.usual, 1e-12))
+    return sorted(found, key=lambda one: -one.miss / one.usual)
 
 
 def scatter(solution: Solution) -> list[Scatter]:
@@ -127,7 +127,7 @@ def _of_shot(
         if view.shot != shot:
             continue
         others = [one.rms for one in solution.views if (one.sensor, one.of) == (view.sensor, view.of)]
-        usual = float(np.median(others))
+        usual = max(float(np.median(others)), 1e-12)
         if view.of == "corners":
             sizes = np.linalg.norm(view.residuals, axis=1) / solution.deviations[f"{view.sensor} corners"]
             is_bad = float(np.median(sizes)) > _DEVIATIONS and view.rms > _HARMLESS_PX
