@@ -5,6 +5,7 @@
   abs-service calibrate rig take.mcap --target target.toml --keep color --reference color --fixed-pose depth \
       --depth-terms depth=scale --out l.toml                                                  aligned depth
   abs-service calibrate rig rig.toml --target target.toml --out lab.calibration.toml          live, 30 different views
+  abs-service calibrate rig take.corners.npz --target target.toml --skip 7 --fix k3 --out l.toml   again, without images
   abs-service calibrate rig --images left='l*.png' --images right='r*.png' --target target.toml --out p.toml
 
 Corners in colour, infrared and amplitude images and the distances that depth sensors measure on the board are explained
