@@ -42,25 +42,7 @@ def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the common arguments."""
-    parser.add_argument(
-        "source",
-        metavar="SOURCE",
-        nargs="?",
-        type=Path,
-        help="recording (.mcap), corners (.npz, .vnl), or rig (.toml): live",
-    )
-    parser.add_argument(
-        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
-    )
-    parser.add_argument(
-        "--size",
-        metavar="NAME=WxH",
-        action="append",
-        default=[],
-        help="of its images, for mrcal's corners; repeatable",
-    )
-    parser.add_argument("--corners", metavar="FILE.vnl", type=Path, help="also write the corners for mrcal")
-    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
+    _add_sources(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
     parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")
     parser.add_argument(
@@ -84,6 +66,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--needed", metavar="PX", type=float, default=1.0, help="how well projections have to be known (%(default)g)"
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
+
+
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments that say where the corners come from, and of which board."""
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        type=Path,
+        help="recording (.mcap), corners (.npz, .vnl), or rig (.toml): live",
+    )
+    parser.add_argument(
+        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
+    )
+    parser.add_argument(
+        "--size",
+        metavar="NAME=WxH",
+        action="append",
+        default=[],
+        help="of its images, for mrcal's corners; repeatable",
+    )
+    parser.add_argument("--corners", metavar="FILE.vnl", type=Path, help="also write the corners for mrcal")
+    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
 
 
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
