@@ -6,7 +6,7 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -111,7 +111,7 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
     return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed, **terms)  # pyright: ignore[reportArgumentType]
 
 
-def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Iterable[str]) -> tuple[str, ...]:
+def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collection[str]) -> tuple[str, ...]:
     """Intrinsics of a sensor that `--fix` holds where they begin."""
     found: dict[str, None] = {}
     for text in options:

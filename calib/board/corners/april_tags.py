@@ -46,7 +46,7 @@ def _tags(levels: Grey, enlarged: int, grown: int) -> dict[int, NDArray[np.float
     if numbers is None:
         return {}
     corners = [(each.reshape(4, 2).astype(np.float64) + 0.5) / enlarged - 0.5 for each in found]
-    return dict(zip(numbers.ravel().tolist(), corners, strict=True))
+    return {int(number): each for number, each in zip(numbers.ravel(), corners, strict=True)}
 
 
 def _at_the_corners(levels: Grey, corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -25,7 +25,9 @@ def test_a_file_that_is_given_three_times_counts_once_and_holds_nothing_out() ->
     region = np.ones((24, 32), bool)
 
     def by_sequence(pairs: list) -> bool:
-        return measurement.calibrate(*zip(*pairs), region, np.random.default_rng(0), lambda _: None).by_sequence
+        taken, targets = [one for one, _ in pairs], [target for _, target in pairs]
+        generator = np.random.default_rng(0)
+        return measurement.calibrate(taken, targets, region, generator, lambda _: None).by_sequence
 
     assert by_sequence(given)
     joined, (said,) = counted_once(given)
