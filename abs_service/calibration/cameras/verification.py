@@ -100,7 +100,7 @@ def verdicts(found: Verification) -> list[Verdict]:
     disagree = any(one.level == Level.BAD for one in scatter)
     lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
     named = {one.about for one in lasting}
-    said = [*lasting, *scatter, *causes.of_contradictions(contradicting(found.changes)), *fits]
+    said = [*lasting, *(scatter or causes.of_contradictions(contradicting(found.changes))), *fits]
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
     changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
     said += [_of_pair(change, found.comparison) for change in changes]

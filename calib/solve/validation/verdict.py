@@ -70,8 +70,9 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    contradicting = contradictions(solution)
-    reasons = [*_contradicting(contradicting), *_scattered(solution), *weak_directions(solution, distance)]
+    scattered = _scattered(solution)
+    contradicting = [] if scattered else contradictions(solution)  # without a rest, nothing contradicts it
+    reasons = [*scattered, *_contradicting(contradicting), *weak_directions(solution, distance)]
     reasons += _outliers(solution, {one.shot for one in contradicting})
     reasons += _uncertain({**images, **pairs}, needed_px)
     try:
