@@ -71,7 +71,7 @@ class SensorEvidence(Table):
 
     Attributes:
         factory: the device's own calibration, which the file's takes the place of.
-        sigma: standard deviation of every determined parameter; names as in `calib.solve.bundle.layout`.
+        sigma: standard deviation of every determined parameter; names as in `calib.solve.bundle.parameters.layout`.
         residuals: what is left.
     """
 

@@ -29,8 +29,9 @@ class Synchroniser:
     deadline is over, or too many reference frames wait. Sets leave in order of time, no frame is in two of them, and
     within a stream later sets hold later frames.
 
-    Frames are compared on `t_host_ns`, all of one host's clock. When the reference stream changes it, as after a reboot
-    of that host, all streams begin anew. A stream's size and encoding are those of the first frame of its epoch.
+    Frames are compared by the middle of their exposures (`Frame.at_middle`), on one host's clock. When the reference
+    stream changes it, as after a reboot of that host, all streams begin anew. A stream's size and encoding are those of
+    the first frame of its epoch.
 
     Args:
         reference: stream whose frames give the sets their time.
@@ -80,7 +81,7 @@ class Synchroniser:
         if frame.host_clock != self._host_clock:
             self._count(frame.key, "other_clock")
             return sets
-        offset_ns = self._offsets_ns.get(frame.sensor, 0)
+        frame, offset_ns = frame.at_middle(), self._offsets_ns.get(frame.sensor, 0)
         self._insert(replace(frame, t_host_ns=frame.t_host_ns + offset_ns) if offset_ns else frame)
         return sets + self._form()
 
@@ -94,7 +95,6 @@ class Synchroniser:
         """Returns the sets whose deadline is over at `now_ns`, with what there is.
 
         The time is that of this host's CLOCK_MONOTONIC, to which the frames' host times need not belong.
-
         A stream that was missing in a set is not waited for until it delivers again.
         """
         sets: list[FrameSet] = []

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.april_grid import AprilGrid
 from calib.board.target import Charuco, Chessboard, Target
 
 #: Width of a marker's black frame, in cells.
@@ -32,6 +33,8 @@ def artwork(target: Target) -> Artwork:
     if isinstance(target, Charuco):
         squares = _black_squares(target.columns, target.rows, target.square)
         return Artwork(np.concatenate([squares, _markers(target)]), np.zeros((0, 3)))
+    if isinstance(target, AprilGrid):
+        return Artwork(target.black_rectangles(), np.zeros((0, 3)))
     centers = target.points()[:, :2]
     radius = np.full((len(centers), 1), target.diameter / 2)
     return Artwork(np.zeros((0, 4)), np.concatenate([centers, radius], axis=1))

@@ -7,19 +7,19 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.april_grid import AprilGrid
+from calib.board.target_checks import TargetError, check_counts, check_length
+
 Points = NDArray[np.float64]
 
 Dictionary = Literal[
     "4x4_50", "4x4_100", "4x4_250", "4x4_1000", "5x5_50", "5x5_100", "5x5_250", "5x5_1000", "6x6_50", "6x6_100",
     "6x6_250", "6x6_1000", "7x7_50", "7x7_100", "7x7_250", "7x7_1000", "original",
+    "apriltag_16h5", "apriltag_25h9", "apriltag_36h10", "apriltag_36h11",
 ]  # fmt: skip
 
 #: OpenCV's marker dictionaries, in the order of its enumeration.
 DICTIONARIES: tuple[Dictionary, ...] = get_args(Dictionary)
-
-
-class TargetError(ValueError):
-    """Invalid board parameters; the message begins with the wrong attribute."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class Chessboard:
     square: float
 
     def __post_init__(self) -> None:
-        _check_counts(self.columns, self.rows, 3)
-        _check_length("square", self.square)
+        check_counts(self.columns, self.rows, 3)
+        check_length("square", self.square)
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -82,9 +82,9 @@ class Charuco:
     dictionary: Dictionary = "5x5_250"
 
     def __post_init__(self) -> None:
-        _check_counts(self.columns, self.rows, 3)
-        _check_length("square", self.square)
-        _check_length("marker", self.marker)
+        check_counts(self.columns, self.rows, 3)
+        check_length("square", self.square)
+        check_length("marker", self.marker)
         if self.marker >= self.square:
             raise TargetError(f"marker: {self.marker:g} m must be less than the square of {self.square:g} m around it")
         if self.dictionary not in DICTIONARIES:
@@ -189,7 +189,7 @@ class AsymmetricCircles:
         return self.spacing * np.stack([2 * column + row % 2, row, 0 * row], axis=1, dtype=np.float64)
 
 
-Target = Chessboard | Charuco | Circles | AsymmetricCircles
+Target = Chessboard | Charuco | Circles | AsymmetricCircles | AprilGrid
 
 
 def outline(target: Target) -> Points:
@@ -204,20 +204,9 @@ def _lattice(columns: int, rows: int, spacing: float) -> Points:
     return spacing * np.stack([column, row, 0 * row], axis=1, dtype=np.float64)
 
 
-def _check_counts(columns: int, rows: int, least: int) -> None:
-    for name, count in (("columns", columns), ("rows", rows)):
-        if not least <= count <= 100:
-            raise TargetError(f"{name}: {count} must be from {least} to 100")
-
-
-def _check_length(name: str, length: float) -> None:
-    if not 1e-4 <= length <= 10:
-        raise TargetError(f"{name}: {length:g} m must be from 0.0001 to 10 m; lengths are in metres")
-
-
 def _check_discs(columns: int, rows: int, spacing: float, diameter: float, name: str) -> None:
-    _check_counts(columns, rows, 3)
-    _check_length(name, spacing)
-    _check_length("diameter", diameter)
+    check_counts(columns, rows, 3)
+    check_length(name, spacing)
+    check_length("diameter", diameter)
     if diameter >= spacing:
         raise TargetError(f"diameter: {diameter:g} m must be less than the {name} of {spacing:g} m")

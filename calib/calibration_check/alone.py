@@ -35,7 +35,7 @@ class CornerFit:
 def corner_fit(stored: Stored, views: Views, sensor: str) -> CornerFit:
     """Residuals of one sensor that detects corners."""
     own = Views([view for view in views.corners if view.sensor == sensor], ())
-    adjusted = solve(stored, own, ())
+    adjusted = solve(stored, own, ()).adjustment
     group = adjusted.equations.groups[0]
     residuals = (adjusted.residuals.reshape(-1, 2)) * group.measured.sigmas[:, None]
     return CornerFit(group.measured.pixels, residuals, len(own.corners))

@@ -9,20 +9,21 @@ from calib import pose
 from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle.adjustment import Adjustment, adjust
+from calib.solve.bundle.adjustment import adjust
 from calib.solve.bundle.formulation import Formulation, formulate, groups_of
-from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters, Layout
-from calib.solve.bundle.lens_parameters import kind_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters, Layout
+from calib.solve.bundle.parameters.lens_parameters import kind_of
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates
 
 
-def solve(stored: Stored, views: Views, moving: Collection[str]) -> Adjustment:
+def solve(stored: Stored, views: Views, moving: Collection[str]) -> Solution:
     """Board poses and the poses of `moving` sensors, with estimated deviations."""
     equations = formulation(stored, views, moving)
     count = len(groups_of(equations.task))
-    return adjust(equations, _start(stored, views), count, lambda _: None)
+    return Solution(equations.task, adjust(equations, _start(stored, views), count, lambda _: None))
 
 
 def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = ()) -> Formulation:

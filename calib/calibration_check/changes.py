@@ -1,6 +1,6 @@
 """Relative motion of pairs of sensors since the calibration, with its significance."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -14,7 +14,8 @@ from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle import rotations
-from calib.solve.bundle.layout import POSE
+from calib.solve.bundle.parameters.layout import POSE
+from calib.solve.validation.contradictions import Contradiction, contradictions
 
 #: Minimum number of common shots of two sensors.
 MIN_SHOTS = 3
@@ -35,6 +36,7 @@ class PairChange:
         shift_px: resulting shift in the second sensor's image [px], root mean square.
         sigma_px: standard deviation of that shift, from the stored and the new covariance [px].
         squared: squared Mahalanobis distance of turn and move; chi-squared with 6 degrees of freedom without motion.
+        contradicting: shots that contradict the others and were left out.
     """
 
     first: str
@@ -45,6 +47,7 @@ class PairChange:
     shift_px: float
     sigma_px: float
     squared: float
+    contradicting: tuple[Contradiction, ...] = ()
 
     @property
     def is_significant(self) -> bool:
@@ -66,9 +69,21 @@ def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
     ]
 
 
+def contradicting(changes: Sequence[PairChange]) -> list[Contradiction]:
+    """Contradicting shots of all pairs, each once, by number."""
+    found = {one.shot: one for change in changes for one in change.contradicting}
+    return [found[shot] for shot in sorted(found)]
+
+
 def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> PairChange:
     second = pair[1]
-    adjusted = solve(stored, views, (second,))
+    solution = solve(stored, views, (second,))
+    contradicting = contradictions(solution)
+    rest = {*solution.task.shots} - {one.shot for one in contradicting}
+    if contradicting and len(rest) >= MIN_SHOTS:
+        views, shots = views.of(pair, rest), len(rest)
+        solution = solve(stored, views, (second,))
+    adjusted = solution.adjustment
     before, after = stored.sensors[second].camera, adjusted.state.sensors[second].camera
     turn = rotations.logarithm((after.T_rs[:3, :3] @ before.T_rs[:3, :3].T)[None])[0]
     move = after.T_rs[:3, 3] - before.T_rs[:3, 3]
@@ -85,6 +100,7 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> 
         _shift(before, points, change),
         float(np.sqrt(np.sum(np.square(spread)))),
         float(change @ np.linalg.solve(covariance, change)),
+        tuple(contradicting),
     )
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calib.calibration_check.stored import Stored
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
 
 #: Deviations of what happens to a sensor: moved by 0.1 rad and 0.1 m, distances changed by 5 cm and 5 %.
 PRIOR: Mapping[str, float] = dict(zip((*POSE, *DEPTH_TERMS), (0.1,) * 6 + (0.05, 0.05), strict=True))

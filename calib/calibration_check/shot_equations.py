@@ -18,7 +18,7 @@ from calib.solve.bundle import robust, rotations
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.equations import Equations
 from calib.solve.bundle.formulation import groups_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.state import State
 
 #: Directions of a board's pose that change a view by less than this part of the others are not seen in it.
 RANK = 1e-6

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calib.board.views import CornerView, PlaneView
-from calib.solve.bundle.layout import POSE
-from calib.solve.bundle.state import SensorState
+from calib.solve.bundle.parameters.layout import POSE
+from calib.solve.bundle.parameters.state import SensorState
 from calib.solve.start.board_poses import pose_candidates
 
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from calib.solve.bundle.adjustment import adjust
+from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 from calib.solve.start.start import start
@@ -37,4 +37,7 @@ def _solve(task: Task, start: State, note: Callable[[str], None]) -> Solution:
     formulation = formulate(task)
     groups = groups_of(task)
     note(f"all together: {formulation.layout.size} parameters of {len(groups)} groups of views")
-    return Solution(task, adjust(formulation, start, len(groups), note))
+    try:
+        return Solution(task, adjust(formulation, start, len(groups), note))
+    except NotSolvedError as error:
+        raise NotSolvedError(f"{error}{diagnoses.unlike_the_rest(task, start)}") from error

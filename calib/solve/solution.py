@@ -14,9 +14,9 @@ from calib.solve.bundle import robust
 from calib.solve.bundle.adjustment import Adjustment
 from calib.solve.bundle.blocks import Corners
 from calib.solve.bundle.formulation import groups_of
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, FreeParameters
-from calib.solve.bundle.lens_parameters import MATRIX
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, FreeParameters
+from calib.solve.bundle.parameters.lens_parameters import MATRIX
+from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import Task
 
 

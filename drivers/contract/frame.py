@@ -1,7 +1,7 @@
 """Frames: images with the metadata needed to interpret them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -47,6 +47,11 @@ class FrameError(ValueError):
     """An inconsistent frame."""
 
 
+#: Exposures from the reference to the middle.
+_TO_MIDDLE: Mapping[Reference, float] = {Reference.START: 0.5, Reference.MIDDLE: 0.0, Reference.END: -0.5}
+#: Longest exposure that is believed [s].
+_LONGEST_S = 10.0
+
 #: Default unit by kind; all other kinds are in device-specific digital numbers.
 _UNITS: Mapping[Kind, str] = {Kind.DEPTH: "m", Kind.DEVIATION: "m", Kind.BINARY: "1"}
 
@@ -87,7 +92,7 @@ class Frame:
         t_device_ticks, tick_hz: the device's timestamp and its rate; rate 0 if the device has no clock.
         clock_domain: name of the clock of the ticks.
         t_sigma_ns: standard deviation of `t_host_ns` [ns].
-        t_reference: point of the exposure that the timestamps refer to.
+        t_reference: point of the exposure that the timestamps refer to; frames are paired by its middle.
         exposure_s, gain, temperature_c: settings during the exposure; NaN if unknown.
         modulation: modulation or range profile of a time-of-flight sensor, "" if none.
         calib_id: hash of the device's camera model, "" if unknown.
@@ -154,6 +159,18 @@ class Frame:
     def key(self) -> tuple[str, str]:
         """(sensor, stream), the identity of the frame's stream."""
         return self.sensor, self.stream
+
+    def at_middle(self) -> "Frame":
+        """The frame with the times of the middle of its exposure; unchanged if the exposure is unknown."""
+        if self.t_reference is Reference.MIDDLE or not 0 <= self.exposure_s <= _LONGEST_S:
+            return self
+        after_s = _TO_MIDDLE[self.t_reference] * self.exposure_s
+        return replace(
+            self,
+            t_host_ns=self.t_host_ns + round(after_s * 1e9),
+            t_device_ticks=self.t_device_ticks + round(after_s * self.tick_hz),
+            t_reference=Reference.MIDDLE,
+        )
 
     def si(self) -> NDArray[np.float32]:
         """The image in `unit` as float32, NaN where there is no return."""

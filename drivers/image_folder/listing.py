@@ -30,6 +30,12 @@ class ImageFile:
     t_ns: int
 
 
+def last_number(stem: str) -> int | None:
+    """Last number in a name; None without any."""
+    numbers = re.findall(r"\d+", stem)
+    return int(numbers[-1]) if numbers else None
+
+
 def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
     """Files that match a pattern, sorted by the last number in their name, the sequence number.
 
@@ -45,10 +51,9 @@ def by_number(folder: Path, pattern: str, rate_hz: float) -> list[ImageFile]:
         raise ImageFolderError(f"{folder}: no such folder")
     numbered: dict[int, Path] = {}
     for path in sorted(folder.glob(pattern)):
-        numbers = re.findall(r"\d+", path.stem)
-        if not numbers:
+        number = last_number(path.stem)
+        if number is None:
             raise ImageFolderError(f"{path}: there is no number in its name to tell which exposure it is")
-        number = int(numbers[-1])
         if number in numbered:
             raise ImageFolderError(f"{path}: has the same number as {numbered[number].name}")
         numbered[number] = path

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.observability import UndeterminedError
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.state import State
 from calib.solve.solution import Solution
 
 

@@ -19,7 +19,7 @@ from calib import pose
 from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL, LensKind
+from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, RATIONAL, LensKind
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution

@@ -12,8 +12,8 @@ from calib.calibration_check.comparison import Comparison, compare
 from calib.calibration_check.hypotheses import Kind
 from calib.calibration_check.stored import CalibrationCheckError, Stored, Views, usable
 from calib.camera import Camera
-from calib.solve.bundle.layout import POSE
-from calib.solve.bundle.state import SensorState
+from calib.solve.bundle.parameters.layout import POSE
+from calib.solve.bundle.parameters.state import SensorState
 from tests.calib.solve.board_views import Head, look, random_boards, three_heads
 
 SIGMAS = {"light": (2e-4, 2e-4), "color": (2e-4, 2e-4)}

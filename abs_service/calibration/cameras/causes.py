@@ -1,6 +1,6 @@
 """Verdict on what has changed since a calibration, in words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from abs_service.report.content import Level, Verdict
 from calib.calibration_check.comparison import Comparison, Explanation
 from calib.calibration_check.hypotheses import TERMS, Kind
+from calib.solve.validation.contradictions import Contradiction
 
 #: Distance bias that is as good as any depth camera's, and that is unacceptable [m].
 UNNOTICED_M, WRONG_M = 0.002, 0.01
@@ -54,6 +55,15 @@ def verdicts(found: Comparison, motion: Level, reaches: Mapping[str, Reach]) -> 
         text += f" These shots cannot tell that from this: {'; '.join(f'{_names(r)} {_said(r)}' for r in rivals)}."
     advice = _telling(chosen, rivals, reaches) if rivals else _ADVICE.get(kind, _WARM)
     return [Verdict(level, text, advice, _names(chosen))]
+
+
+def of_contradictions(found: Sequence[Contradiction]) -> list[Verdict]:
+    """Verdict on shots that contradict the others; none without any."""
+    if not found:
+        return []
+    text = f"{'; '.join(map(str, found))}. The others agree; these shots were left out of what follows."
+    skipped = ",".join(str(one.shot) for one in found)
+    return [Verdict(Level.DOUBTFUL, text, f"Look at the pictures, and leave out what is wrong: --skip {skipped}.")]
 
 
 def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:

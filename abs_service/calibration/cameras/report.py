@@ -1,6 +1,7 @@
 """Report and calibration file of `calibrate intrinsics` and `calibrate rig`."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -32,6 +33,7 @@ def report(title: str, origin: Provenance, solution: Solution, found: Assessment
         "trusted": found.trusted,
         "distance_m": found.distance,
         "poses": poses,
+        "contradicting": [asdict(each) for each in found.contradicting],
         "parameters": {each.name: {"value": each.value, "sigma": each.sigma} for each in solution.parameters},
         "deviations": dict(solution.deviations),
         "halves": {

@@ -16,11 +16,11 @@ from abs_service.report.provenance import Provenance
 from calib.board.distinct import distinct_poses
 from calib.board.views import PlaneView
 from calib.calibration_check.alone import CornerFit, DistanceBias, corner_fit, distance_bias
-from calib.calibration_check.changes import PairChange, pair_changes
+from calib.calibration_check.changes import PairChange, contradicting, pair_changes
 from calib.calibration_check.comparison import NOT_COMPARED, Comparison, compare
 from calib.calibration_check.hypotheses import TERMS, Kind
 from calib.calibration_check.stored import Stored, Views, usable
-from calib.solve.bundle.state import SensorState
+from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.
 MOST_SHOTS = 40
@@ -100,7 +100,7 @@ def verdicts(found: Verification) -> list[Verdict]:
     disagree = any(one.level == Level.BAD for one in scatter)
     lasting = [] if disagree else causes.verdicts(found.comparison, motion, found.reaches)
     named = {one.about for one in lasting}
-    said = [*lasting, *scatter, *fits]
+    said = [*lasting, *(scatter or causes.of_contradictions(contradicting(found.changes))), *fits]
     said += [_of_bias(name, bias) for name, bias in found.biases.items() if name not in named]
     changes = [change for change in found.changes if not (disagree or _is_explained(change, found))]
     said += [_of_pair(change, found.comparison) for change in changes]
@@ -145,7 +145,8 @@ def _compared(stored: Stored, views: Views, changes: Sequence[PairChange]) -> Co
         for change in changes:
             if not together or together & {change.first, change.second}:
                 together |= {change.first, change.second}
-    shots = [number for name in together for number in views.shots[name]]
+    wrong = {one.shot for one in contradicting(changes)}
+    shots = [number for name in together for number in views.shots[name] if number not in wrong]
     return compare(stored, views.of(together, shots)) if together else NOT_COMPARED
 
 

@@ -71,7 +71,7 @@ class Covariance:
     """Covariance of all estimated parameters.
 
     Attributes:
-        names: of the parameters, `tof.fx`, `color.rotation_x`, …; see `calib.solve.bundle.layout`.
+        names: of the parameters, `tof.fx`, `color.rotation_x`, …; see `calib.solve.bundle.parameters.layout`.
         matrix: (n, n), in the product of their units (m, rad, px, s, 1).
     """
 

@@ -8,7 +8,9 @@ from typing import Any
 import tomli_w
 
 from abs_service.config.problems import ABSENT, Problem, allowed_instead
-from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError
+from calib.board.april_grid import AprilGrid
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
+from calib.board.target_checks import TargetError
 from calib.files import limited, nested
 
 #: Values of `kind`.
@@ -17,10 +19,11 @@ KINDS: Mapping[str, type[Target]] = {
     "charuco": Charuco,
     "circles": Circles,
     "asymmetric_circles": AsymmetricCircles,
+    "april_grid": AprilGrid,
 }
 
 #: Keys of lengths; each may end in `_mm`.
-_LENGTHS = ("square", "marker", "spacing", "diameter")
+_LENGTHS = ("square", "marker", "spacing", "diameter", "tag", "gap")
 
 
 class TargetFileError(ValueError):
@@ -102,6 +105,7 @@ _EXAMPLES: Mapping[str, Target] = {
     "charuco": Charuco(9, 6, 0.03, 0.022),
     "circles": Circles(7, 5, 0.03, 0.015),
     "asymmetric_circles": AsymmetricCircles(4, 11, 0.02, 0.015),
+    "april_grid": AprilGrid(6, 6, 0.088, 0.0264),
 }
 
 

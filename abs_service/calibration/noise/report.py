@@ -1,5 +1,6 @@
 """Report of a noise calibration: verdicts, model comparison, error components, and plots."""
 
+from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -8,7 +9,7 @@ from abs_service.calibration.noise import plots, verdicts
 from abs_service.calibration.noise.measurement import NoiseCalibration
 from abs_service.calibration.noise.sigma_consistency import SigmaConsistency
 from abs_service.report import figures
-from abs_service.report.content import Column, Picture, Report, Section, Table, drawing, photo
+from abs_service.report.content import Column, Level, Picture, Report, Section, Table, Verdict, drawing, photo
 from abs_service.report.provenance import Provenance
 from calib.noise.per_pixel import PerPixel
 from calib.sequences.reference import Kind
@@ -20,7 +21,11 @@ _COLORS = {"static": (60, 160, 60), "target": (60, 90, 220), "left out": (160, 1
 
 
 def report(
-    sensor: str, found: NoiseCalibration, consistencies: tuple[SigmaConsistency, ...], provenance: Provenance
+    sensor: str,
+    found: NoiseCalibration,
+    consistencies: tuple[SigmaConsistency, ...],
+    provenance: Provenance,
+    repeated: Sequence[str] = (),
 ) -> Report:
     """Report of one sensor.
 
@@ -29,6 +34,7 @@ def report(
         found: result of the calibration.
         consistencies: consistency of the σ that the sensor reports.
         provenance: provenance of the report.
+        repeated: sentences about sequences that count as one.
     """
     sections = [
         Section("Models", (_models(found),)),
@@ -43,7 +49,8 @@ def report(
     if consistencies:
         sections.append(Section("The sensor's own deviation", (_sigma_table(consistencies),)))
     title = f"Noise of sensor {sensor}" if sensor else "Noise"
-    return Report(title, provenance, verdicts.verdicts(found), tuple(sections), values(found))
+    joined = tuple(Verdict(Level.GOOD, f"{text}.") for text in repeated)
+    return Report(title, provenance, (*verdicts.verdicts(found), *joined), tuple(sections), values(found))
 
 
 _WHAT = (

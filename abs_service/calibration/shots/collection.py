@@ -18,16 +18,21 @@ class Collector:
         sizes: width and height of the images of every sensor that has any [px], by sensor name.
 
     Attributes:
-        views: kept views of all sensors.
+        seen: what the kept shots show.
         kept: number of shots.
         latest: rejection of the last shot by sensor; "" for a sensor whose view was kept.
     """
 
     def __init__(self, sizes: Mapping[str, tuple[int, int]]) -> None:
         self.sizes = sizes
-        self.views: list[CornerView] = []
+        self.seen = BoardObservations(sizes=sizes)
         self.kept = 0
         self.latest: dict[str, str] = {}
+
+    @property
+    def views(self) -> Sequence[CornerView]:
+        """Kept views of all sensors."""
+        return self.seen.corners
 
     @property
     def missing_views(self) -> Sequence[MissingView]:
@@ -54,7 +59,7 @@ class Collector:
         for view in seen.corners:
             self.latest[view.sensor] = "" if is_kept else "nothing new: change the pose"
         if is_kept:
-            self.views += seen.corners
+            self.seen += seen
             self.kept += 1
         return is_kept
 

@@ -1,6 +1,6 @@
 """Corner and plane extraction from shots, with reasons for rejected images."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from abs_service.calibration.shots.shots import SensorShot, Shot
@@ -39,6 +39,15 @@ class BoardObservations:
             self.planes + other.planes,
             {**self.rejected, **other.rejected},
             {**self.sizes, **other.sizes},
+        )
+
+    def of_shots(self, shots: Collection[int]) -> "BoardObservations":
+        """Observations in some shots."""
+        return BoardObservations(
+            tuple(view for view in self.corners if view.shot in shots),
+            tuple(view for view in self.planes if view.shot in shots),
+            {key: error for key, error in self.rejected.items() if key[0] in shots},
+            self.sizes,
         )
 
 

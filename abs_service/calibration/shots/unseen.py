@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from abs_service.calibration.shots.corner_extraction import BoardObservations
 from abs_service.calibration.shots.shots import Shot
+from calib.board.april_grid import AprilGrid
 from calib.board.corners import errors
 from calib.board.corners.search import find
 from calib.board.corners.to_8bit import grey
@@ -53,6 +54,8 @@ def _reasons(seen: BoardObservations) -> Counter[str]:
 def _name(target: Target) -> str:
     if isinstance(target, Chessboard):
         return f"board of {target.columns} × {target.rows} inner corners"
+    if isinstance(target, AprilGrid):
+        return f"AprilGrid of {target.columns} × {target.rows} tags"
     kind = "ChArUco of {} × {} squares" if isinstance(target, Charuco) else "grid of {} × {} discs"
     return kind.format(target.columns, target.rows)
 

@@ -9,8 +9,9 @@ the board, and the lines below say what is missing. It ends when nothing is, or 
 A view is kept if the board holds still and shows something that the kept views do not. `left` and `right` are those of
 the sensor's image, and the board faces where its print does.
 
-Writes the recording OUT, from which the other commands calibrate, and a picture OUT-SENSOR.png of what each sensor has
-seen: where it is red, it has not seen the board. Exit code 0: enough; 1: ended before it was enough; 2: of no use.
+Writes the recording OUT, from which the other commands calibrate, the corners it found (OUT.corners.npz), from which
+`rig` and `intrinsics` do, too, and a picture OUT-SENSOR.png of what each sensor has seen: where it is red, it has not
+seen the board. Exit code 0: enough; 1: ended before it was enough; 2: of no use.
 """
 
 import argparse
@@ -26,7 +27,7 @@ from rich.console import Console
 
 from abs_service import config
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.calibration.files import target_file
+from abs_service.calibration.files import corner_file, target_file
 from abs_service.calibration.shots.collection import Collector
 from abs_service.calibration.shots.corner_extraction import see
 from abs_service.calibration.shots.guide import Guide, LineGuide, LiveGuide, coverage_map
@@ -76,6 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
                 _collect(target, shots, cameras, collector, recording, guide, arguments.out)
         finally:
             recording.finish()
+    corner_file.write(collector.seen, corner_file.path_beside(arguments.out))
     return _conclude(collector, arguments)
 
 

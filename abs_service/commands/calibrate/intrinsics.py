@@ -15,8 +15,8 @@ options have to be changed first. What the verdicts mean: docs/calibration.md.
 import argparse
 from dataclasses import replace
 
-from abs_service.commands.calibrate import solving
-from abs_service.commands.calibrate.solving import Material, SolveOptionError
+from abs_service.commands.calibrate import material, solving
+from abs_service.commands.calibrate.material import Material, SolveOptionError
 from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _solve(arguments: argparse.Namespace) -> int:
     """Solves one camera."""
-    found = solving.material(arguments)
+    found = material.material(arguments)
     name = _sensor(arguments.sensor, found)
     task = Task(
         {name: solving.sensor_task(name, arguments, found, keeps=False)},

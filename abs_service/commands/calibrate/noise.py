@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from abs_service.calibration.files import target_file, toml_text
-from abs_service.calibration.noise import board_poses, measurement, report, sigma_consistency
+from abs_service.calibration.noise import board_poses, measurement, repeated, report, sigma_consistency
 from abs_service.calibration.shots import sequences
 from abs_service.commands.calibrate import calibrations
 from abs_service.commands.images import camera_file
@@ -92,7 +92,8 @@ def run(arguments: argparse.Namespace) -> int:
     paths += [path for path in (arguments.target, arguments.calibration) if path is not None]
     trace = provenance.trace(["calibrate", "noise", *_command_line(arguments)], paths)
     worst = Exit.OK
-    for number, (setting, group) in enumerate(groups.items()):
+    for number, (setting, given) in enumerate(groups.items()):
+        group, said = repeated.counted_once(given)
         with console.status("learning") as status:
             found = measurement.calibrate(
                 [one for one, _ in group],
@@ -104,7 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
         sensor = group[0][0].sensor
         out = _out(arguments.out, sensor, number)
         made = report.report(
-            sensor, found, tuple(c for one, _ in group for c in sigma_consistency.of_sequence(one)), trace
+            sensor, found, tuple(c for one, _ in group for c in sigma_consistency.of_sequence(one)), trace, said
         )
         model = [] if made.level is Level.BAD else _write_model(found, sensor, out, made.level)
         written = [*model, *page.write(made, out)]

@@ -5,6 +5,7 @@
   abs-service calibrate rig take.mcap --target target.toml --keep color --reference color --fixed-pose depth \
       --depth-terms depth=scale --out l.toml                                                  aligned depth
   abs-service calibrate rig rig.toml --target target.toml --out lab.calibration.toml          live, 30 different views
+  abs-service calibrate rig take.corners.npz --target target.toml --skip 7 --fix k3 --out l.toml   again, without images
   abs-service calibrate rig --images left='l*.png' --images right='r*.png' --target target.toml --out p.toml
 
 Corners in colour, infrared and amplitude images and the distances that depth sensors measure on the board are explained
@@ -21,8 +22,8 @@ options have to be changed first. What the verdicts mean: docs/calibration.md.
 import argparse
 from collections.abc import Iterable
 
-from abs_service.commands.calibrate import solving
-from abs_service.commands.calibrate.solving import Material, SolveOptionError
+from abs_service.commands.calibrate import material, solving
+from abs_service.commands.calibrate.material import Material, SolveOptionError
 from abs_service.config.problems import allowed_instead
 from calib.solve.bundle.tasks import Task
 
@@ -54,9 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _solve(arguments: argparse.Namespace) -> int:
     """Solves the rig."""
-    found = solving.material(arguments)
+    found = material.material(arguments)
     there = [name for name in found.seen.sizes if any(view.sensor == name for view in _views(found))]
-    terms = solving.named(arguments.depth_terms, "--depth-terms")
+    terms = material.named(arguments.depth_terms, "--depth-terms")
     for option, names in (
         ("--keep", arguments.keep),
         ("--fixed-pose", arguments.fixed_pose),

@@ -6,41 +6,24 @@ import json
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from abs_service.calibration.cameras import report
-from abs_service.calibration.files import rig_file, target_file
-from abs_service.calibration.files.rig_file import SensorCalibration
-from abs_service.calibration.shots import corner_extraction, unseen
-from abs_service.calibration.shots.corner_extraction import BoardObservations
-from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
-from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import calibrations, live
+from abs_service.calibration.files import rig_file
+from abs_service.commands.calibrate import skipping
+from abs_service.commands.calibrate.material import Material, SolveOptionError, UnusableImagesError, named, say
 from abs_service.config.problems import allowed_instead
 from abs_service.report import page, provenance
 from abs_service.report.content import Level, Report, Verdict
 from abs_service.supervision.exit_codes import Exit
-from calib.board import coverage
-from calib.board.distinct import counts_of, distinct_poses
-from calib.camera import Camera
 from calib.formats.plausibility import baselines
-from calib.solve.bundle.lens_parameters import KINDS, kind_of
+from calib.solve.bundle.parameters.lens_parameters import KINDS, LensKind, kind_of
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation.verdict import assess
-from calib.solve.weights import shared
-from drivers.replay.recording import Recording
-
-
-class SolveOptionError(ValueError):
-    """Options that do not fit the images."""
-
-
-class UnusableImagesError(ValueError):
-    """Images that no calibration can come from."""
 
 
 @contextmanager
@@ -57,38 +40,22 @@ def reported(title: str, arguments: argparse.Namespace) -> Iterator[None]:
         raise
 
 
-@dataclass(frozen=True)
-class Material:
-    """Input of a calibration.
-
-    Attributes:
-        seen: observations of boards.
-        known: previous calibration, by sensor.
-        data: image files.
-    """
-
-    seen: BoardObservations
-    known: Mapping[str, SensorCalibration]
-    data: tuple[Path, ...]
-
-
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Adds the common arguments."""
-    parser.add_argument(
-        "source", metavar="SOURCE", nargs="?", type=Path, help="recording (.mcap), or rig (.toml): live"
-    )
-    parser.add_argument(
-        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
-    )
-    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
+    _add_sources(parser)
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="calibration to write; must not exist")
     parser.add_argument("--start", metavar="FILE", type=Path, help="calibration or rig file to start from, or to keep")
     parser.add_argument(
         "--lens", metavar="NAME=KIND", action="append", default=[], help=f"kind of lens: {', '.join(KINDS)}"
     )
     parser.add_argument(
+        "--fix", metavar="[NAME=]PARAMETERS", action="append", default=[],
+        help="intrinsics that stay as they begin, such as k3,aspect; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
         "--every", metavar="S", type=float, default=0.5, help="least time between shots of a recording (%(default)g)"
     )
+    skipping.add_argument(parser)
     parser.add_argument(
         "--shots", metavar="N", type=int, default=30, help="different views to wait for, live (%(default)d)"
     )
@@ -101,60 +68,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
 
 
-def material(arguments: argparse.Namespace) -> Material:
-    """Detects the board in all images, with progress on the terminal.
-
-    Raises:
-        SolveOptionError: incompatible options.
-        UnusableImagesError: no board, or too few views; the message says why.
-        TargetFileError, ShotsError, RecordingError, ConfigError: files that cannot be used.
-        ViewsAlikeError, MirroredSensorError: the views do not allow a calibration.
-    """
-    if arguments.out.exists():
-        raise SolveOptionError(f"--out {arguments.out}: exists already; choose another name or remove it")
-    if (arguments.source is None) == (not arguments.images):
-        raise SolveOptionError("give either a recording or rig as SOURCE, or --images NAME=GLOB for each sensor")
-    target = target_file.read(arguments.target)
-    known = dict(calibrations.load(arguments.start).sensors) if arguments.start else {}
-    with ExitStack() as stack:
-        shots, cameras, data = _shots(arguments, {name: each.camera for name, each in known.items()}, stack)
-        known = {name: known.get(name, SensorCalibration(camera, factory=camera)) for name, camera in cameras.items()}
-        is_live = live.is_live(arguments.source)
-        seen, shot = BoardObservations(), None
-        for shot in shots:
-            new = corner_extraction.see(target, shot, cameras)
-            if is_live and not live.adds(new, seen):
-                continue
-            seen += new
-            say(f"shot {shot.number}: {', '.join(view.sensor for view in new.corners) or 'no board'}")
-            if is_live and live.views(seen) >= arguments.shots:
-                break
-    if shot is not None and not seen.corners:
-        raise UnusableImagesError(unseen.reason(target, seen, shot))
-    try:
-        coverage.check(view for view in seen.corners)
-    except coverage.TooFewViewsError as error:
-        raise UnusableImagesError(f"{error}. {unseen.STILLS}" if unseen.mostly_moved(seen) else str(error)) from error
-    for sensor, count in counts_of(seen.corners, distinct_poses(seen.corners, seen.sizes)).items():
-        images = sum(view.sensor == sensor for view in seen.corners)
-        say(f"{sensor}: {count} distinct poses of the board in {images} images")
-    return Material(replace(seen, corners=tuple(shared(seen.corners))), known, data)
-
-
-def _shots(
-    arguments: argparse.Namespace, cameras: Mapping[str, Camera], stack: ExitStack
-) -> tuple[Iterable[Shot], Mapping[str, Camera], tuple[Path, ...]]:
-    """Shots, known cameras, and source files."""
-    if arguments.images:
-        patterns = named(arguments.images, "--images")
-        folders = dict.fromkeys(Path(pattern).parent for pattern in patterns.values())
-        return FolderShots(patterns), cameras, tuple(folders)
-    if not live.is_live(arguments.source):
-        recording = Recording(arguments.source)
-        known = {**recording.cameras, **cameras}
-        return RecordingShots(recording, arguments.every, cameras=known), known, (arguments.source,)
-    shots, known = stack.enter_context(live.streaming(arguments.source, cameras))
-    return shots, known, (arguments.source,)
+def _add_sources(parser: argparse.ArgumentParser) -> None:
+    """Adds the arguments that say where the corners come from, and of which board."""
+    parser.add_argument(
+        "source",
+        metavar="SOURCE",
+        nargs="?",
+        type=Path,
+        help="recording (.mcap), corners (.npz, .vnl), or rig (.toml): live",
+    )
+    parser.add_argument(
+        "--images", metavar="NAME=GLOB", action="append", default=[], help="images of a sensor in a folder; repeatable"
+    )
+    parser.add_argument(
+        "--size",
+        metavar="NAME=WxH",
+        action="append",
+        default=[],
+        help="of its images, for mrcal's corners; repeatable",
+    )
+    parser.add_argument("--corners", metavar="FILE.vnl", type=Path, help="also write the corners for mrcal")
+    parser.add_argument("--target", metavar="FILE", type=Path, required=True, help="description of the board, TOML")
 
 
 def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps: bool, **terms: object) -> SensorTask:
@@ -173,7 +107,22 @@ def sensor_task(name: str, arguments: argparse.Namespace, found: Material, keeps
         factory = ()  # of another lens family: no initial values
     if keeps and not factory:
         raise SolveOptionError(f"{name}: nothing is known of its intrinsics, so they cannot be kept; see --start")
-    return SensorTask(*size, KINDS[kind], factory, keeps, **terms)  # pyright: ignore[reportArgumentType]
+    fixed = _fixed(name, arguments.fix, KINDS[kind], found.seen.sizes)
+    return SensorTask(*size, KINDS[kind], factory, keeps, fixed=fixed, **terms)  # pyright: ignore[reportArgumentType]
+
+
+def _fixed(name: str, options: Iterable[str], kind: LensKind, sensors: Collection[str]) -> tuple[str, ...]:
+    """Intrinsics of a sensor that `--fix` holds where they begin."""
+    found: dict[str, None] = {}
+    for text in options:
+        whose, _, parameters = text.rpartition("=")
+        if whose and whose not in sensors:
+            raise SolveOptionError(f"--fix {text}: no sensor that saw the board, {allowed_instead(whose, sensors)}")
+        for parameter in parameters.split(",") if whose in ("", name) else ():
+            if parameter not in kind.fixable:
+                raise SolveOptionError(f"--fix {text}: {allowed_instead(parameter, kind.fixable)}")
+            found[parameter] = None
+    return tuple(found)
 
 
 def finish(title: str, task: Task, arguments: argparse.Namespace, found: Material) -> int:
@@ -205,23 +154,3 @@ def _middle_distance(reference: str, solution) -> float:
     from calib.solve.validation.projection_uncertainty import reach  # noqa: PLC0415
 
     return round(math.fsum(reach(solution, reference)) / 2, 2)
-
-
-def named(options: Iterable[str], option: str) -> dict[str, str]:
-    """`NAME=VALUE` options as a table.
-
-    Raises:
-        SolveOptionError: one is not of this form.
-    """
-    found = {}
-    for text in options:
-        name, equals, value = text.partition("=")
-        if not (name and equals and value):
-            raise SolveOptionError(f"{option} {text}: must be NAME=VALUE")
-        found[name] = value
-    return found
-
-
-def say(text: str) -> None:
-    """Prints a progress message."""
-    print(f"  {text}", file=sys.stderr)

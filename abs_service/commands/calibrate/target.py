@@ -12,6 +12,7 @@ charuco             found in parts, cannot be mistaken for its mirror image; nee
 chessboard          for small images, down to 5 pixels per square; has to be seen whole
 circles             for blurred images; has to be seen whole
 asymmetric_circles  the same with one way up
+april_grid          Kalibr's; found in parts; needs some 30 pixels per tag
 """
 
 import argparse
@@ -21,7 +22,9 @@ from pathlib import Path
 
 from abs_service.calibration.files import board_sheet, target_file
 from abs_service.supervision.exit_codes import Exit
-from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, TargetError, outline
+from calib.board.april_grid import AprilGrid
+from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target, outline
+from calib.board.target_checks import TargetError
 
 #: Papers by name: width and height, upright [m].
 PAPERS = {"a4": (0.210, 0.297), "a3": (0.297, 0.420), "letter": (0.2159, 0.2794)}
@@ -32,16 +35,19 @@ DEFAULTS: dict[str, Target] = {
     "chessboard": Chessboard(8, 5, 0.028),
     "circles": Circles(9, 6, 0.028, 0.014),
     "asymmetric_circles": AsymmetricCircles(5, 11, 0.016, 0.012),
+    "april_grid": AprilGrid(6, 4, 0.032, 0.0096),
 }
 
 #: Arguments of the board, with their meaning.
 _BOARD = {
-    "columns": "inner corners, squares (charuco) or discs along the longer side",
+    "columns": "inner corners, squares (charuco), discs or tags along the longer side",
     "rows": "along the shorter side",
     "square": "edge of a square",
     "marker": "edge of a marker (charuco)",
     "spacing": "distance of discs",
     "diameter": "of a disc",
+    "tag": "edge of a tag (april_grid)",
+    "gap": "distance of tags (april_grid)",
 }
 
 
@@ -102,8 +108,8 @@ def _target(arguments: argparse.Namespace) -> Target:
         if name not in allowed:
             raise TargetOptionError(f"--{_option(name)} = {value}: means nothing for {arguments.kind}")
     changed = {name: value * 1e-3 if isinstance(value, float) else value for name, value in given.items()}
-    # Markers and discs scale with squares and spacing unless given explicitly.
-    for part, whole in (("marker", "square"), ("diameter", "spacing")):
+    # Markers, discs and gaps scale with squares, spacing and tags unless given explicitly.
+    for part, whole in (("marker", "square"), ("diameter", "spacing"), ("gap", "tag")):
         if whole in changed and part in allowed and part not in changed:
             changed[part] = changed[whole] * getattr(default, part) / getattr(default, whole)
     try:

@@ -24,10 +24,10 @@ from abs_service.calibration.files.rig_file import RigCalibration
 from abs_service.calibration.shots.corner_extraction import BoardObservations, see
 from abs_service.calibration.shots.shot_sources import FolderShots, RecordingShots
 from abs_service.calibration.shots.shots import Shot
-from abs_service.commands.calibrate import calibrations, live
+from abs_service.commands.calibrate import calibrations, live, skipping
 from abs_service.commands.parts import rig_process
 from abs_service.report import page, provenance
-from abs_service.report.content import Report, to_json
+from abs_service.report.content import Level, Report, Verdict, to_json
 from calib.board.target import Target
 from calib.camera import Camera
 from drivers.replay import Recording
@@ -50,6 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--every", metavar="S", type=float, default=0.5, help="seconds between shots of a recording (default: 0.5)"
     )
+    skipping.add_argument(parser)
     parser.add_argument(
         "--shots", metavar="N", type=int, default=15, help="different views to wait for, live (default: 15)"
     )
@@ -65,8 +66,14 @@ def run(arguments: argparse.Namespace) -> int:
     target = target_file.read(arguments.target)
     seen, files = _look(arguments, target, known)
     origin = provenance.trace(_command_line(arguments), [arguments.calibration, arguments.target, *files])
-    report = verification.verify(known, seen, origin)
     path = arguments.report or arguments.calibration.with_name(f"{arguments.calibration.stem}-verify.html")
+    try:
+        report = verification.verify(known, seen, origin)
+    except ValueError as error:
+        if type(error).__module__.startswith("calib."):
+            failed = Report(f"Verification of {known.name}", origin, (Verdict(Level.BAD, f"{error}."),), ())
+            print(f"wrote {page.write(failed, path)[0]}", file=sys.stderr)
+        raise
     page_path, _ = page.write(report, path)
     print(json.dumps(to_json(report), ensure_ascii=False) if arguments.json else _text(report, page_path))
     return int(report.level)
@@ -82,11 +89,11 @@ def _look(arguments: argparse.Namespace, target: Target, known: RigCalibration) 
         if not all(patterns.values()):
             raise VerifyOptionError(f"--images {' '.join(arguments.images)}: each must be NAME=GLOB")
         folders = [*dict.fromkeys(Path(pattern).parent for pattern in patterns.values())]
-        return _see_all(target, FolderShots(patterns), cameras), folders
+        return _see_all(target, skipping.kept(FolderShots(patterns), arguments.skip, None), cameras), folders
     if live.is_live(arguments.source):
         return _see_live(arguments, target, cameras), [arguments.source]
     shots = RecordingShots(Recording(arguments.source), arguments.every, cameras=cameras)
-    return _see_all(target, shots, cameras), [arguments.source]
+    return _see_all(target, skipping.kept(shots, arguments.skip, arguments.source), cameras), [arguments.source]
 
 
 def _see_all(target: Target, shots: Iterable[Shot], cameras: Mapping[str, Camera]) -> BoardObservations:
@@ -111,7 +118,7 @@ def _see_live(arguments: argparse.Namespace, target: Target, cameras: Mapping[st
                 f"{arguments.source}: {', '.join(there)}: none of its sensors is one of "
                 f"{arguments.calibration}: {', '.join(cameras)}"
             )
-        for shot in shots:
+        for shot in skipping.kept(shots, arguments.skip, arguments.source):
             new = see(target, _of(cameras, shot), cameras)
             if not live.adds(new, seen):
                 continue
@@ -142,4 +149,5 @@ def _command_line(arguments: argparse.Namespace) -> list[str]:
     source = [] if arguments.source is None else [str(arguments.source)]
     given = ["calibrate", "verify", str(arguments.calibration), *source, *images, "--target", str(arguments.target)]
     pace = ["--shots", str(arguments.shots)] if live.is_live(arguments.source) else ["--every", f"{arguments.every:g}"]
-    return [*given, *pace]
+    skipped = ["--skip", skipping.text(arguments.skip)] if arguments.skip else []
+    return [*given, *pace, *skipped]

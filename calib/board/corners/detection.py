@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.april_grid import AprilGrid
 from calib.board.corners import ellipse, errors, quality, saddle
 from calib.board.corners.order import canonical_order
 from calib.board.corners.search import find, is_cut_off
@@ -118,7 +119,7 @@ def _check_saturation(share: float, largest: float) -> None:
 
 def _detection_error(target: Target, image: Image, levels: Grey, found: int) -> errors.BoardError:
     """Most specific error for too few points."""
-    if isinstance(target, Charuco) and len(find(target, np.ascontiguousarray(levels[:, ::-1]))[0]) > found:
+    if isinstance(target, Charuco | AprilGrid) and len(find(target, np.ascontiguousarray(levels[:, ::-1]))[0]) > found:
         return errors.MirroredBoardError(
             "the board is seen as in a mirror: switch off the mirroring of the camera or its driver, or print the "
             "board anew if the print itself is mirrored"

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from calib.board.april_grid import AprilGrid
 from calib.board.corners.to_8bit import Grey
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
@@ -16,7 +17,7 @@ def canonical_order(target: Target, pixels: NDArray[np.float64], levels: Grey) -
     x × y points into the image as on the board. Remaining rotations are resolved by the colours of the squares, or else
     by the direction of x, which points to the right.
     """
-    if isinstance(target, Charuco):
+    if isinstance(target, Charuco | AprilGrid):
         return pixels
     lattice = pixels.reshape(target.grid[1], target.grid[0], 2)
     match target:

@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from calib.board.april_grid import BITS, BORDER, AprilGrid
 from calib.board.corners.order import cells
 from calib.board.corners.to_8bit import Grey, Image
 from calib.board.target import AsymmetricCircles, Charuco, Circles, Target, outline
@@ -121,8 +122,22 @@ def _lines(target: Target, points: NDArray[np.float64], axis: int) -> tuple[NDAr
             np.stack([points[:-1], points[1:]] if axis == 0 else [points[:, :-1], points[:, 1:]]), 2
         )
         return before.reshape(-1, 2), (0.5 * (before + after)).reshape(-1, 2)
+    if isinstance(target, AprilGrid):
+        return _tag_edges(target, points, axis)
     middle = cells(points)
     before, after = (middle[:-1], middle[1:]) if axis == 0 else (middle[:, :-1], middle[:, 1:])
     reach = (target.square - target.marker) / (2 * target.square) if isinstance(target, Charuco) else 0.8
     center, half = 0.5 * (before + after), 0.5 * reach * (after - before)
     return (center - half).reshape(-1, 2), (center + half).reshape(-1, 2)
+
+
+def _tag_edges(
+    target: AprilGrid, points: NDArray[np.float64], axis: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Lines across the edges of tags, within their black frames and the white between them."""
+    lattice = points if axis == 1 else points.transpose(1, 0, 2)
+    before, after = (0.5 * (lattice[::2, side::2] + lattice[1::2, side::2]) for side in (0, 1))
+    share = 0.9 * min(BORDER / (BITS + 2 * BORDER), target.gap / target.tag)
+    reach = share * (after - before)
+    lines = np.concatenate([(before - reach, before + reach), (after - reach, after + reach)], axis=1)
+    return lines[0].reshape(-1, 2), lines[1].reshape(-1, 2)

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib.board.april_grid import AprilGrid
+from calib.board.corners.april_tags import find_april_grid
 from calib.board.corners.to_8bit import Grey, local_contrast
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
 
@@ -25,7 +27,7 @@ _NOTHING: Found = (np.zeros(0, np.intp), np.zeros((0, 2)))
 def find(target: Target, levels: Grey) -> Found:
     """Indices (n,) and pixels (n, 2) of the detected points, in OpenCV's order.
 
-    All boards but ChArUco are detected completely or not at all; then n is 0.
+    All boards but ChArUco and AprilGrid are detected completely or not at all; then n is 0.
     """
     for attempt in (levels, local_contrast(levels)):
         for scale in _scales(target, levels):
@@ -38,7 +40,7 @@ def find(target: Target, levels: Grey) -> Found:
 
 def _scales(target: Target, levels: Grey) -> Iterator[float]:
     size = max(levels.shape)
-    if size > _LARGEST and not isinstance(target, Charuco):
+    if size > _LARGEST and not isinstance(target, Charuco | AprilGrid):
         yield 1 / int(np.ceil(size / _LARGEST))
         return
     yield 1
@@ -61,6 +63,8 @@ def _find(target: Target, levels: Grey) -> Found:
             found, corners = cv2.findChessboardCornersSB(levels, target.grid, flags=flags)
         case Charuco():
             return _find_charuco(target, levels)
+        case AprilGrid():
+            return find_april_grid(target, levels)
         case Circles():
             found, corners = _find_circles(target, levels, cv2.CALIB_CB_SYMMETRIC_GRID)
         case AsymmetricCircles():
@@ -75,7 +79,7 @@ def is_cut_off(target: Target, levels: Grey) -> bool:
             flags = cv2.CALIB_CB_LARGER | cv2.CALIB_CB_NORMALIZE_IMAGE
             found, corners, _ = cv2.findChessboardCornersSBWithMeta(levels, (3, 3), flags)
             part = corners.reshape(-1, 2) if found else np.zeros((0, 2))
-        case Charuco():
+        case Charuco() | AprilGrid():
             return False
         case _:
             blobs = _disc_detector(target, levels).detect(levels)

@@ -19,9 +19,9 @@ from scipy.sparse.linalg import aslinearoperator
 from calib.solve.bundle import robust, uncertainty
 from calib.solve.bundle.blocks import Planes
 from calib.solve.bundle.equations import Equations, Group
-from calib.solve.bundle.layout import Layout
 from calib.solve.bundle.observability import require_determined, require_touched
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import Layout
+from calib.solve.bundle.parameters.state import State
 
 #: Builds the equations about a state, given the deviations estimated so far.
 Formulate = Callable[[State, tuple[float, ...]], Equations]

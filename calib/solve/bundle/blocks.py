@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from calib.camera import Camera
 from calib.solve.bundle import rotations
-from calib.solve.bundle.lens_parameters import MATRIX
 from calib.solve.bundle.motion import ViewPoses
+from calib.solve.bundle.parameters.lens_parameters import MATRIX
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from calib.camera import CameraError
 from calib.lenses.lens import LensError
 from calib.solve.bundle import motion, rotations
 from calib.solve.bundle.blocks import Corners, JacobianBlocks, Planes
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Layout
-from calib.solve.bundle.lens_parameters import MATRIX
 from calib.solve.bundle.motion import ShotPoses, ViewPoses
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, Layout
+from calib.solve.bundle.parameters.state import State
 
 
 @dataclass(frozen=True)
@@ -158,8 +157,7 @@ class Equations:
     ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
         """Jacobian (n, k) with respect to the sensor's free parameters, and their columns (k,)."""
         free = self.layout.free_parameters[name]
-        order = [*MATRIX, *free.kind.coefficients]
-        parts = [blocks.intrinsics[:, [order.index(each) for each in free.intrinsics]]]
+        parts = [free.of_intrinsics(blocks.intrinsics, self.base.sensors[name].camera)]
         if free.moves:
             turn = increments[self.layout.columns(name, POSE[:3])]
             parts += [blocks.pose[:, :3] @ rotations.left_jacobian(turn[None])[0], blocks.pose[:, 3:]]

@@ -11,8 +11,8 @@ from calib.solve.bundle import motion
 from calib.solve.bundle.adjustment import rescale
 from calib.solve.bundle.blocks import Corners, Planes
 from calib.solve.bundle.equations import Equations, Group
-from calib.solve.bundle.layout import Layout
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import Layout
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 
 

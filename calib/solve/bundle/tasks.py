@@ -7,8 +7,8 @@ from functools import cached_property
 from calib.board.distinct import distinct_poses
 from calib.board.views import CornerView, PlaneView
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS, FreeParameters
-from calib.solve.bundle.lens_parameters import BROWN_CONRADY, MATRIX, LensKind
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters
+from calib.solve.bundle.parameters.lens_parameters import ASPECT, BROWN_CONRADY, MATRIX, LensKind
 
 
 class TaskError(ValueError):
@@ -24,6 +24,7 @@ class SensorTask:
         lens: kind of lens to fit.
         factory: initial or fixed camera; empty if unknown, otherwise one.
         fixed_intrinsics: True if the intrinsics are fixed.
+        fixed: single intrinsics that are, or `ASPECT` for the ratio of the focal lengths.
         fixed_pose: True if the pose in the rig is, as of a depth image that was aligned to another sensor's image.
         depth_terms: those of `DEPTH_TERMS` that are estimated.
         free_running: True if its clock has an unknown offset (free-running sensor).
@@ -37,8 +38,11 @@ class SensorTask:
     fixed_pose: bool = False
     depth_terms: tuple[str, ...] = ()
     free_running: bool = False
+    fixed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if unknown := [name for name in self.fixed if name not in self.lens.fixable]:
+            raise TaskError(f"{', '.join(unknown)}: can be fixed: {', '.join(self.lens.fixable)}")
         if (self.fixed_intrinsics or self.fixed_pose) and not self.factory:
             raise TaskError("intrinsics and poses can be kept only where a calibration to keep is given")
         unknown = set(self.depth_terms) - set(DEPTH_TERMS)
@@ -53,8 +57,19 @@ class SensorTask:
 
     def free_parameters(self, moves: bool) -> FreeParameters:
         """Free parameters of the sensor."""
+        held = {*self.fixed}
+        ratio = ASPECT in held and not held & {"fx", "fy"}
+        if ASPECT in held:  # one of two that are tied is no parameter, and fixes both if it is fixed
+            held |= {"fy"} if ratio else {"fx", "fy"}
         intrinsics = () if self.fixed_intrinsics else (*MATRIX, *self.lens.coefficients)
-        return FreeParameters(self.lens, intrinsics, moves and not self.fixed_pose, self.depth_terms, self.free_running)
+        return FreeParameters(
+            self.lens,
+            tuple(name for name in intrinsics if name not in held),
+            moves and not self.fixed_pose,
+            self.depth_terms,
+            self.free_running,
+            ratio and not self.fixed_intrinsics,
+        )
 
 
 @dataclass(frozen=True)

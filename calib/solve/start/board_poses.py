@@ -12,7 +12,7 @@ from calib.board.views import CornerView
 from calib.camera import Camera
 from calib.lenses.lens import LensError
 from calib.pose import Pose
-from calib.solve.bundle.lens_parameters import LensKind
+from calib.solve.bundle.parameters.lens_parameters import LensKind
 
 #: Candidate focal lengths, relative to the image's width: from a wide fisheye to a telephoto lens.
 FOCAL_LENGTHS = np.geomspace(0.25, 4.0, 13)

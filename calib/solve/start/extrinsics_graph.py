@@ -68,9 +68,12 @@ def relative_pose(seen: PoseCandidates, a: str, b: str) -> Pose:
     best = costs.sum(axis=1).argmin()
     agreeing = int(np.sum(costs[best] < 1))
     if len(shots) >= 4 and agreeing * 2 < len(shots):
+        alone = [np.median([seen[name][shot][0].rms_px for shot in shots]) for name in (a, b)]
+        agreed = ", ".join(str(shot) for shot, cost in zip(shots, costs[best], strict=True) if cost < 1)
         raise ContradictionError(
-            f"{a} and {b}: only {agreeing} of their {len(shots)} common shots agree on where they stand to each other; "
-            "their images are not of the same moments, one of them moved, or names are mixed up"
+            f"{a} and {b}: each fits its own corners, to {alone[0]:.2g} and {alone[1]:.2g} px, but only {agreeing} of "
+            f"their {len(shots)} common shots agree on where they stand to each other ({agreed}): the images of a shot "
+            "were not taken at the same moment, one of the sensors was moved, or names are mixed up"
         )
     return candidates[best]
 

@@ -11,7 +11,7 @@ from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle.adjustment import NotSolvedError, search
 from calib.solve.bundle.formulation import formulate
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.start import extrinsics_graph, registration
 from calib.solve.start.board_poses import PoseCandidate, initial_camera, pose_candidates
@@ -63,7 +63,8 @@ def fit_camera(name: str, sensor: SensorTask, views: Sequence[CornerView], first
     """
     for simpler in sensor.lens.simpler:  # numerator and denominator of a rational lens are redundant without distortion
         if first.lens.is_pinhole:
-            first = fit_camera(name, replace(sensor, lens=simpler), views, first)
+            fixed = tuple(each for each in sensor.fixed if each in simpler.fixable)
+            first = fit_camera(name, replace(sensor, lens=simpler, fixed=fixed), views, first)
     boards = {view.shot: found[0].T_sb for view in views if (found := pose_candidates(first, view))}
     if not boards:
         raise NotSolvedError(f"{name}: no view shows a board that its camera could have seen")

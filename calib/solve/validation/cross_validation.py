@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calib.solve.bundle.adjustment import adjust
 from calib.solve.bundle.formulation import formulate, groups_of
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty

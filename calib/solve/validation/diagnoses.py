@@ -7,10 +7,11 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from calib import pose
 from calib.board.views import CornerView
 from calib.camera import Camera
-from calib.solve.bundle.layout import DEPTH_TERMS
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS
+from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Parameter
 from calib.solve.start.board_poses import pose_candidates
@@ -30,6 +31,10 @@ BETTER = 3.0
 #: larger than this many pixels in an image of 1000 pixels across.
 FACTORY_RATIO = 4.0
 FACTORY_MISS = 0.5
+
+
+#: Views of the initial state that miss by this many times their sensor's median, and by this much [px], are named.
+FAR_RATIO, FAR_PX = 10.0, 10.0
 
 
 class ViewsError(ValueError):
@@ -126,6 +131,26 @@ def _miss(camera: Camera, name: str, task: Task) -> float:
     views = [view for view in task.corners if view.sensor == name][:20]
     misses = [found[0].rms_px for view in views if (found := pose_candidates(camera, view))]
     return float(np.median(misses)) if misses else float("nan")
+
+
+def unlike_the_rest(task: Task, state: State) -> str:
+    """Shots that even the initial state explains far worse than the others, as the end of a sentence; "" if none."""
+    misses: dict[str, dict[int, float]] = {}
+    for view in task.corners:
+        camera, T_rb = state.sensors[view.sensor].camera, state.boards[view.shot]
+        errors = np.hypot(*(camera.project(pose.transform(T_rb, view.points_b)) - view.pixels).T)
+        misses.setdefault(view.sensor, {})[view.shot] = float(np.median(np.nan_to_num(errors, nan=np.inf)))
+    found: dict[int, str] = {}
+    for sensor, by_shot in misses.items():
+        usual = float(np.median([*by_shot.values()]))
+        far = {shot: miss for shot, miss in by_shot.items() if miss > max(FAR_RATIO * usual, FAR_PX)}
+        found |= {
+            shot: f"shot {shot} of {sensor} by {miss:.2g} px, {usual:.2g} px are usual" for shot, miss in far.items()
+        }
+    if not found:
+        return ""
+    said, numbers = "; ".join(found[shot] for shot in sorted(found)), ",".join(map(str, sorted(found)))
+    return f". Corners miss in {said}: leave out what is wrong, --skip {numbers}"
 
 
 def suspect_square_size(task: Task, state: State) -> bool:

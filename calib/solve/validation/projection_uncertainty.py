@@ -17,9 +17,9 @@ from calib import pose
 from calib.camera import Camera
 from calib.solve.bundle import rotations
 from calib.solve.bundle.blocks import by_intrinsics, directions_by_intrinsics
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE, Layout
-from calib.solve.bundle.lens_parameters import MATRIX
-from calib.solve.bundle.state import State
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE, FreeParameters, Layout
+from calib.solve.bundle.parameters.lens_parameters import MATRIX
+from calib.solve.bundle.parameters.state import State
 from calib.solve.solution import Solution
 from calib.solve.validation.support import supported
 
@@ -80,15 +80,13 @@ def implied_jacobian(solution: Solution, sensor: str, distance: float) -> NDArra
     """Compensated Jacobian (n, 2, k) of the grid at a distance [m] with respect to the free intrinsics of a sensor."""
     camera = solution.cameras[sensor]
     free = solution.adjustment.layout.free_parameters[sensor]
-    order = [*MATRIX, *free.kind.coefficients]
-    wanted = [order.index(name) for name in free.intrinsics]
     near, far = reach(solution, sensor)
     volume = _points(camera, (near, 0.5 * (near + far), far))
     seen = np.tile(supported(solution, sensor, grid(camera).reshape(-1, 2)), 3)
     volume = volume[seen & np.isfinite(volume).all(axis=1)]
-    changes = by_intrinsics(camera, volume[:, :2] / volume[:, 2:])[:, :, wanted]
+    changes = free.of_intrinsics(by_intrinsics(camera, volume[:, :2] / volume[:, 2:]), camera)
     points = _points(camera, (distance,))
-    own = by_intrinsics(camera, points[:, :2] / points[:, 2:])[:, :, wanted]
+    own = free.of_intrinsics(by_intrinsics(camera, points[:, :2] / points[:, 2:]), camera)
     return MotionCompensation(camera, volume).at(points, changes, own)
 
 
@@ -174,14 +172,15 @@ def pair_jacobian(state: State, layout: Layout, source: str, target: str, distan
         ],
         axis=-1,
     )
-    return np.concatenate([by_source[:, :, _order(layout, source)], by_target[:, :, _order(layout, target)]], axis=-1)
+    own = _by_free(by_source, layout.free_parameters[source], sensor.camera)
+    return np.concatenate([own, _by_free(by_target, layout.free_parameters[target], camera)], axis=-1)
 
 
-def _order(layout: Layout, sensor: str) -> list[int]:
-    """Positions of a sensor's free parameters in the list of all possible ones."""
-    free = layout.free_parameters[sensor]
+def _by_free(derivatives: NDArray[np.float64], free: FreeParameters, camera: Camera) -> NDArray[np.float64]:
+    """Derivatives (n, 2, k) by a sensor's free parameters, from those by all possible ones."""
     every = [*MATRIX, *free.kind.every, *POSE, *DEPTH_TERMS, "time_offset"]
-    return [every.index(name) for name in free.names]
+    others = [every.index(name) for name in free.names[len(free.intrinsics) :]]
+    return np.concatenate([free.of_intrinsics(derivatives, camera), derivatives[:, :, others]], axis=-1)
 
 
 def map_pixels(

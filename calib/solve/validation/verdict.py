@@ -1,12 +1,13 @@
 """Verdict on a calibration, in words."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
+from calib.solve.validation.contradictions import Contradiction, contradictions, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.weak_directions import weak_directions
@@ -32,6 +33,7 @@ class Assessment:
         trusted: True if the solution is fit for use.
         verdict: one line that begins with "Trust it" or "Do not trust it yet".
         reasons: objections, each with a remedy; empty if trusted.
+        contradicting: shots that contradict the rest.
         agreements: of the two halves; empty with too few shots.
         images: uncertainty of each sensor's projection, by name.
         pairs: uncertainty of each depth sensor's points in the other images, by "tof → color".
@@ -41,6 +43,7 @@ class Assessment:
     trusted: bool
     verdict: str
     reasons: Sequence[str]
+    contradicting: Sequence[Contradiction]
     agreements: Sequence[Agreement]
     images: dict[str, UncertaintyMap]
     pairs: dict[str, UncertaintyMap]
@@ -67,7 +70,11 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    reasons = [*weak_directions(solution, distance), *_outliers(solution), *_uncertain({**images, **pairs}, needed_px)]
+    scattered = _scattered(solution)
+    contradicting = [] if scattered else contradictions(solution)  # without a rest, nothing contradicts it
+    reasons = [*scattered, *_contradicting(contradicting), *weak_directions(solution, distance)]
+    reasons += _outliers(solution, {one.shot for one in contradicting})
+    reasons += _uncertain({**images, **pairs}, needed_px)
     try:
         agreements = cross_validate(solution, distance, note)
         reasons += _disagreeing(agreements, needed_px)
@@ -75,7 +82,7 @@ def assess(
         agreements = []
         reasons.append(f"two halves could not be compared: {error}")
     verdict = f"Do not trust it yet: {reasons[0]}" if reasons else _praise(agreements, {**images, **pairs}, distance)
-    return Assessment(not reasons, verdict, reasons, agreements, images, pairs, distance)
+    return Assessment(not reasons, verdict, reasons, contradicting, agreements, images, pairs, distance)
 
 
 def _praise(agreements: Sequence[Agreement], fields: dict[str, UncertaintyMap], distance: float) -> str:
@@ -114,11 +121,30 @@ def _uncertain(fields: dict[str, UncertaintyMap], needed_px: float) -> list[str]
     return found
 
 
-def _outliers(solution: Solution) -> list[str]:
-    """Groups with too many outliers."""
+def _contradicting(found: Sequence[Contradiction]) -> list[str]:
+    if not found:
+        return []
+    count = f"{len(found)} shots contradict" if len(found) > 1 else "one shot contradicts"
+    return [
+        f"{count} the others: {'; '.join(map(str, found))}. Look at the pictures, and leave out what is wrong: "
+        f"--skip {','.join(str(shot) for shot in sorted(one.shot for one in found))}"
+    ]
+
+
+def _scattered(solution: Solution) -> list[str]:
+    return [
+        f"{' and '.join(one.sensors)}: each fits its own corners to {one.alone_px:.2g} px, but together they miss by "
+        f"{one.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or a sensor was "
+        "moved between them; hold the board still in every shot, or synchronise the sensors"
+        for one in scatter(solution)
+    ]
+
+
+def _outliers(solution: Solution, named: Collection[int]) -> list[str]:
+    """Groups with too many outliers, but for those of shots that are named anyway."""
     found = []
-    for sensor, of in dict.fromkeys((view.sensor, view.of) for view in solution.views):
-        views = [view for view in solution.views if (view.sensor, view.of) == (sensor, of)]
+    for sensor, of in dict.fromkeys((view.sensor, view.of) for view in solution.views if view.shot not in named):
+        views = [view for view in solution.views if (view.sensor, view.of) == (sensor, of) and view.shot not in named]
         far = sum(int(view.outliers.sum()) for view in views)
         every = sum(len(view.outliers) for view in views)
         if far > MAX_OUTLIERS * every:

@@ -7,7 +7,7 @@ the largest variance, and what changes with it, is the change that leaves all re
 import numpy as np
 from scipy import linalg
 
-from calib.solve.bundle.layout import DEPTH_TERMS, POSE
+from calib.solve.bundle.parameters.layout import DEPTH_TERMS, POSE
 from calib.solve.solution import Solution
 
 #: Directions are weak if they are known to less than this share of the distance (95 %).

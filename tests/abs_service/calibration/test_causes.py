@@ -78,3 +78,19 @@ def test_images_of_different_moments_are_told_from_a_sensor_that_moved() -> None
     assert "were not taken at the same moment" in said
     assert "moved" not in said
     assert report.verdicts[0].level > Level.GOOD
+
+
+def test_a_pair_of_images_that_contradicts_the_others_is_named_and_moves_no_sensor() -> None:
+    random = np.random.default_rng(3)
+    heads = {name: head for name, head in three_heads().items() if name != "tof"}
+    boards = random_boards(12, random)
+    first = look({"light": heads["light"]}, boards, random)
+    late = look({"color": heads["color"]}, {**boards, 4: boards[9], 9: boards[4]}, random)
+    sensors = {name: rig_file.SensorCalibration(head.camera) for name, head in heads.items()}
+    seen = BoardObservations((*first.corners, *late.corners), ())
+    report = verification.verify(rig_file.RigCalibration("lab", sensors, ORIGIN), seen, ORIGIN)
+    doubtful = [one for one in report.verdicts if one.level > Level.GOOD]
+    assert len(doubtful) == 1
+    assert "shot 4: corners of" in doubtful[0].text
+    assert "belongs to shot 9" in doubtful[0].text
+    assert doubtful[0].advice.endswith("--skip 4,9.")

@@ -17,7 +17,7 @@ from abs_service.supervision.exit_codes import Exit
 from calib.board.corners.detection import detect
 from calib.board.target import outline
 
-KINDS = ["charuco", "chessboard", "circles", "asymmetric_circles"]
+KINDS = ["charuco", "chessboard", "circles", "asymmetric_circles", "april_grid"]
 POINT_MM = 25.4 / 72
 SVG = "{http://www.w3.org/2000/svg}"
 #: Pixels per millimetre of a scan.

@@ -45,7 +45,7 @@ def test_lengths_are_metres_or_millimetres(tmp_path: Path) -> None:
     ("old", "new", "words"),
     [
         ('"charuco"', '"charucko"', ['kind = "charucko"', 'did you mean "charuco"?', "circles"]),
-        ('kind = "charuco"', "", ["kind: ", "allowed: asymmetric_circles, charuco"]),
+        ('kind = "charuco"', "", ["kind: ", "allowed: april_grid, asymmetric_circles, charuco"]),
         ("columns = 9", "columns = 9.5", ["columns = 9.5", "whole number"]),
         ("columns = 9", "columns = 2", ["columns = 2", "from 3 to 100"]),
         ("columns = 9", "", ["columns: missing"]),

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from abs_service.pairing.synchroniser import DEPTH, Synchroniser
-from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
+from drivers.contract.frame import Frame, FrameSet, Geometry, Kind, Reference
 
 MS = 1_000_000
 TOF, COLOR, AMPLITUDE = ("tof", "depth"), ("color", "color"), ("tof", "amplitude")
@@ -46,6 +46,26 @@ def test_a_set_is_formed_by_the_last_member_within_tolerance():
     assert formed.frames == {TOF: depth, COLOR: color, AMPLITUDE: amplitude}
     assert (formed.seq, formed.stamp_ns, formed.missing, formed.spread_ns) == (0, 100 * MS, (), 8 * MS)
     assert sync.counters == {}
+
+
+def test_stamps_of_start_and_end_are_compared_in_the_middle_of_the_exposures():
+    sync = synchroniser()
+    first = replace(frame(TOF, 100, late_ms=50), t_reference=Reference.START, exposure_s=0.02, tick_hz=1000.0)
+    sync.add(first)
+    (formed,) = sync.add(replace(frame(COLOR, 130, late_ms=50), t_reference=Reference.END, exposure_s=0.03))
+    assert (formed.stamp_ns, formed.spread_ns) == (110 * MS, 5 * MS)
+    depth = formed.frames[TOF]
+    assert (depth.t_host_ns, depth.t_device_ticks, depth.t_reference) == (110 * MS, 10, Reference.MIDDLE)
+
+
+def test_stamps_without_a_known_exposure_stay_as_they_are():
+    sync = synchroniser()
+    for exposure_s in (np.nan, -1.0, 1e9):
+        late = replace(frame(TOF, 100), t_reference=Reference.END, exposure_s=exposure_s)
+        assert late.at_middle() is late
+    sync.add(late)
+    (formed,) = sync.add(frame(COLOR, 108))
+    assert formed.stamp_ns == 100 * MS
 
 
 def test_a_member_that_is_past_the_tolerance_is_named_missing_at_once():

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from calib import pose
+from calib.board.april_grid import AprilGrid
 from calib.board.corners import errors
 from calib.board.corners.detection import detect
 from calib.board.target import AsymmetricCircles, Charuco, Chessboard, Circles, Target
@@ -21,6 +22,7 @@ TARGETS = [
     Circles(7, 5, 0.04, 0.02),
     Circles(6, 6, 0.04, 0.02),
     AsymmetricCircles(4, 9, 0.025, 0.02),
+    Charuco(10, 7, 0.03, 0.0225, "apriltag_36h11"),
 ]
 TILTED = (0.35, -0.4, 0.2)
 
@@ -38,6 +40,31 @@ def test_every_kind_is_found_in_order_and_to_a_tenth_of_a_pixel(target: Target, 
     error = found.pixels - truth(target, T_sb)[found.ids]
     assert np.sqrt(np.mean(error**2)) < 0.05
     assert np.abs(error).max() < 0.2
+
+
+@pytest.mark.parametrize("rotation", [(0.0, 0.0, 0.0), TILTED, (0.6, 0.3, 1.0), (0.0, 0.0, np.pi)])
+def test_an_april_grid_is_found_in_part_and_where_it_is(rotation) -> None:
+    grid = AprilGrid(6, 5, 0.03, 0.009)
+    T_sb = centered(grid, rotation, 0.5)
+    found = detect(grid, as_bytes(photograph(grid, VGA, T_sb)))
+    assert len(found.ids) > 0.75 * len(grid.points())
+    error = found.pixels - truth(grid, T_sb)[found.ids]
+    assert np.sqrt(np.mean(error**2)) < 0.05
+    assert np.abs(error).max() < 0.2
+    assert 1.0 < found.edge_px < 2.5
+
+
+def test_tag_0_of_an_april_grid_is_in_its_lower_left_corner_as_in_kalibr() -> None:
+    grid = AprilGrid(6, 5, 0.03, 0.009)
+    image = as_bytes(photograph(grid, VGA, centered(grid, (0, 0, 0), 0.5)))
+    code, first = 0xD5D628584, grid.points()[grid.ids_of_tag(0)].mean(axis=0)
+    assert first[0] == pytest.approx(0.015)
+    assert first[1] == pytest.approx(grid.points()[:, 1].max() - 0.015)
+    # Kalibr's code of tag 0, most significant bit in the upper left corner, white where it is set.
+    row, column = np.divmod(np.arange(36), 6)
+    cells = first + 0.003 * np.stack([column - 2.5, row - 2.5, np.zeros(36)], axis=1)
+    u, v = np.rint(VGA.project(pose.transform(centered(grid, (0, 0, 0), 0.5), cells))).astype(int).T
+    assert [bool(code >> (35 - bit) & 1) for bit in range(36)] == (image[v, u] > 115).tolist()
 
 
 @pytest.mark.parametrize("target", [CHESSBOARD, Chessboard(6, 9, 0.03), CHARUCO, AsymmetricCircles(4, 9, 0.025, 0.02)])

@@ -73,7 +73,7 @@ def test_sensors_that_share_no_shot_are_named() -> None:
 def test_images_of_different_moments_contradict_each_other() -> None:
     _, task = scene()
     shifted = [replace(view, shot=(view.shot + 5) % SHOTS) if of(view, "color") else view for view in task.corners]
-    with pytest.raises(ContradictionError, match="not of the same moments"):
+    with pytest.raises(ContradictionError, match="not taken at the same moment"):
         calibrate(replace(task, corners=shifted))
 
 

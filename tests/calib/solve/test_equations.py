@@ -12,9 +12,9 @@ from calib.lenses.lens import Lens
 from calib.solve.bundle import rotations
 from calib.solve.bundle.equations import Equations
 from calib.solve.bundle.formulation import formulate, groups_of
-from calib.solve.bundle.layout import Layout
-from calib.solve.bundle.lens_parameters import BROWN_CONRADY, FISHEYE, RATIONAL, LensKind
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.layout import Layout
+from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, FISHEYE, RATIONAL, LensKind
+from calib.solve.bundle.parameters.state import SensorState, State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.validation import projection_uncertainty
 from tests.calib.solve import board_views

@@ -12,7 +12,7 @@ from scipy import stats
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from calib.solve.bundle.lens_parameters import BROWN_CONRADY, RATIONAL
+from calib.solve.bundle.parameters.lens_parameters import BROWN_CONRADY, RATIONAL
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
 from calib.solve.validation import projection_uncertainty

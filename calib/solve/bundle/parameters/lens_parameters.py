@@ -14,6 +14,9 @@ from calib.lenses.lens import Lens, LensModel
 MATRIX = ("fx", "fy", "cx", "cy")
 
 
+#: Ratio of the focal lengths, fy / fx, among the intrinsics that can be fixed.
+ASPECT = "aspect"
+
 #: Standard deviation of the prior on regularised coefficients. Numerator and denominator of a rational lens may share a
 #: common factor, which is unobservable; without a prior the search drifts along it.
 PRIOR_SIGMA = 2.0
@@ -38,6 +41,11 @@ class LensKind:
     make: Callable[[NDArray[np.float64]], LensModel]
     regularized: tuple[str, ...] = ()
     simpler: tuple["LensKind", ...] = ()
+
+    @property
+    def fixable(self) -> tuple[str, ...]:
+        """Intrinsics of a camera with this lens that can be fixed."""
+        return (*MATRIX, *self.coefficients, ASPECT)
 
 
 PINHOLE = LensKind("pinhole", lens.COEFFICIENTS, (), Lens)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from calib import pose
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle.lens_parameters import MATRIX, PRIOR_SIGMA, LensKind
-from calib.solve.bundle.state import SensorState, State
+from calib.solve.bundle.parameters.lens_parameters import MATRIX, PRIOR_SIGMA, LensKind
+from calib.solve.bundle.parameters.state import SensorState, State
 
 POSE = ("rotation_x", "rotation_y", "rotation_z", "x", "y", "z")
 DEPTH_TERMS = ("depth_offset", "depth_scale")
@@ -32,6 +32,7 @@ class FreeParameters:
     Attributes:
         kind: kind of its lens.
         intrinsics: names of the free intrinsics: camera matrix and lens coefficients, or none.
+        fixed_aspect: True if fy / fx is fixed: fy, which is not among the intrinsics, follows fx.
         moves: True if its pose is free; false for the reference sensor.
         depth: free ones of `DEPTH_TERMS`.
         free_running: True if its clock has an unknown offset (free-running sensor).
@@ -42,6 +43,15 @@ class FreeParameters:
     moves: bool = True
     depth: tuple[str, ...] = ()
     free_running: bool = False
+    fixed_aspect: bool = False
+
+    def of_intrinsics(self, derivatives: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
+        """Derivatives (…, k) by the free intrinsics from those (…, 4 + n) by camera matrix and coefficients."""
+        order = [*MATRIX, *self.kind.coefficients]
+        chosen = derivatives[..., [order.index(each) for each in self.intrinsics]]
+        if self.fixed_aspect:
+            chosen[..., self.intrinsics.index("fx")] += camera.fy / camera.fx * derivatives[..., order.index("fy")]
+        return chosen
 
     @property
     def priors(self) -> Mapping[str, float]:
@@ -106,6 +116,8 @@ class Layout:
         free = self.free_parameters[name]
         start = self.starts[name]
         steps = dict(zip(free.names, increments[start : start + len(free.names)].tolist(), strict=True))
+        if free.fixed_aspect:
+            steps["fy"] = steps["fx"] * sensor.camera.fy / sensor.camera.fx
         camera = _refitted(sensor.camera, free.kind, steps)
         if free.moves:
             camera = replace(camera, T_rs=turned(camera.T_rs, np.array([steps[name] for name in POSE])))

@@ -1,0 +1,1 @@
+"""Parameters of a calibration: values, lenses, and the vector of those that are free."""

@@ -1,0 +1,184 @@
+"""Shots that contradict the rest of a solution, and images of a shot that were not taken at the same moment.
+
+In a rig all sensors share one pose of the board per shot. If two images of a shot show the board in different places,
+because they were paired wrongly or the board moved between them, each fits alone and both together do not.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from calib import pose
+from calib.board.views import CornerView
+from calib.pose import Pose
+from calib.solve.solution import Solution
+from calib.solve.start.board_poses import PoseCandidate, pose_candidates
+from calib.solve.start.start import fit_camera
+
+#: Corners of a view that contradict: their median residual in deviations. Normal errors have 1.18, …
+_DEVIATIONS = 3.0
+#: … and where residuals are this small they harm nothing [px].
+_HARMLESS_PX = 0.5
+#: Fraction of outliers among the distances of a view that contradicts.
+_OUTLIERS = 0.5
+#: Above this fraction of contradicting shots there is no rest that they contradict.
+_MOST = 1 / 3
+#: Images of a shot that fit this many times better alone, and miss by this much together, are of different moments.
+_BETTER, _SCATTERS_PX = 3.0, 0.5
+#: Exchanged images put the board in the same place again to this share of what they are apart.
+_SAME = 0.2
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """A shot that the solution of all others does not explain.
+
+    Attributes:
+        shot: its number.
+        sensors: whose view misses most, and, if each of the two fits alone, the other one of the pair.
+        miss: root mean square residual of the first one's view [px], or [m] for distances.
+        usual: median over its views.
+        of: "corners" or "distances".
+        apart: distance of the boards that the two see [m]; 0 for a single sensor.
+        exchanged_with: shots whose image of one sensor fits that of the other here.
+    """
+
+    shot: int
+    sensors: tuple[str, ...]
+    miss: float
+    usual: float
+    of: str
+    apart: float = 0.0
+    exchanged_with: tuple[int, ...] = ()
+
+    def __str__(self) -> str:
+        """One clause for people."""
+        unit, scale = ("px", 1.0) if self.of == "corners" else ("mm", 1e3)
+        miss, usual = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.usual))
+        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {usual} are usual"
+        if self.apart:
+            said += f"; {' and '.join(self.sensors)} see the board {self.apart * 1e3:.1f} mm apart, and each fits alone"
+        if self.exchanged_with:
+            said += f"; one of its pictures belongs to shot {' or '.join(map(str, self.exchanged_with))}"
+        return f"shot {self.shot}: {said}"
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Images that fit alone and not together, in most shots.
+
+    Attributes:
+        sensors: that saw the board together.
+        apart_px: median over the shots of the worse view's residual, with one board in each shot [px].
+        alone_px: median residual of a view, with a camera and boards of its own [px].
+    """
+
+    sensors: tuple[str, ...]
+    apart_px: float
+    alone_px: float
+
+
+def contradictions(solution: Solution) -> list[Contradiction]:
+    """Shots that contradict the rest, the worst first; empty if they are too many to have a rest."""
+    boards = _boards(solution)
+    found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
+    if len(found) > _MOST * len(solution.task.shots):
+        return []
+    return sorted(found, key=lambda one: -one.miss / one.usual)
+
+
+def scatter(solution: Solution) -> list[Scatter]:
+    """That images of most shots were taken at different moments; empty, or one."""
+    together = [shot for shot in solution.task.shots if len(_seeing(solution, shot)) > 1]
+    corners = [view for view in solution.views if view.of == "corners" and view.shot in together]
+    worst = [max(view.rms for view in corners if view.shot == shot) for shot in together]
+    joint = float(np.median(worst)) if worst else 0.0
+    if joint < _SCATTERS_PX:
+        return []
+    alone = [fitted for name in solution.task.sensors for fitted in _alone(solution, name, together)]
+    if not alone or joint < _BETTER * float(np.median(alone)):
+        return []
+    return [Scatter(tuple(dict.fromkeys(view.sensor for view in corners)), joint, float(np.median(alone)))]
+
+
+def _seeing(solution: Solution, shot: int) -> list[str]:
+    return [view.sensor for view in solution.task.corners if view.shot == shot]
+
+
+def _alone(solution: Solution, name: str, shots: Sequence[int]) -> list[float]:
+    """Residuals of a sensor's views [px] with a camera and boards of its own."""
+    views = [view for view in solution.task.corners if view.sensor == name]
+    if not views:
+        return []
+    sensor, camera = solution.task.sensors[name], solution.cameras[name]
+    if not sensor.fixed_intrinsics:
+        camera = fit_camera(name, sensor, views, camera)
+    return [found[0].rms_px for view in views if view.shot in shots and (found := pose_candidates(camera, view))]
+
+
+def _of_shot(
+    solution: Solution, shot: int, boards: Mapping[tuple[str, int], tuple[Pose, float]]
+) -> Contradiction | None:
+    """The worst view of a shot, if it contradicts."""
+    worst: Contradiction | None = None
+    for view in solution.views:
+        if view.shot != shot:
+            continue
+        others = [one.rms for one in solution.views if (one.sensor, one.of) == (view.sensor, view.of)]
+        usual = max(float(np.median(others)), 1e-12)
+        if view.of == "corners":
+            sizes = np.linalg.norm(view.residuals, axis=1) / solution.deviations[f"{view.sensor} corners"]
+            is_bad = float(np.median(sizes)) > _DEVIATIONS and view.rms > _HARMLESS_PX
+        else:
+            is_bad = float(np.mean(view.outliers)) > _OUTLIERS
+        if is_bad and (worst is None or view.rms / usual > worst.miss / worst.usual):
+            worst = Contradiction(shot, (view.sensor,), view.rms, usual, view.of)
+    return None if worst is None else _with_partner(worst, boards)
+
+
+def _with_partner(found: Contradiction, boards: Mapping[tuple[str, int], tuple[Pose, float]]) -> Contradiction:
+    """With the other sensor of a pair whose views each fit alone, and the shots that would fit instead."""
+    own = {sensor: each for (sensor, shot), each in boards.items() if shot == found.shot}
+    pairs = [
+        (_apart(own[a][0], own[b][0]), a, b)
+        for a, b in combinations(own, 2)
+        if found.of == "corners" and found.sensors[0] in (a, b) and max(own[a][1], own[b][1]) * _BETTER < found.miss
+    ]
+    if not pairs:
+        return found
+    apart, a, b = max(pairs)
+    first, second = (a, b) if a == found.sensors[0] else (b, a)
+    others = {
+        shot
+        for (sensor, shot), (T_rb, _) in boards.items()
+        for here in (a, b)
+        if shot != found.shot and sensor in (a, b) and sensor != here and _apart(T_rb, own[here][0]) < _SAME * apart
+    }
+    return replace(found, sensors=(first, second), apart=apart, exchanged_with=tuple(sorted(others)))
+
+
+def _apart(T_ra: Pose, T_rb: Pose) -> float:
+    return float(np.linalg.norm(T_ra[:3, 3] - T_rb[:3, 3]))
+
+
+def _boards(solution: Solution) -> dict[tuple[str, int], tuple[Pose, float]]:
+    """Pose of the board `T_rb` and residual [px] by sensor and shot, each from that one image."""
+    found = {}
+    for view in solution.task.corners:
+        if candidates := pose_candidates(solution.cameras[view.sensor], view):
+            found[view.sensor, view.shot] = _nearest(candidates, solution, view)
+    return found
+
+
+def _nearest(candidates: Sequence[PoseCandidate], solution: Solution, view: CornerView) -> tuple[Pose, float]:
+    """Of the two poses that a planar board may have, the nearer to the solution's if both fit."""
+    T_rs = solution.cameras[view.sensor].T_rs
+    allowed = [one for one in candidates if one.rms_px < 2 * candidates[0].rms_px]
+    board = solution.boards.get(view.shot)
+    if board is None:
+        return T_rs @ candidates[0].T_sb, candidates[0].rms_px
+    turned = [np.linalg.norm(pose.to_rotation_vector(T_rs @ one.T_sb @ pose.inverse(board))[0]) for one in allowed]
+    best = allowed[int(np.argmin(turned))]
+    return T_rs @ best.T_sb, best.rms_px
