@@ -7,6 +7,7 @@ Goals: none of the first three; the bounds below for the slopes, of runs of ten 
 Seeds: the context's seed chooses faults and times.
 """
 
+import shutil
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from abs_service.report.content import Column, Section, Table
-from evaluation.experiment import Context, Findings, Goal, at_most
+from evaluation.experiment import Context, Findings, Goal, UnavailableError, at_most
 from evaluation.service.faults import fault, folders, messages, processes
 from evaluation.service.faults.fault import Fault, Seen, Try
 from evaluation.service.faults.running import RunningRig, start_run
@@ -33,6 +34,8 @@ FAULTS = tuple(
 )
 #: The most that a crash may lose [s].
 LOST_S = 1.0
+#: Data rate of the recordings [bytes/s].
+RECORDED_BYTES_S = 11_000_000
 #: Bounds of the slopes: memory [MB/min] and open files [1/min]; shortest run in which they can be told [min].
 GROWTH_MB_MIN, GROWTH_FILES_MIN, LEAST_MIN = 0.3, 0.3, 10.0
 
@@ -69,6 +72,7 @@ def run(settings: Settings, context: Context) -> Findings:
     made: list[tuple[Fault, Seen]] = []
     usages: list[Usage] = []
     with tempfile.TemporaryDirectory(prefix="abs-soak-") as folder, start_run(Path(folder), "", 0) as rig:
+        _check_room(Path(folder), settings.minutes)
         rig.await_calm(fault.PATIENCE_S)
         end_s = time.monotonic() + 60 * settings.minutes
         while time.monotonic() < end_s:
@@ -140,6 +144,15 @@ def _flat(name: str, slope: tuple[float, float]) -> tuple[Goal, Goal]:
         at_most(f"Growth of the memory {words}", slope[0], GROWTH_MB_MIN, "MB/min"),
         at_most(f"Growth of the open files {words}", slope[1], GROWTH_FILES_MIN, "1/min"),
     )
+
+
+def _check_room(folder: Path, minutes: float) -> None:
+    needed, free = round(minutes * 60 * RECORDED_BYTES_S), shutil.disk_usage(folder).free
+    if needed > free:
+        raise UnavailableError(
+            f"{folder.parent}: {free / 1e9:.1f} GB are free, the recordings need {needed / 1e9:.1f} GB; make room, or name "
+            "another folder for temporary files with TMPDIR"
+        )
 
 
 def _watch(rig: RunningRig, seconds: float, usages: list[Usage]) -> None:

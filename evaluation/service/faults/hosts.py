@@ -68,12 +68,12 @@ class Hosts:
             if (code := self._running[name].poll()) is not None:
                 raise ServiceError(f"{name} ended by itself with code {code}")
 
-    def stop(self, timeout_s: float = 15.0) -> int:
+    def stop(self, timeout_s: float = 15.0, number: signal.Signals = signal.SIGINT) -> int:
         """See `running.Processes`."""
         codes = [0]
         for process in self._running.values():
             if process.poll() is None:
-                process.send_signal(signal.SIGTERM)
+                process.send_signal(number)
         for process in self._running.values():
             try:
                 codes.append(process.wait(timeout_s))

@@ -10,6 +10,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
+from abs_service.wire.checked_bus import CheckedBus
 from drivers.contract.host_clock import host_clock
 from evaluation.service.live.rig import REFERENCE, TRACKER
 from evaluation.service.live.subscriber import connect
@@ -37,7 +38,7 @@ class Listener:
         self.frames: list[tuple[int, int, int, int]] = []
         self.health: list[tuple[int, Health]] = []
         self.last_image = Sample(DEPTH, "", b"")
-        self._bus = connect(endpoint, rig)
+        self._bus = CheckedBus(connect(endpoint, rig), time.monotonic_ns)  # some faults are messages
         self._bus.subscribe(keys.state(TRACKER), self._take_state)
         self._bus.subscribe(DEPTH, self._take_image)
         self._bus.subscribe(keys.health("**"), self._take_health)

@@ -38,8 +38,8 @@ def run_killed(rig: RunningRig) -> Made:
 def terminated(rig: RunningRig) -> Made:
     """SIGTERM to `run`, which is started again afterwards."""
     processes = rig.processes().values()
-    begin_ns = rig.signal("run", signal.SIGTERM)
-    code = rig.service.stop(END_S)
+    begin_ns = rig.now_ns()
+    code = rig.service.stop(END_S, signal.SIGTERM)
     left = [path.name for path in rig.takes.glob("*.active")]
     broken = ", ".join([*([f"exit code {code}"] if code else []), *(f"{name} is not complete" for name in left)])
     return _started_again(rig, begin_ns, lambda: any(map(is_running, processes)), broken)

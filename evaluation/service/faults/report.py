@@ -41,7 +41,8 @@ class Row:
     @classmethod
     def from_values(cls, values: Mapping[str, Any]) -> "Row":
         """A row of a JSON report, in which NaN is null."""
-        return cls(**{name: math.nan if value is None else value for name, value in values.items()})
+        cells: dict[str, Any] = {name: math.nan if value is None else value for name, value in values.items()}
+        return cls(**cells)
 
 
 def row(fault: Fault, tries: Sequence[Try]) -> Row:

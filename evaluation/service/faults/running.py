@@ -38,8 +38,8 @@ class Processes(Protocol):
         """Raises a `ServiceError` if the whole has ended."""
         ...
 
-    def stop(self, timeout_s: float = 15.0) -> int:
-        """Ends them; returns the exit code."""
+    def stop(self, timeout_s: float = 15.0, number: signal.Signals = signal.SIGINT) -> int:
+        """Asks them to end by a signal; returns the exit code."""
         ...
 
 

@@ -83,6 +83,14 @@ def test_what_grows_is_seen():
     assert files == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_soak_says_what_was_late_and_ill():
+    late, ill = Try(2.5, "", 1.0, 0.4, 0.4, ""), Try(0.5, "", math.nan, 0.4, 0.4, "")
+    usages = [Usage(t * S, "run", 10**8, 20) for t in range(600)]
+    found = soak.findings(soak.Settings(), [(FAULT, WELL), (FAULT, late), (FAULT, ill)], 0, usages)
+    assert [goal.met for goal in found.goals] == [True, False, False, True, True]
+    assert found.values["held"] == {"run": "100 → 100 MB, 20 → 20 files"}
+
+
 def test_the_soak_makes_only_faults_after_which_the_rig_helps_itself():
     assert {one.name for one in soak.FAULTS} >= {FAULT.name, "the folder is renamed"}
     assert not any("started again" in one.name or one.room_mb for one in soak.FAULTS)
