@@ -150,8 +150,8 @@ def _check_room(folder: Path, minutes: float) -> None:
     needed, free = round(minutes * 60 * RECORDED_BYTES_S), shutil.disk_usage(folder).free
     if needed > free:
         raise UnavailableError(
-            f"{folder.parent}: {free / 1e9:.1f} GB are free, the recordings need {needed / 1e9:.1f} GB; make room, or name "
-            "another folder for temporary files with TMPDIR"
+            f"{folder.parent}: {free / 1e9:.1f} GB are free, the recordings need {needed / 1e9:.1f} GB; make room, or "
+            "name another folder for temporary files with TMPDIR"
         )
 
 
