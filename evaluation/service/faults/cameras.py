@@ -31,7 +31,8 @@ def _lasting(name: str, promise: str, kind: str, longest_s: float) -> Fault:
 
 def _passing(name: str, promise: str, kind: str, recording_s: float) -> Fault:
     restarted = frozenset({"capture"})  # by `passing` itself
-    return Fault(name, promise, passing, 1.5, recording_s, math.inf, restarted, f"&fault={kind}@{BEGIN}")
+    device = f"&fault={kind}@{BEGIN}"
+    return Fault(name, promise, passing, 1.5, recording_s, math.inf, restarted=restarted, device=device)
 
 
 FAULTS = (

@@ -41,6 +41,7 @@ class Fault:
         estimates_s: longest time between two exposures with an estimate that says TRACKING [s].
         recording_s: longest time between two recorded depth images [s].
         noticed_s: time until a component's health is not OK [s]; infinite where nothing has to be said.
+        tracks_s: time from the end of the cause to the first estimate that says TRACKING [s].
         restarted: processes that may be others afterwards.
         device: added to the address of the simulated device.
         room_mb: size of a file system of its own for the recordings [MB]; 0 for none.
@@ -53,6 +54,7 @@ class Fault:
     estimates_s: float = 0.5
     recording_s: float = 0.5
     noticed_s: float = NOTICED_S
+    tracks_s: float = math.inf
     restarted: frozenset[str] = frozenset()
     device: str = ""
     room_mb: int = 0
@@ -80,8 +82,8 @@ class Try:
     Attributes:
         noticed_s: from the beginning to the first health that is not OK [s].
         said: that health's message.
-        recovered_s: from the end of the cause to the first estimate that says TRACKING and to every component's OK [s].
-        estimates_s, recording_s: see `Fault`.
+        recovered_s: from the end of the cause until it tracks and every component's health is OK again [s].
+        estimates_s, recording_s, tracks_s: see `Fault`.
         broken: a promise that was not kept besides, in words.
     """
 
@@ -90,6 +92,7 @@ class Try:
     recovered_s: float
     estimates_s: float
     recording_s: float
+    tracks_s: float
     broken: str
 
     def missed(self, fault: Fault) -> str:
@@ -99,6 +102,8 @@ class Try:
             found.append("did not recover")
         if not math.isinf(fault.noticed_s) and not self.noticed_s <= fault.noticed_s:
             found.append("not in health" if math.isnan(self.noticed_s) else f"in health after {self.noticed_s:.1f} s")
+        if not self.tracks_s <= fault.tracks_s:
+            found.append(f"tracks after {self.tracks_s:.1f} s")
         if not self.estimates_s <= fault.estimates_s:
             found.append(f"no estimate for {self.estimates_s:.1f} s")
         if not self.recording_s <= fault.recording_s:
@@ -151,27 +156,29 @@ def judge(seen: Seen, rig: RunningRig, recorded_ns: Sequence[int]) -> Try:
     made, listener = seen.made, rig.listener
     said = [(t_ns, one) for t_ns, one in listener.health if made.begin_ns <= t_ns <= seen.calm_ns]
     bad = [(t_ns, one) for t_ns, one in said if one.level > Health.LEVEL_OK]
-    tracked_ns = [exposed for _, exposed, tracking in listener.states if tracking]
+    exposed_ns = [exposed for _, exposed, tracking in listener.states if tracking]
+    tracks_ns = next((t for t, exposed, tracking in listener.states if tracking and exposed > made.end_ns), math.nan)
+    back_ns = max(tracks_ns, _all_ok_ns(said))
     return Try(
         noticed_s=(bad[0][0] - made.begin_ns) * 1e-9 if bad else math.nan,
         said=f"{bad[0][1].component}: {bad[0][1].message}" if bad else "",
-        recovered_s=_recovered_s(seen, rig, said) if seen.recovered else math.nan,
-        estimates_s=gap_s(tracked_ns, made.begin_ns, seen.calm_ns),
+        recovered_s=(back_ns - made.end_ns) * 1e-9 if seen.recovered else math.nan,
+        estimates_s=gap_s(exposed_ns, made.begin_ns, seen.calm_ns),
         recording_s=gap_s(recorded_ns, made.begin_ns, seen.calm_ns),
+        tracks_s=(tracks_ns - made.end_ns) * 1e-9,
         broken=made.broken,
     )
 
 
-def _recovered_s(seen: Seen, rig: RunningRig, said: Sequence[tuple[int, Health]]) -> float:
-    """Time from the end of the cause until it tracks and every component that was not OK is so again [s]."""
-    end_ns = seen.made.end_ns
-    latest_ns = next(t for t, exposed, tracking in rig.listener.states if tracking and exposed > end_ns)
+def _all_ok_ns(said: Sequence[tuple[int, Health]]) -> float:
+    """When the last component became OK that was not [ns]; 0 if all were."""
+    latest_ns = 0
     for component in {one.component for _, one in said}:
-        levels = [(t, one.level) for t, one in said if one.component == component]
+        levels = [(t_ns, one.level) for t_ns, one in said if one.component == component]
         for (_, before), (t_ns, level) in itertools.pairwise(levels):
             if before != Health.LEVEL_OK and level == Health.LEVEL_OK:
                 latest_ns = max(latest_ns, t_ns)
-    return (latest_ns - end_ns) * 1e-9
+    return latest_ns
 
 
 def gap_s(times_ns: Sequence[int], begin_ns: int, end_ns: int) -> float:

@@ -18,6 +18,7 @@ from types import MappingProxyType
 from evaluation.experiment import UnavailableError
 from evaluation.service.faults import network
 from evaluation.service.faults.fault import Elsewhere, Fault, Made
+from evaluation.service.faults.processes import TRACKS_S
 from evaluation.service.faults.running import START_S, RunningRig, table
 from evaluation.service.live.rig import TRACKER, endpoint_of
 from evaluation.service.live.service import ServiceError
@@ -167,15 +168,16 @@ def cut(rig: RunningRig) -> Made:
     return Made(begin_ns, rig.now_ns())
 
 
-_AWAY = f"tracks within 3 s when it is back; the others live on (away for {AWAY_S:g} s)"
+_AWAY = f"tracks within {TRACKS_S:g} s when it is back; the others live on (away for {AWAY_S:g} s)"
 
 FAULTS = (
     Fault(
         "the cameras' host reboots: new clock, new boot identity",
         _AWAY,
         rebooted,
-        estimates_s=AWAY_S + 3,
-        recording_s=AWAY_S + 3,
+        estimates_s=math.inf,
+        recording_s=math.inf,
+        tracks_s=TRACKS_S,
         noticed_s=math.inf,  # health itself goes through the router
         restarted=frozenset({"capture"}),
         start=start_hosts,
@@ -184,16 +186,18 @@ FAULTS = (
         "the router stands still for longer than the lease",
         _AWAY,
         router_stopped,
-        estimates_s=AWAY_S + 3,
-        recording_s=AWAY_S + 3,
+        estimates_s=math.inf,
+        recording_s=math.inf,
+        tracks_s=TRACKS_S,
         noticed_s=math.inf,  # likewise
         start=start_hosts,
     ),
     Fault(
         f"the network to the tracker's host is cut for {CUT_S:g} s",
-        "recording goes on; tracks within 3 s when it is back",
+        f"recording goes on; tracks within {TRACKS_S:g} s when it is back",
         cut,
-        estimates_s=CUT_S + 3,
+        estimates_s=math.inf,
+        tracks_s=TRACKS_S,
         noticed_s=math.inf,
         start=start_networked_hosts,
     ),

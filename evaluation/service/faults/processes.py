@@ -14,6 +14,8 @@ from evaluation.service.live.proc import is_running
 STOP_S = 1.5
 #: Time in which all processes of a rig end [s].
 END_S = 5.0
+#: Time in which a rig that is started, or has its cameras again, tracks [s].
+TRACKS_S = 3.0
 
 
 def killed(component: str, rig: RunningRig) -> Made:
@@ -82,20 +84,22 @@ FAULTS = (
     Fault("kill -9 of `record`", "nothing older than 1 s is lost", recorder_killed, 0.5, 1.5, restarted=_RECORD),
     Fault(
         "kill -9 of `run`, started again",
-        f"its processes end within {END_S:g} s; then it tracks within 3 s",
+        f"its processes end within {END_S:g} s; then it tracks within {TRACKS_S:g} s",
         run_killed,
-        END_S + 3,
-        END_S + 3,
+        math.inf,
+        math.inf,
         _UNSAID,
+        TRACKS_S,
         _ALL,
     ),
     Fault(
         "SIGTERM of `run`, started again",
-        f"exit code 0 and complete files within {END_S:g} s; then it tracks within 3 s",
+        f"exit code 0 and complete files within {END_S:g} s; then it tracks within {TRACKS_S:g} s",
         terminated,
-        END_S + 3,
-        END_S + 3,
+        math.inf,
+        math.inf,
         _UNSAID,
+        TRACKS_S,
         _ALL,
     ),
     Fault(f"SIGSTOP of `capture` for {STOP_S:g} s", "goes on", partial(stopped, "capture"), 2.5, 2.5),
@@ -104,5 +108,5 @@ FAULTS = (
     Fault(f"SIGSTOP of `run` for {STOP_S:g} s", "nobody is killed", partial(stopped, "run"), 2.5, 2.5, _UNSAID),
     Fault(f"`capture` {_HANGS}", _BACK, partial(hangs, "capture"), STALL_S + 4, STALL_S + 4, restarted=_CAPTURE),
     Fault(f"`track` {_HANGS}", _BACK, partial(hangs, "track"), STALL_S + 4, restarted=_TRACK),
-    Fault(f"`record` {_HANGS}", _BACK, partial(hangs, "record"), 0.5, STALL_S + 2.5, STALL_S + 1, _RECORD),
+    Fault(f"`record` {_HANGS}", _BACK, partial(hangs, "record"), 0.5, STALL_S + 2.5, STALL_S + 1, restarted=_RECORD),
 )

@@ -19,7 +19,7 @@ from evaluation.service.soak import Usage, growth, lost_images
 S = 1_000_000_000
 ROOT = Path(__file__).parents[3]
 FAULT = next(one for one in FAULTS if isinstance(one, Fault))
-WELL = Try(0.5, "run: capture ended", 1.0, 0.4, 0.4, "")
+WELL = Try(0.5, "run: capture ended", 1.0, 0.4, 0.4, 1.0, "")
 
 
 def test_the_page_has_a_row_for_each_fault():
@@ -38,14 +38,23 @@ def test_names_are_unique_and_tests_exist():
     ("seen", "words"),
     [
         (WELL, ""),
-        (Try(math.nan, "", 1.0, 0.4, 0.4, ""), "not in health"),
-        (Try(2.5, "", 1.0, 0.4, 0.4, ""), "in health after 2.5 s"),
-        (Try(0.5, "", math.nan, 0.4, 0.4, ""), "did not recover"),
-        (Try(0.5, "", 1.0, 9.0, math.inf, "exit code 1"), "exit code 1, no estimate for 9.0 s, no recording for inf s"),
+        (Try(math.nan, "", 1.0, 0.4, 0.4, 1.0, ""), "not in health"),
+        (Try(2.5, "", 1.0, 0.4, 0.4, 1.0, ""), "in health after 2.5 s"),
+        (Try(0.5, "", math.nan, 0.4, 0.4, 1.0, ""), "did not recover"),
+        (
+            Try(0.5, "", 1.0, 9.0, math.inf, 1.0, "exit code 1"),
+            "exit code 1, no estimate for 9.0 s, no recording for inf s",
+        ),
     ],
 )
 def test_each_broken_promise_is_named(seen, words):
     assert seen.missed(FAULT) == words
+
+
+def test_a_rig_that_is_started_again_has_to_track_soon():
+    restarted = next(one for one in FAULTS if one.name == "kill -9 of `run`, started again")
+    assert isinstance(restarted, Fault)
+    assert Try(math.nan, "", 6.0, 9.0, 9.0, 3.5, "").missed(restarted) == "tracks after 3.5 s"
 
 
 @pytest.mark.parametrize(
@@ -57,7 +66,7 @@ def test_a_gap_is_that_which_touches_the_time_of_the_fault(times, gap):
 
 
 def test_reports_become_rows_and_other_rows_stay():
-    found = faults.findings([row(FAULT, [WELL, Try(0.5, "", 7.0, 9.0, 0.4, "")])])
+    found = faults.findings([row(FAULT, [WELL, Try(0.5, "", 7.0, 9.0, 0.4, 1.0, "")])])
     assert not found.goals[0].met
     values = json.loads(json.dumps(to_json(experiment.report("", found, {}, trace([], [])))))["values"]["rows"]
     other = "| kill -9 of `track` | x | 10 | kept | 1 | 1 | 1 | 1 |"
@@ -84,7 +93,7 @@ def test_what_grows_is_seen():
 
 
 def test_a_soak_says_what_was_late_and_ill():
-    late, ill = Try(2.5, "", 1.0, 0.4, 0.4, ""), Try(0.5, "", math.nan, 0.4, 0.4, "")
+    late, ill = Try(2.5, "", 1.0, 0.4, 0.4, 1.0, ""), Try(0.5, "", math.nan, 0.4, 0.4, 1.0, "")
     usages = [Usage(t * S, "run", 10**8, 20) for t in range(600)]
     found = soak.findings(soak.Settings(), [(FAULT, WELL), (FAULT, late), (FAULT, ill)], 0, usages)
     assert [goal.met for goal in found.goals] == [True, False, False, True, True]
