@@ -6,6 +6,8 @@ fault, that is said instead of an outcome.
 Statistic: of each fault, the tries in which every promise was kept, and the longest times without an estimate that says
 TRACKING, without a recorded depth image, until a component's health was not OK, and to recover.
 Goals: every promise is kept in every try; the bounds are those of `Fault`, written before the first run.
+    Changed on 2026-11-24 after single tries: nothing has to be in health while the router itself is away, since nobody
+    could hear it; how soon it tracks after a restart is a bound of its own, which is stricter than before.
 Seeds: none; faults come when the rig is calm, at no fixed phase of its periods.
 Easier than reality: one fault at a time, and a rig that may restart its processes as often as it likes.
 """
