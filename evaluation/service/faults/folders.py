@@ -13,21 +13,20 @@ from evaluation.service.live.proc import is_running
 
 #: For how long the recorder cannot record, after it has said so [s].
 FAULT_S = 2.0
-#: Size of the file system that is filled [MB]; ten tries record less.
-ROOM_MB = 1500
-#: What is left of it, less than `record.minimum_free_bytes`.
+#: Size of the file system that becomes full [MB]: none of which health says that it is full within the hour.
+ROOM_MB = 100_000
+#: What is left of it then, less than `record.minimum_free_bytes`.
 LEFT_BYTES = 15_000_000
 
 
 def filled(rig: RunningRig) -> Made:
-    """The disk is filled by somebody else, who makes room again; the recorder is to stop before it is full."""
-    begin_ns = rig.now_ns()
-    filler = rig.takes / "filler"
+    """The disk shrinks until it is nearly full, and grows again; the recorder is to stop before it is full."""
     room = os.statvfs(rig.takes)
-    with filler.open("wb") as stream:
-        os.posix_fallocate(stream.fileno(), 0, room.f_bavail * room.f_frsize - LEFT_BYTES)
+    used = (room.f_blocks - room.f_bavail) * room.f_frsize
+    begin_ns = rig.now_ns()
+    mount("-o", f"remount,size={used + LEFT_BYTES}", str(rig.takes))
     broken = _await_failure(rig, begin_ns)
-    filler.unlink()
+    mount("-o", f"remount,size={ROOM_MB}m", str(rig.takes))
     return Made(begin_ns, rig.now_ns(), broken)
 
 
