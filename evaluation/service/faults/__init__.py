@@ -22,6 +22,7 @@ from evaluation.service.faults import report
 from evaluation.service.faults.fault import Fault, make_tries
 from evaluation.service.faults.report import Row
 from evaluation.service.faults.table import FAULTS
+from evaluation.service.live.service import ServiceError
 
 TITLE = "Faults: what is promised, lost, said and how soon it is well again"
 
@@ -62,3 +63,5 @@ def _row(fault: Fault, tries: int, context: Context) -> Row:
             return report.row(fault, make_tries(fault, tries, Path(folder), context.progress))
         except UnavailableError as error:
             return Row(fault.name, fault.promise, outcome=f"not permitted here: {error}")
+        except (ServiceError, TimeoutError) as error:
+            return Row(fault.name, fault.promise, tries, tries, f"MISSED: {error}")

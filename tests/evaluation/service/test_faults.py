@@ -9,6 +9,7 @@ import pytest
 from abs_service.report.content import to_json
 from abs_service.report.provenance import trace
 from evaluation import experiment
+from evaluation.experiment import UnavailableError
 from evaluation.service import faults, soak
 from evaluation.service.faults import page
 from evaluation.service.faults.fault import Elsewhere, Fault, Made, Seen, Try, gap_s
@@ -63,6 +64,22 @@ def test_a_rig_that_is_started_again_has_to_track_soon():
 )
 def test_a_gap_is_that_which_touches_the_time_of_the_fault(times, gap):
     assert gap_s([t * S for t in times], 12 * S, 25 * S) == gap
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome", "missed"),
+    [
+        (UnavailableError("mount: no"), "not permitted here: mount: no", 0),
+        (TimeoutError("no calm"), "MISSED: no calm", 2),
+    ],
+)
+def test_a_fault_that_cannot_be_tried_does_not_end_the_others(monkeypatch, error, outcome, missed):
+    def refuse(*_):
+        raise error
+
+    monkeypatch.setattr(faults, "make_tries", refuse)
+    found = faults.run(faults.Settings(2, ("kill -9 of `track`",)), experiment.Context(0))
+    assert [(row["outcome"], row["missed"]) for row in found.values["rows"]] == [(outcome, missed)]
 
 
 def test_reports_become_rows_and_other_rows_stay():
