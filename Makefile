@@ -19,6 +19,9 @@ format: .venv/.all ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 evaluate: .venv/.all ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
 	@$(BIN)/python -m evaluation $(ARGS)
+faults: .venv/.all ## make every fault ten times and write what came of it to docs/reliability.md: make faults ARGS="--set tries=3"
+	@$(BIN)/python -m evaluation faults --out results $(ARGS)
+	@$(BIN)/python -m evaluation.service.faults.page results/faults/report.json
 bench: .venv/.all ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
 	@$(BIN)/pytest evaluation/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
 cost: .venv/.all ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
@@ -42,4 +45,4 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
 .venv/.all: .venv/.run constraints-all.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
-.PHONY: help run test check lint format evaluate bench cost proto constraints all clean
+.PHONY: help run test check lint format evaluate faults bench cost proto constraints all clean

@@ -15,8 +15,10 @@ from abs_service.supervision.exit_codes import Exit
 
 _log = logging.getLogger(__name__)
 
-#: Backoff before a restart: doubles with each end within the window, up to the longest.
+#: Backoff before a restart: doubles with each end of a process soon after its start, up to the longest.
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
+#: A process that has run for longer than this had worked: the next backoff is the first one again [ns].
+WORKED_NS = 10_000_000_000
 #: A longer time between two calls of `poll` was a stop of this process, in which it heard no child [ns].
 PAUSE_NS = 1_000_000_000
 
@@ -75,6 +77,8 @@ class Child:
     exit_code: int = 0
     process: Process = field(default=NO_PROCESS, repr=False)
     deadline_ns: int = 0
+    started_ns: int = 0
+    backoff_ns: int = FIRST_BACKOFF_NS // 2
     start_at_ns: int = 0
     heard_ns: int = 0
     threads: Mapping[int, ThreadTimes] = field(default_factory=dict, repr=False)
@@ -178,7 +182,7 @@ class Supervisor:
         started = {"component": child.component, "child": child.process.pid, "restarts": child.restarts}
         _log.info("%s is started", child.component, extra={"fields": started})
         child.state, child.reason = State.RUNNING, ""
-        child.heard_ns, child.threads = now_ns, {}
+        child.started_ns, child.heard_ns, child.threads = now_ns, now_ns, {}
         child.deadline_ns = now_ns + self._limits.startup_ns
 
     def _check(self, child: Child, now_ns: int) -> None:
@@ -204,7 +208,9 @@ class Supervisor:
             times = f"needed more than {self._limits.restarts} restarts in {self._limits.window_ns / 1e9:g} s"
             self._give_up(child, f"{times}; the last time it {reason}")
             return
-        child.start_at_ns = now_ns + min(FIRST_BACKOFF_NS << len(child.exits_ns), LONGEST_BACKOFF_NS)
+        worked = now_ns - child.started_ns > WORKED_NS
+        child.backoff_ns = FIRST_BACKOFF_NS if worked else min(2 * child.backoff_ns, LONGEST_BACKOFF_NS)
+        child.start_at_ns = now_ns + child.backoff_ns
         child.exits_ns.append(now_ns)
         child.restarts += 1
         child.state, child.reason, child.process = state, reason, NO_PROCESS

@@ -100,14 +100,6 @@ def wait_until(condition: Callable[[], Any], timeout_s: float, what: str) -> Any
     return result
 
 
-def is_running(pid: int) -> bool:
-    """True if a process exists and is no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
 def kill(pid: int) -> int:
     """`kill -9`; returns the moment, CLOCK_MONOTONIC [ns]."""
     os.kill(pid, signal.SIGKILL)

@@ -11,8 +11,8 @@ from absmsg.v1.frame_info_pb2 import FrameInfo
 from absmsg.v1.health_pb2 import Health
 from mcap.reader import make_reader
 
-from evaluation.service.live.proc import children
-from tests.system.running import is_running, kill, wait_until
+from evaluation.service.live.proc import children, is_running
+from tests.system.running import kill, wait_until
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import config
-from evaluation.service.live.proc import children
-from tests.system.running import TRACKING, abs_service, is_running, wait_until
+from evaluation.service.live.proc import children, is_running
+from tests.system.running import TRACKING, abs_service, wait_until
 
 pytestmark = pytest.mark.slow
 

@@ -72,6 +72,14 @@ def children(pid: int) -> Mapping[str, int]:
     return found
 
 
+def is_running(pid: int) -> bool:
+    """True if a process exists and is no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
 def _command(words: Iterable[str]) -> str:
     """Word after `abs_service` on a command line; "" if there is none."""
     words = iter(words)

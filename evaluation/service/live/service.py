@@ -48,10 +48,10 @@ class Service:
             last = self._output.read().strip().rpartition("\n")[2]
             raise ServiceError(f"the service ended by itself with code {code}: {last}")
 
-    def stop(self, timeout_s: float = 15.0) -> int:
-        """Interrupts it (SIGINT) and returns its exit code; negative if it had to be killed."""
+    def stop(self, timeout_s: float = 15.0, number: signal.Signals = signal.SIGINT) -> int:
+        """Asks it to end by a signal and returns its exit code; negative if it had to be killed."""
         if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
+            self._process.send_signal(number)
         try:
             return self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:

@@ -102,6 +102,18 @@ def test_a_crashed_child_is_started_again_after_a_pause_that_doubles(world):
     assert supervisor.children["capture"].restarts == 3
 
 
+def test_a_child_that_had_worked_is_started_again_after_the_shortest_pause(world):
+    supervisor = world.supervisor("record")
+    for _ in range(5):
+        passes(world, supervisor, 11)
+        world.latest("record").code = -9
+        supervisor.poll()
+        started = len(world.started)
+        world.now_ns += S // 5
+        supervisor.poll()
+        assert len(world.started) == started + 1
+
+
 def test_a_child_that_crashes_too_often_is_given_up_and_the_others_go_on(world):
     supervisor = world.supervisor("capture", "track/a", "track/b")
     for _ in range(6):

@@ -1,0 +1,111 @@
+"""Faults of other programs on the bus: messages that no rig sends, and a subscriber that stands still."""
+
+import math
+import random
+import signal
+import subprocess
+import sys
+import time
+
+from absmsg.v1.frame_info_pb2 import FrameInfo
+from absmsg.v1.health_pb2 import Health
+
+from abs_service.bus import keys
+from abs_service.bus.contract import EVENTS
+from abs_service.bus.zenoh_bus import ZenohBus
+from evaluation.service.faults.fault import Fault, Made
+from evaluation.service.faults.listener import DEPTH
+from evaluation.service.faults.running import NAME, RunningRig
+from evaluation.service.live.rig import STREAMS, TRACKER
+from evaluation.service.live.subscriber import connect
+
+#: Messages on every key, and on the one key that is flooded.
+GARBAGE, FLOOD = 20, 5000
+#: For how long a subscriber is stopped [s].
+STOP_S = 3.0
+#: A subscriber of everything, as an application would be one.
+SUBSCRIBER = """
+import sys, time
+from evaluation.service.live.subscriber import connect
+connect(sys.argv[1], sys.argv[2]).subscribe("**", lambda sample: None)
+time.sleep(600)
+"""
+
+
+def topics() -> list[str]:
+    """All topics on which the rig sends."""
+    sensors = [topic for sensor, _ in STREAMS for topic in (keys.model(sensor), keys.calibration(sensor))]
+    images = [keys.image(sensor, stream) for sensor, stream in STREAMS]
+    tracker = [keys.state(TRACKER), keys.mesh(TRACKER), keys.topology(TRACKER), keys.reinitialize(TRACKER)]
+    health = [keys.health(name) for name in ("capture", f"track/{TRACKER}", "record", "run")]
+    return [*dict.fromkeys(sensors), *images, *tracker, *health, keys.CONFIG, keys.TRANSFORMS, keys.truth("sim")]
+
+
+def garbage(rig: RunningRig) -> Made:
+    """Random bytes, of every message type of the rig, on every key."""
+    draw = random.Random(rig.now_ns())
+    types = ["", "absmsg.v1.Health", "absmsg.v1.DeformationState", "absmsg.v1.SensorModel", "foxglove.RawImage"]
+    bus, begin_ns = connect(rig.endpoint, NAME), rig.now_ns()
+    for topic in topics():
+        for message in types:
+            publisher = bus.publisher(topic, message, EVENTS)
+            for _ in range(GARBAGE // len(types)):
+                publisher.put(draw.randbytes(draw.randrange(200)), draw.randbytes(draw.randrange(60)))
+    return _left(rig, bus, begin_ns)
+
+
+def flood(rig: RunningRig) -> Made:
+    """Valid health of no component, more than any process sends."""
+    bus, begin_ns = connect(rig.endpoint, NAME), rig.now_ns()
+    publisher = bus.publisher(keys.health("flood"), Health.DESCRIPTOR.full_name, EVENTS)
+    message = Health(component="flood", level=Health.LEVEL_OK).SerializeToString()
+    for _ in range(FLOOD):
+        publisher.put(message)
+    return _left(rig, bus, begin_ns)
+
+
+def forged_epoch(rig: RunningRig) -> Made:
+    """One depth image of an epoch far ahead."""
+    image = rig.listener.last_image
+    info = FrameInfo.FromString(image.attachment)
+    info.epoch = 2**32 - 1
+    bus, begin_ns = connect(rig.endpoint, NAME), rig.now_ns()
+    bus.publisher(DEPTH, image.message, EVENTS).put(image.payload, info.SerializeToString())
+    return _left(rig, bus, begin_ns)
+
+
+def stopped_subscriber(rig: RunningRig) -> Made:
+    """A subscriber of everything is stopped, and killed in the end."""
+    arguments = [sys.executable, "-c", SUBSCRIBER, rig.endpoint, NAME]
+    with subprocess.Popen(arguments) as subscriber:
+        time.sleep(STOP_S)  # until it has subscribed
+        begin_ns = rig.now_ns()
+        subscriber.send_signal(signal.SIGSTOP)
+        time.sleep(STOP_S)
+        subscriber.kill()
+        return Made(begin_ns, rig.now_ns())
+
+
+def _left(rig: RunningRig, bus: ZenohBus, begin_ns: int) -> Made:
+    time.sleep(0.2)  # until it is sent
+    bus.close()
+    return Made(begin_ns, rig.now_ns())
+
+
+FAULTS = (
+    Fault(f"garbage: {GARBAGE} messages of random bytes on every key", "no process ends; refused, counted", garbage),
+    Fault(f"{FLOOD} valid messages at once on one key", "no process ends; refused beyond 1000 a second", flood),
+    Fault(
+        "a depth image of an epoch far ahead",
+        "estimates go on after 30 frames",
+        forged_epoch,
+        estimates_s=2.0,
+        noticed_s=math.inf,
+    ),
+    Fault(
+        f"a subscriber of everything is stopped for {STOP_S:g} s",
+        "nobody waits for it",
+        stopped_subscriber,
+        noticed_s=math.inf,
+    ),
+)

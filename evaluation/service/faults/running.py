@@ -1,0 +1,235 @@
+"""A rig that runs, is listened to and records to a folder of its own."""
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from typing import Any, Protocol
+
+import tomli_w
+from mcap.reader import make_reader
+
+from abs_service.recording.recovery import RecoveryError, leftovers, recover
+from evaluation.experiment import UnavailableError
+from evaluation.service.faults.listener import DEPTH, Listener
+from evaluation.service.live.rig import TRACKER, demo_table, endpoint_of
+from evaluation.service.live.service import Service
+
+NAME = "faults"
+#: The first start on a machine compiles the kernels [s].
+START_S = 180.0
+#: A process without health for this long is killed; the default of ten seconds only takes longer [s].
+STALL_S = 4.0
+#: Time for which a second recorder must have been there to be loaded [s].
+LOAD_S = 8.0
+
+
+class Processes(Protocol):
+    """The processes of a rig; `Service` is one."""
+
+    def processes(self) -> Mapping[str, int]:
+        """Numbers of the processes that run, by the command of each."""
+        ...
+
+    def check(self) -> None:
+        """Raises a `ServiceError` if the whole has ended."""
+        ...
+
+    def stop(self, timeout_s: float = 15.0, number: signal.Signals = signal.SIGINT) -> int:
+        """Asks them to end by a signal; returns the exit code."""
+        ...
+
+
+class RunningRig:
+    """A rig and somebody who listens to it; a context manager that ends both.
+
+    Args:
+        folder: an empty folder, with `takes` in it where that is a file system of its own.
+        table: the configuration.
+        start: starts the processes of the rig of a file.
+        components: those whose health is listened to.
+
+    Attributes:
+        takes: folder of the recordings.
+        path: file of the rig.
+        endpoint: of the bus.
+        service: the processes.
+        listener: notes what they publish.
+    """
+
+    def __init__(
+        self, folder: Path, table: Mapping[str, Any], start: Callable[[Path], Processes], components: frozenset[str]
+    ) -> None:
+        self.path, self.takes = folder / "rig.toml", folder / "takes"
+        self.path.write_text(tomli_w.dumps(table), encoding="utf-8")
+        self.endpoint = endpoint_of(self.path)
+        self._start, self._components = start, components
+        self._stack = ExitStack()
+        self.service = start(self.path)
+        self._stack.callback(self._stop)
+        self.listener = self._stack.enter_context(Listener(self.endpoint, NAME))
+        self._wait(lambda: self.listener.tracks(0), START_S, "nothing was tracked")
+
+    def __enter__(self) -> "RunningRig":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def _stop(self) -> None:
+        self.service.stop()  # that which runs by then
+
+    @staticmethod
+    def now_ns() -> int:
+        """CLOCK_MONOTONIC [ns]."""
+        return time.monotonic_ns()
+
+    def processes(self) -> Mapping[str, int]:
+        """See `Processes`."""
+        return self.service.processes()
+
+    def signal(self, component: str, number: signal.Signals) -> int:
+        """Sends a signal to a process; returns the moment [ns]."""
+        os.kill(self.processes()[component], number)
+        return self.now_ns()
+
+    def start_again(self) -> int:
+        """Starts the processes anew after they have ended; returns the moment [ns]."""
+        begin_ns = self.now_ns()
+        self.service = self._start(self.path)
+        return begin_ns
+
+    def await_calm(self, timeout_s: float, since_ns: int = 0, required: bool = True) -> bool:
+        """Waits until it tracks and every component says that all is well; returns whether that happened.
+
+        Raises:
+            TimeoutError: it did not happen though it is required.
+        """
+        since_ns = since_ns or self.now_ns()
+
+        def calm() -> bool:
+            latest = self.listener.latest(since_ns)
+            heard = all(name in latest for name in self._components)
+            return heard and all(one.level == 1 for one in latest.values()) and self.listener.tracks(since_ns)
+
+        return self._wait(calm, timeout_s, "the rig did not become calm" if required else "")
+
+    def await_second_recorder(self) -> None:
+        """Waits until a second recorder is loaded."""
+        self._wait(lambda: len(self._recorders()) == 2, 30.0, "there is no second recorder")
+        time.sleep(max(0.0, LOAD_S - _age_s(max(self._recorders()))))
+
+    def await_new_frame(self, condition: Callable[[int, int], bool], timeout_s: float) -> int:
+        """Waits for a depth image whose number and epoch fulfil a condition; returns its arrival [ns]."""
+        seen = len(self.listener.frames)
+        found: list[int] = []
+
+        def there() -> bool:
+            found.extend(t for t, seq, epoch, _ in self.listener.frames[seen:] if condition(seq, epoch))
+            return bool(found)
+
+        self._wait(there, timeout_s, "the frame did not come")
+        return found[0]
+
+    def recorded_stamps(self) -> set[int]:
+        """Stops the rig and returns the stamps of all recorded depth images, of the wall clock [ns]."""
+        self.service.stop()
+        found: set[int] = set()
+        for folder in {path.parent for path in self.takes.parent.rglob("*.mcap*")}:
+            for path in leftovers(folder):
+                with suppress(RecoveryError, OSError):
+                    recover(path)
+            for path in folder.glob("*.mcap"):
+                with path.open("rb") as stream:
+                    messages = make_reader(stream).iter_messages(f"/{DEPTH}", log_time_order=False)
+                    found |= {message.log_time for *_, message in messages}
+        return found
+
+    @staticmethod
+    def on_own_clock(stamps: Iterable[int]) -> list[int]:
+        """Stamps of the wall clock as times of CLOCK_MONOTONIC, sorted [ns]."""
+        wall_ns = time.time_ns() - time.monotonic_ns()
+        return sorted(stamp - wall_ns for stamp in stamps)
+
+    def _recorders(self) -> list[int]:
+        run = self.processes()["run"]
+        listed = Path(f"/proc/{run}/task/{run}/children").read_text(encoding="utf-8").split()
+        return [pid for pid in map(int, listed) if b"\0record\0" in _command_line(pid)]
+
+    def _wait(self, condition: Callable[[], bool], timeout_s: float, what: str) -> bool:
+        """Waits for a condition; False, or an error that says `what`, when the time is over."""
+        deadline_s = time.monotonic() + timeout_s
+        while not condition():
+            self.service.check()
+            if time.monotonic() > deadline_s:
+                if what:
+                    raise TimeoutError(f"{what} within {timeout_s:g} s")
+                return False
+            time.sleep(0.02)
+        return True
+
+
+def table(device: str) -> dict[str, Any]:
+    """The demo rig; `device` is added to the address of its simulated device."""
+    rig = demo_table(NAME)
+    rig["devices"]["sim"]["uri"] += device
+    rig["record"]["minimum_free_bytes"] = 20_000_000
+    # Ten tries in a row are more than a rig would bear.
+    rig["run"] |= {"max_restarts": 1000, "stall_timeout_s": STALL_S}
+    return rig
+
+
+@contextmanager
+def start_run(folder: Path, device: str, room_mb: int) -> Iterator[RunningRig]:
+    """`abs-service run` of the demo rig; arguments as in `fault.Fault`."""
+    components = frozenset({"run", "capture", f"track/{TRACKER}", "record"})
+    with _room(folder / "takes", room_mb), RunningRig(folder, table(device), Service, components) as rig:
+        yield rig
+
+
+@contextmanager
+def _room(folder: Path, megabytes: int) -> Iterator[None]:
+    """A file system of its own, in memory, at a folder; none for 0.
+
+    Raises:
+        UnavailableError: this user may not mount one.
+    """
+    if not megabytes:
+        yield
+        return
+    folder.mkdir()
+    mount("-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", str(folder))
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+def mount(*arguments: str) -> None:
+    """`mount ARGUMENTS`.
+
+    Raises:
+        UnavailableError: it is refused; the message is mount's own.
+    """
+    try:
+        subprocess.run(["mount", *arguments], check=True, capture_output=True, text=True)
+    except FileNotFoundError as error:
+        raise UnavailableError("there is no mount(8)") from error
+    except subprocess.CalledProcessError as error:
+        raise UnavailableError(f"mount {' '.join(arguments)}: {error.stderr.strip()}") from error
+
+
+def _command_line(pid: int) -> bytes:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def _age_s(pid: int) -> float:
+    """Time since a process began [s]."""
+    ticks = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[19]
+    return time.clock_gettime(time.CLOCK_BOOTTIME) - int(ticks) / os.sysconf("SC_CLK_TCK")

@@ -1,0 +1,23 @@
+"""All faults: those of issue and reliability page, and of what recorders that are trusted promise."""
+
+from evaluation.service.faults import cameras, folders, hosts, messages, processes
+from evaluation.service.faults.fault import Elsewhere, Fault
+
+#: In the order of the page.
+FAULTS: tuple[Fault | Elsewhere, ...] = (
+    *processes.FAULTS,
+    *folders.FAULTS,
+    *cameras.FAULTS,
+    *messages.FAULTS,
+    *hosts.FAULTS,
+    Elsewhere(
+        "mistakes in a configuration",
+        "exit code 2 with file, key, value and what is allowed",
+        "tests/system/test_user_errors.py",
+    ),
+    Elsewhere(
+        "a process is starved of processor time",
+        "it is not restarted; health says why",
+        "tests/system/test_stops.py",
+    ),
+)
