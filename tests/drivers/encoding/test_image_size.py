@@ -44,7 +44,7 @@ def test_an_image_that_claims_too_many_pixels_is_refused_before_it_is_decoded(co
     (tmp_path / "x.png").write_bytes(content)
     with pytest.raises(ImageFolderError, match=r"x\.png: .*67108864"):
         image_file.read(tmp_path / "x.png")
-    with pytest.raises(DetectionError, match=r"within: .*67108864"):
+    with pytest.raises(DetectionError, match=r"within = .*67108864"):
         load_mask(tmp_path / "x.png", "within")
     message = CompressedImage(frame_id="head", format="jpeg", data=content)
     with pytest.raises(CodecError, match=r"head: .*67108864"):
