@@ -270,5 +270,5 @@ def test_a_file_that_is_no_rig_file_is_refused_without_being_read_to_its_end(tmp
 
 
 def test_a_device_without_end_is_no_rig_file():
-    with pytest.raises(config.ConfigError, match="/dev/zero: .*no regular file"):
+    with pytest.raises(config.ConfigError, match=r"/dev/zero: .*no regular file"):
         config.load(Path("/dev/zero"))
