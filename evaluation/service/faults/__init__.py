@@ -40,7 +40,7 @@ class Settings:
     only: tuple[str, ...] = ("",)
 
 
-QUICK = Settings(tries=3)
+QUICK = Settings(tries=1)
 
 
 def run(settings: Settings, context: Context) -> Findings:
