@@ -19,18 +19,20 @@ format: .venv/.all ## rewrite the code in the project's format
 	@$(BIN)/ruff format . && $(BIN)/ruff check --fix .
 evaluate: .venv/.all ## measure how well it tracks: make evaluate ARGS="all --quick --out results", ARGS=list
 	@$(BIN)/python -m evaluation $(ARGS)
-faults: .venv/.all ## make every fault ten times and write what came of it to docs/reliability.md: make faults ARGS="--set tries=3"
+faults: .venv/.all ## make every fault ten times and write what came of it to docs/reference/reliability.md: make faults ARGS="--set tries=3"
 	@$(BIN)/python -m evaluation faults --out results $(ARGS)
 	@$(BIN)/python -m evaluation.service.faults.page results/faults/report.json
 bench: .venv/.all ## measure the hot parts, one table and JSON=bench.json; compare minima, machines differ
 	@$(BIN)/pytest evaluation/benchmarks --benchmark-enable --benchmark-quiet --benchmark-json=$(JSON) $(ARGS)
 cost: .venv/.all ## plot how the cost grows with vertices, population and sensors (docs/images/cost.png)
 	@$(BIN)/python -m evaluation.pictures.cost_growth docs/images/cost.png
+docs: .venv/.all ## build the documentation site into build/site; a broken link or anchor is an error
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict $(ARGS)
 proto: .venv/.all ## regenerate the wire code from proto/absmsg/v1/*.proto
 	@$(BIN)/python -m grpc_tools.protoc -Iproto --python_out=proto --pyi_out=proto proto/absmsg/v1/*.proto
 constraints: .venv/.all ## resolve the pinned requirements again: make constraints ARGS=--upgrade
 	@$(COMPILE) --group build --output-file constraints.txt
-	@$(COMPILE) --group dev --all-extras --constraints constraints.txt --output-file constraints-all.txt
+	@$(COMPILE) --group dev --group docs --all-extras --constraints constraints.txt --output-file constraints-all.txt
 all: .venv/.all ## install everything: device SDKs, what `make evaluate ARGS=peers` compares with, tools
 clean: ## remove .venv and every cache
 	rm -rf .venv build dist bench.json .pytest_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
@@ -45,4 +47,4 @@ clean: ## remove .venv and every cache
 	@$(PIP) --require-hashes --only-binary :all: -r constraints.txt && $(PIP) --no-deps --no-build-isolation -e . && touch $@
 .venv/.all: .venv/.run constraints-all.txt
 	@$(PIP) --require-hashes --only-binary :all: -r constraints-all.txt && touch $@
-.PHONY: help run test check lint format evaluate faults bench cost proto constraints all clean
+.PHONY: help run test check lint format evaluate faults bench cost docs proto constraints all clean

@@ -7,7 +7,8 @@
   for number, depth_m in enumerate(images):
       estimate = tracker.track(depth_m, time_s=number / 30)
 
-What `__all__` names is the public face (docs/api.md), imported when it is first used; nothing else is promised.
+What `__all__` names is the public face (docs/reference/api.md), imported when it is first used;
+nothing else is promised.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""Deformation models by their public names; docs/models.md describes them."""
+"""Deformation models by their public names; docs/explanation/models.md describes them."""
 
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.flexpad import Settings as FlexPad

@@ -1,4 +1,4 @@
-"""Noise models of sensors, by their public names; docs/noise.md has their formulas and how to measure them."""
+"""Noise models of sensors, by their public names; docs/explanation/noise.md has formulas and how to measure them."""
 
 from calib.noise.constant import Settings as Constant
 from calib.noise.gaussian_polynomial import Settings as GaussianPolynomial

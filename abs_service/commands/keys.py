@@ -5,8 +5,8 @@
   abs-service keys bob --only viewer --authority keys        one more
 
 The names are rig (the host that the others connect to: may do everything), capture, tracker, recorder, viewer (reads)
-and operator (reads, and sends commands). docs/hosts.md says which files belong where. Keep authority.key off the rigs:
-whoever has it makes certificates. Nothing that exists is overwritten.
+and operator (reads, and sends commands). docs/how-to/mutual-tls.md says which files belong where. Keep authority.key
+off the rigs: whoever has it makes certificates. Nothing that exists is overwritten.
 """
 
 import argparse

@@ -4,7 +4,7 @@
   abs-service record rig.toml --connect tcp/192.168.1.7:7447   of the same rig on another host
 
 A file is called *.mcap.active until it is complete. What a crash leaves is recovered at the next start. Exit code 1 if
-recording failed at any time (docs/reliability.md).
+recording failed at any time (docs/reference/reliability.md).
 """
 
 import argparse

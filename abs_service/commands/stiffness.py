@@ -4,7 +4,8 @@
   abs-service stiffness recordings/x.mcap --weight 0.08 --plot p.svg  choose the picture
   abs-service stiffness recordings/x.mcap --weight 0.08 --json        one JSON object, for scripts
 
-The tracker's model has to be "gravity" (docs/gravity.md), in the recording's configuration or in that of --config.
+The tracker's model has to be "gravity" (docs/explanation/gravity.md), in the recording's configuration or in that of
+--config.
 """
 
 import argparse

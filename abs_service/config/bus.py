@@ -17,7 +17,7 @@ class TlsTable(Table):
     Attributes:
         authority: certificate of the authority that signed those of all hosts, like the others in PEM format.
         certificate: this host's; its common name says what it may do: `rig`, `capture`, `tracker`, `recorder`,
-            `viewer` or `operator` (hosts.md).
+            `viewer` or `operator` (docs/how-to/mutual-tls.md).
         key: its private key.
     """
 

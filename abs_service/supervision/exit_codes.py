@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Exit(IntEnum):
-    """Reason of a process's end; docs/command-line.md has a table for users."""
+    """Reason of a process's end; docs/reference/command-line.md has a table for users."""
 
     OK = 0
     FAILED = 1  # something broke; starting again may help

@@ -78,7 +78,7 @@ class _Snapshot:
 
 
 def rows(view: RigView) -> Iterator[Row]:
-    """All numbers of a rig. Losses are in `abs_count_total`, with the names that docs/reliability.md explains."""
+    """All numbers of a rig. Losses are in `abs_count_total`, named as in docs/reference/reliability.md."""
     yield from _of_components(view)
     for stream in view.streams:
         yield "abs_stream_rate_hertz", "rate of a stream of images", {"stream": stream.name}, stream.rate_hz

@@ -15,7 +15,7 @@ from calib.noise.fit.samples import Samples
 
 @dataclass(frozen=True)
 class GaussianPolynomial:
-    """μ(x, a) = Σ mu[i][j] xⁱ aʲ and σ(x, a) = Σ sigma[i][j] xⁱ aʲ, x in metres, a in the sensor's amplitude unit.
+    """μ(x, a) = Σ `mu[i][j]` xⁱ aʲ and σ(x, a) = Σ `sigma[i][j]` xⁱ aʲ, x in metres, a in the sensor's unit.
 
     Arguments are clamped to the calibrated domain and σ is at least `least_sigma`, so that extrapolation stays positive
     and bounded.

@@ -7,7 +7,7 @@ A driver is a module or package of `drivers`, named after the scheme of its addr
 - `discover(timeout_s: float) -> list[Found]`, see `drivers.contract.discovery`.
 
 A driver opens a device, delivers frames and reports failure. It never reconnects: the device supervisor
-(`abs_service.capture.device_supervisor`) detects stalls and reopens the device. See docs/devices.md.
+(`abs_service.capture.device_supervisor`) detects stalls and reopens the device. See docs/how-to/devices.md.
 """
 
 from collections.abc import Mapping

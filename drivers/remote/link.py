@@ -1,6 +1,6 @@
 """A zenoh client session to the remote rig; the only module of this driver that imports zenoh.
 
-Keys are those of docs/subscribing.md: `abs/RIG/TOPIC`.
+Keys are those of docs/how-to/subscribing.md: `abs/RIG/TOPIC`.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Accuracy of fitted noise models: the table of docs/noise.md.
+"""Accuracy of fitted noise models: the table of docs/explanation/noise.md.
 
 Samples are those of `tests/calib/noise/laws.py`: 20 000 from the simulator, 5 % of them uniform outliers, and as many
 held out. Errors are the largest over the domain, in the worst of the seeds; all other statistics are means.

@@ -1,4 +1,4 @@
-"""Every deformation model on the same sequences of the demo rig: the table of docs/models.md.
+"""Every deformation model on the same sequences of the demo rig: the table of docs/explanation/models.md.
 
 Everything is as in the demo's configuration except the model, the search (`cma` unless stated) and the objective: the
 likelihood, with or without texture registration noise, or squares with default weights. Means over the frames of a

@@ -1,4 +1,4 @@
-"""Writes docs/configuration.md, every key of a rig file, from the annotations and docstrings of the configuration.
+"""Writes docs/reference/configuration.md, every key of a rig file, from the configuration's annotations and docstrings.
 
 .venv/bin/python -m tests.repository.configuration_page
 """
@@ -18,15 +18,15 @@ from abs_service.config import plugins, values
 from abs_service.config.tables import ServiceConfig
 from tests.repository.configuration_values import WORDS, default_words, value_words
 
-PAGE = Path(__file__).parents[2] / "docs" / "configuration.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "configuration.md"
 INTRO = """\
 # Every key of a rig file
 
 <!-- Written by `.venv/bin/python -m tests.repository.configuration_page`: edit the docstrings that it is made from. -->
 
 The sections follow the order of a rig file; `NAME` is a name of your choice.
-[abs_service/rigs/demo.toml](../abs_service/rigs/demo.toml) is a complete file to begin with,
-[examples/rigs](../examples/rigs) has others, and `abs-service check rig.toml` says which keys or values are wrong.
+[abs_service/rigs/demo.toml](../../abs_service/rigs/demo.toml) is a complete file to begin with,
+[examples/rigs](../../examples/rigs) has others, and `abs-service check rig.toml` says which keys or values are wrong.
 
 *value* is the type and range: an integer may stand for a number, but not "3" for 3; paths start from the folder of the
 file that names them. A key without a default may be left out unless it is **required**. Equations and sections are

@@ -1,4 +1,4 @@
-"""Types, ranges and defaults of the configuration in words, for docs/configuration.md."""
+"""Types, ranges and defaults of the configuration in words, for docs/reference/configuration.md."""
 
 import json
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""docs/configuration.md lists every key of a rig file as the code has it."""
+"""docs/reference/configuration.md lists every key of a rig file as the code has it."""
 
 import re
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from tests.repository.configuration_values import default_words, value_words
 
 def test_the_page_is_what_the_code_says():
     assert PAGE.read_text(encoding="utf-8") == page(), (
-        "docs/configuration.md is out of date: .venv/bin/python -m tests.repository.configuration_page"
+        "docs/reference/configuration.md is out of date: .venv/bin/python -m tests.repository.configuration_page"
     )
 
 

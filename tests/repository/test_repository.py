@@ -53,6 +53,7 @@ def test_a_line_that_works_everywhere_is_left_alone(line: str) -> None:
     [
         ("constraints.txt", [*PROJECT["project"]["dependencies"], *PROJECT["dependency-groups"]["build"]]),
         ("constraints-all.txt", [line for line in PROJECT["dependency-groups"]["dev"] if isinstance(line, str)]),
+        ("constraints-all.txt", PROJECT["dependency-groups"]["docs"]),
         ("constraints-all.txt", OPTIONAL),
     ],
 )

@@ -1,4 +1,4 @@
-"""The commands of docs/hosts.md work as they stand there, with both hosts on this one."""
+"""The commands of docs/how-to/mutual-tls.md work as they stand there, with both hosts on this one."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from tests.waiting import eventually
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "docs" / "hosts.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "mutual-tls.md").read_text("utf-8")
 
 
 @pytest.fixture

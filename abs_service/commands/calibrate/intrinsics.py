@@ -9,7 +9,7 @@ brown-conrady (five coefficients; the default), rational (eight) and fisheye (Ka
 calibration FILE its covariances are written, and a report as FILE.html and FILE.json.
 
 The exit code is 0 if the result can be trusted, 1 if it was found but must not be trusted yet, 2 if the images or
-options have to be changed first. What the verdicts mean: docs/calibration.md.
+options have to be changed first. What the verdicts mean: docs/how-to/calibration.md.
 """
 
 import argparse

@@ -16,7 +16,7 @@ moves.
 Beside the calibration FILE its covariances are written, and a report as FILE.html and FILE.json.
 
 The exit code is 0 if the result can be trusted, 1 if it was found but must not be trusted yet, 2 if the images or
-options have to be changed first. What the verdicts mean: docs/calibration.md.
+options have to be changed first. What the verdicts mean: docs/how-to/calibration.md.
 """
 
 import argparse

@@ -7,7 +7,7 @@
   abs-service import kinect.mkv --layout azure --out kinect.mcap
 
 Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
-process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 bag). See docs/devices.md.
+process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 bag). See docs/how-to/devices.md.
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images

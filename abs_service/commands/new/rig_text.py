@@ -119,13 +119,13 @@ priors = {{ stretch = 0.1 }} # soft things stretch; change of an edge's length r
 vertex_offsets = {{ random_walk = 1.6e-3 }} # what the surface cannot follow is learnt [m in a second]
 """,
     "strip": """\
-# Segments of constant curvature below a gripper; the free length is the one that is detected (docs/gravity.md).
+# Segments of constant curvature below a gripper; the free length is the detected one (docs/explanation/gravity.md).
 # `gravity` is downwards in the images of a level camera.
 model = {{ type = "gravity", segments = 8, gravity = [0.0, 1.0, 0.0] }}
 """,
     "rigid": """\
 # It does not bend: rotation and translation. Its mesh is made from the first depth image. With a file of its shape,
-# template = {{ type = "mesh", path = "thing.obj" }} knows its back, too (docs/templates.md).
+# template = {{ type = "mesh", path = "thing.obj" }} knows its back, too (docs/how-to/templates.md).
 model = {{ type = "rigid" }}
 """,
 }
@@ -163,7 +163,7 @@ _FILE = """\
 # Camera: {device.text}.
 # Behind the object: {behind}.
 #
-# Written by `abs-service new`. Every other key: docs/configuration.md.
+# Written by `abs-service new`. Every other key: docs/reference/configuration.md.
 #
 #   abs-service check {file}
 #   abs-service run {file}

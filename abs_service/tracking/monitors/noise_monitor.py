@@ -77,5 +77,5 @@ def _advice(sensor: str, variance: float) -> str:
     factor, change = np.sqrt(variance), "larger" if variance > 1 else "smaller"
     return (
         f"{sensor} errs {factor:.1f} times as much as its noise model says (variance of its residuals {variance:.1f} "
-        f"instead of 1): make the deviation in {key} {change}, or fit it (docs/noise.md)"
+        f"instead of 1): make the deviation in {key} {change}, or fit it (docs/explanation/noise.md)"
     )

@@ -69,7 +69,7 @@ def sections(
         "error: distance of every vertex from its own material; surface error: from the nearest point of the surface."
     ]
     if missing:
-        said.append(f"Cannot be imported here, so left out: {', '.join(missing)} (see docs/evaluation.md).")
+        said.append(f"Cannot be imported here, so left out: {', '.join(missing)} (see docs/reference/evaluation.md).")
     if slow:
         said.append(f"Tracked ten frames of one seed only, because they take so long: {', '.join(slow)}.")
     about = Section("What is compared", tuple(said))

@@ -63,7 +63,7 @@ DIRECTIONS = (0, 45, 90, 135)
 #: Nearer than this is the sheet, farther the wall [m].
 BETWEEN_M = 1.3
 
-#: Residual, in deviations, from which on the likelihood takes a measurement for an outlier (docs/noise.md).
+#: Residual, in deviations, from which on the likelihood takes a measurement for an outlier (docs/explanation/noise.md).
 BOUND = 4.2
 
 MODEL = flexpad.Settings(WIDTH, HEIGHT)

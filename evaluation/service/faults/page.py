@@ -1,4 +1,4 @@
-"""Writes the outcomes of faults into docs/reliability.md, from reports of the experiment `faults`.
+"""Writes the outcomes of faults into docs/reference/reliability.md, from reports of the experiment `faults`.
 
   python -m evaluation.service.faults.page results/faults/report.json …
 
@@ -15,7 +15,7 @@ from evaluation.service.faults.fault import Elsewhere, Fault
 from evaluation.service.faults.report import Row
 from evaluation.service.faults.table import FAULTS
 
-PAGE = Path(__file__).parents[3] / "docs" / "reliability.md"
+PAGE = Path(__file__).parents[3] / "docs" / "reference" / "reliability.md"
 BEGIN, END = "<!-- faults: written by `make faults` -->", "<!-- faults: end -->"
 HEAD = (
     "| fault | promise | tries | outcome | no estimate s | no recording s | in health s | to recover s |",

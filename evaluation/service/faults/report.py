@@ -1,4 +1,4 @@
-"""Outcomes of faults as rows of a table, in the report and in docs/reliability.md."""
+"""Outcomes of faults as rows of a table, in the report and in docs/reference/reliability.md."""
 
 import math
 from collections import Counter

@@ -12,7 +12,7 @@ import pytest
 import abs_service as a
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
 HEAVY = {"numpy", "numba", "cv2", "scipy", "pydantic", "mcap", "zenoh"}
 CALLS = [getattr(a, name) for name in a.__all__ if name != "noise"] + [
     getattr(a.noise, name) for name in a.noise.__all__

@@ -1,4 +1,4 @@
-"""Commands return the exit codes that docs/command-line.md lists."""
+"""Commands return the exit codes that docs/reference/command-line.md lists."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from abs_service import cli
 from abs_service.commands import check, reinitialize
 from abs_service.supervision.exit_codes import Exit
 
-PAGE = (Path(__file__).parents[3] / "docs" / "command-line.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
 
 
 def listed():

@@ -1,4 +1,4 @@
-"""The examples of docs/extending.md, installed beside the package, in a rig file that tracks the sample recording."""
+"""The examples of docs/how-to/extending.md, installed beside the package, in a rig that tracks the sample recording."""
 
 import json
 import os
@@ -12,7 +12,7 @@ import pytest
 from abs_service import config
 
 ROOT = Path(__file__).parents[3]
-PAGE = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "how-to" / "extending.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"```python\n# my_parts/(\w+)\.py\n(.*?)```", PAGE, re.DOTALL))
 SAMPLE = ROOT / "recordings" / "sample.mcap"
 

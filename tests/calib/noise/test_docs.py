@@ -1,4 +1,4 @@
-"""What docs/noise.md shows works: its tables are models, and its example runs."""
+"""What docs/explanation/noise.md shows works: its tables are models, and its example runs."""
 
 import re
 import tomllib
@@ -9,7 +9,7 @@ import pytest
 from abs_service.config import SensorTable, plugins
 from calib.noise import pixel_polynomial
 
-PAGE = (Path(__file__).parents[3] / "docs" / "noise.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "explanation" / "noise.md").read_text(encoding="utf-8")
 TABLES = {
     name: sensor
     for block in re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
@@ -47,7 +47,7 @@ def test_the_sensor_s_own_keys_are_those_of_a_rig_file():
 def test_the_example_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    exec(compile(code, "docs/noise.md", "exec"), {})
+    exec(compile(code, "docs/explanation/noise.md", "exec"), {})
     assert pixel_polynomial.Settings(tmp_path / "pixels.npz").build().shape == (24, 32)
     model, quality, likelihoods = capsys.readouterr().out.splitlines()
     assert model.startswith("TofAmplitude(sigma=(0.001")

@@ -84,7 +84,7 @@ def test_the_compiled_polynomial_takes_any_number_of_samples(n, nodes):
     np.testing.assert_allclose(got, 1 + 2 * a + 3 * x + 4 * x * a, atol=1e-12)
 
 
-#: What the texture may be off by, as documented in docs/noise.md: the log-density falls by 4.5 over three deviations.
+#: What the texture may be off by, as in docs/explanation/noise.md: the log-density falls by 4.5 over three deviations.
 TEXTURE_TOLERANCE = 0.01
 
 

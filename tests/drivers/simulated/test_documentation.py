@@ -1,4 +1,4 @@
-"""docs/simulation.md documents all keys of the addresses."""
+"""docs/reference/simulation.md documents all keys of the addresses."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ from drivers.simulated.address import KEYS, Address
 from drivers.simulated.scene.scenes import SCENES
 from drivers.simulated.sensors.optics import BEAMS, OPTICS
 
-PAGE = (Path(__file__).parents[3] / "docs" / "simulation.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "simulation.md").read_text(encoding="utf-8")
 TABLES = {
     title: set(re.findall(r"^\| `(\w+)` \|", text, re.M))
     for title, text in re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", PAGE, re.M | re.S)

@@ -6,7 +6,7 @@ import pytest
 from abs_service.pairing.images import BAYER_ORDERS
 from evaluation.inputs.bayer import CODES, VARIANTS, MosaicSequence, compare, select_sigmas
 
-#: What the rule of the experiment chooses for every order and variant; see docs/colour.md.
+#: What the rule of the experiment chooses for every order and variant; see docs/explanation/colour.md.
 SIGMA = 80.0
 
 

@@ -1,4 +1,4 @@
-"""The experiments `faults` and `soak`: what they make of what was seen, and the table of docs/reliability.md."""
+"""The experiments `faults` and `soak`: what they make of what was seen, and the table in docs/reference."""
 
 import json
 import math
@@ -27,7 +27,7 @@ def test_the_page_has_a_row_for_each_fault():
     lines = page.PAGE.read_text(encoding="utf-8").partition(page.BEGIN)[2].partition(page.END)[0].splitlines()
     assert [page.name(line) for line in lines if page.name(line) not in {"", "fault"}] == [
         one.name for one in FAULTS
-    ], "docs/reliability.md lacks a fault: make faults"
+    ], "docs/reference/reliability.md lacks a fault: make faults"
 
 
 def test_names_are_unique_and_tests_exist():

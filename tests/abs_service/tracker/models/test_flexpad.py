@@ -216,7 +216,7 @@ def test_half_a_size_is_refused(sizes):
     ],
 )
 def test_bends_of_several_directions_change_lengths_as_documented(sides, documented):
-    """Largest change of an edge in docs/models.md; sums of isometric bends are isometric only to first order."""
+    """Largest change of an edge in docs/explanation/models.md; sums of isometric bends are so only to first order."""
     assert 0.8 * documented < np.abs(stretches(bend(**sides))).max() < documented
 
 

@@ -65,7 +65,9 @@ def test_a_wrong_model_is_named_with_its_factor_and_what_to_do(sensor, variance,
     said = MonitorBench().see_sensors({"tof": 1.0, "color": 1.0, sensor: variance})
     assert said.level == WARNING
     assert said.message.startswith(f"{sensor} errs {factor} times as much as its noise model says")
-    assert said.message.endswith(f"make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/noise.md)")
+    assert said.message.endswith(
+        f"make the deviation in sensors.{sensor}.noise {change}, or fit it (docs/explanation/noise.md)"
+    )
 
 
 def test_the_texture_of_a_depth_sensor_has_a_key_of_its_own():

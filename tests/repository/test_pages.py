@@ -1,0 +1,56 @@
+"""The pages of docs/: those that code and messages name exist, and troubleshooting has what a tracker says."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import yaml
+
+from abs_service.tracker import status
+from abs_service.tracker.shape_quality import ShapeQuality
+from abs_service.tracker.terms.base import RimFit, SensorFit
+
+ROOT = Path(__file__).parents[2]
+TROUBLESHOOTING = (ROOT / "docs" / "how-to" / "troubleshooting.md").read_text(encoding="utf-8")
+
+
+def test_every_page_that_a_file_names_exists():
+    """Comments and messages name pages by their path; links are checked by `make docs`."""
+    named = {
+        (path, page)
+        for path in _tracked("*.py", "*.toml", "*.md", "Makefile", "docker/*")
+        for page in re.findall(r"docs/[\w/-]+\.(?:md|png|svg)", (ROOT / path).read_text(encoding="utf-8"))
+    }
+    assert len(named) > 20
+    assert [f"{path}: {page}" for path, page in sorted(named) if not (ROOT / page).exists()] == []
+
+
+def test_every_page_of_the_four_parts_is_in_the_navigation():
+    text = re.sub(r"!!python\S*", "", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    parts = [part for part in yaml.safe_load(text)["nav"] if isinstance(part, dict)]
+    listed = {page for part in parts for pages in part.values() for page in pages if isinstance(page, str)}
+    written = {
+        path.relative_to(ROOT / "docs").as_posix()
+        for folder in ("tutorial", "how-to", "explanation", "reference")
+        for path in (ROOT / "docs" / folder).glob("*.md")
+    }
+    assert written <= listed
+
+
+def test_troubleshooting_has_every_reason_of_a_status():
+    nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10))
+    bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, unheld_m=1.0)
+    _, reasons = status.judge([nothing_right], ["color"], bad, 9.9, status.Settings())
+    assert len(reasons) == 7
+    page = _without_numbers(TROUBLESHOOTING)
+    assert [reason for reason in reasons if _without_numbers(reason.partition(" so far")[0]) not in page] == []
+
+
+def _without_numbers(text: str) -> str:
+    return re.sub(r"\d+", "#", " ".join(text.split()))
+
+
+def _tracked(*patterns: str) -> list[str]:
+    return subprocess.run(
+        ["git", "ls-files", *patterns], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split()
