@@ -37,6 +37,11 @@ def test_every_page_of_the_four_parts_is_in_the_navigation():
     assert written <= listed
 
 
+def test_every_decision_has_a_number_of_its_own():
+    pages = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("[0-9]*.md"))
+    assert [name[:4] for name in pages] == [f"{number:04}" for number in range(len(pages))]
+
+
 def test_troubleshooting_has_every_reason_of_a_status():
     nothing_right = SensorFit("tof", 100, 300, 100, 10, -1.0, 1.0, RimFit(20, 10, 10))
     bad = ShapeQuality(folded_share=0.5, deviation_m=1.0, unheld_m=1.0)
