@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
@@ -25,6 +26,7 @@ TIMELINE = "time"
 
 JPEG_QUALITY = 90
 
+_COLORS = {State.Status.Name(status).removeprefix("STATUS_"): color for status, color in COLORS.items()}
 _LEVELS = {"DEGRADED": "WARN", "LOST": "ERROR"}
 
 
@@ -93,6 +95,8 @@ class RerunFile:
         self._stream.save(path)
         self._view_hz = view_hz
         self._rates: dict[str, ViewRate] = {}
+        self._images: set[str] = set()
+        self._plots: set[str] = set()
         self._stream.log("/", rr.ViewCoordinates.RDF, static=True)
 
     def add_camera(self, sensor: str, camera: Camera) -> None:
@@ -112,6 +116,7 @@ class RerunFile:
     def add_frame(self, frame: Frame, camera: Camera | None) -> None:
         """Adds an image, and points if it is one of depth."""
         name = f"/images/{frame.sensor}/{frame.stream}"
+        self._images.add(name)
         self._stream.set_time(TIMELINE, duration=frame.t_host_ns * 1e-9)
         if frame.kind == Kind.DEPTH:
             self._add_depth(name, frame, camera)
@@ -125,7 +130,7 @@ class RerunFile:
         self._stream.set_time(TIMELINE, duration=estimate.time_s)
         status = estimate.status.value
         if len(estimate.faces):
-            color = np.array(COLORS[State.Status.Value(f"STATUS_{status}")])
+            color = _COLORS[status]
             mesh = rr.Mesh3D(
                 vertex_positions=estimate.vertices, triangle_indices=estimate.faces, albedo_factor=[*color, 1.0]
             )
@@ -137,9 +142,16 @@ class RerunFile:
         numbers = {"deviation_m": table.deviation_m(estimate), "inlier_share": estimate.inlier_share}
         for name, value in numbers.items():
             self._stream.log(f"/{tracker}/{name}", rr.Scalars(value))
+            self._plots.add(f"/{tracker}/{name}")
 
     def finish(self) -> None:
-        """Writes what is left."""
+        """Writes how it is shown, and what is left."""
+        space = rrb.Spatial3DView(origin="/", contents=["+ /**", "- /images/**"], name="rig")
+        images = [rrb.Spatial2DView(origin=name, name=name.removeprefix("/images/")) for name in sorted(self._images)]
+        plots = [rrb.TimeSeriesView(origin=name, name=name[1:]) for name in sorted(self._plots)]
+        columns = [rrb.Vertical(space, rrb.TextLogView(origin="/"), row_shares=[3, 1])]
+        columns += [rrb.Vertical(*views) for views in (images, plots) if views]
+        self._stream.send_blueprint(rrb.Blueprint(rrb.Horizontal(*columns)))
         self._stream.disconnect()
 
     def _add_depth(self, name: str, frame: Frame, camera: Camera | None) -> None:

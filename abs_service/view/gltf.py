@@ -2,7 +2,6 @@
 
 import json
 import struct
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,7 @@ class Buffer:
         self._data += array.astype(array.dtype.newbyteorder("<")).tobytes()
         return len(self._accessors) - 1
 
-    def file(self, document: Mapping[str, Any]) -> bytes:
+    def file(self, document: dict[str, Any]) -> bytes:
         """The file with what it says of nodes, meshes and animations."""
         described = {
             "asset": {"version": "2.0"},

@@ -32,6 +32,7 @@ def export(recording, out):
 def read(path):
     """Values of each component of each entity, by time [ns]; of what does not change by None."""
     found = defaultdict(dict)
+    assert len(chunk.RrdReader(path).blueprints()) == 1
     for part in chunk.RrdReader(path).stream():
         batch = part.to_record_batch()
         assert part.timeline_names == ([] if part.is_static else ["time"])
