@@ -74,7 +74,7 @@ def _moments(
         while following is not None and following.t_host_ns * 1e-9 <= one.time_s + LATER_S:
             newest[following.key] = following
             following = next(frames, None)
-        if len(newest) == streams:
+        if len(newest) == streams > 0:
             yield one, [newest[key] for key in sorted(newest)]
 
 

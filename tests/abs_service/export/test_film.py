@@ -7,7 +7,7 @@ from abs_service import cli
 from abs_service.supervision.exit_codes import Exit
 from abs_service.view.pictures import picture, with_mesh
 from tests.abs_service.commands.estimated_recording import FACES, SIMULATION, version, vertices, write_estimated
-from tests.abs_service.export.without_images import write_without_images
+from tests.abs_service.export.incomplete_recording import write_without
 
 av = pytest.importorskip("av")
 
@@ -54,8 +54,11 @@ def test_a_film_has_a_picture_for_each_estimate(tmp_path):
     assert sum(gain < 0.9 for gain in gains) >= 2  # of the meshes in sight
 
 
-def test_estimates_without_images_are_no_film(tmp_path, capsys):
-    recording = write_without_images(tmp_path)
+@pytest.mark.parametrize(
+    ("part", "complaint"), [("image", "there are no images in this file"), ("model", "has images of its moment")]
+)
+def test_estimates_without_images_or_cameras_are_no_film(tmp_path, capsys, part, complaint):
+    recording = write_without(tmp_path, part)
     assert cli.main(["export", str(recording), "--out", str(tmp_path / "x.mp4")]) == Exit.USER
-    assert "there are no images in this file" in capsys.readouterr().err
+    assert complaint in capsys.readouterr().err
     assert not [one for one in tmp_path.iterdir() if one.name.startswith("x.mp4")]

@@ -17,7 +17,7 @@ from tests.abs_service.commands.estimated_recording import (
     vertices,
     write_estimated,
 )
-from tests.abs_service.export.without_images import write_without_images
+from tests.abs_service.export.incomplete_recording import write_without
 
 chunk = pytest.importorskip("rerun.chunk")
 
@@ -88,6 +88,6 @@ def camera_place(head):
 
 
 def test_estimates_alone_have_no_images(tmp_path):
-    found = export(write_without_images(tmp_path), tmp_path / "x.rrd")
+    found = export(write_without(tmp_path, "image"), tmp_path / "x.rrd")
     assert sorted(found["/sheet/mesh", "vertex_positions"]) == TIMES[1:]
     assert not [entity for entity, _ in found if entity.startswith("/images")]
