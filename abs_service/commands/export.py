@@ -1,9 +1,12 @@
 """Writes a recording in the format of another program, chosen by the suffix of --out.
 
-  abs-service export recordings/x.mcap                         x_view.mcap, for Foxglove, Lichtblick and Rerun
-  abs-service export recordings/x.mcap --out x.csv             Θ, σ and status, one row for each estimate
+  abs-service export recordings/x.mcap                         x_view.mcap, for Foxglove and Lichtblick
+  abs-service export recordings/x.mcap --out x.rrd             the same for Rerun
+  abs-service export recordings/x.mcap --out x.csv             Θ, σ and status, one row for each estimate; or .parquet
   abs-service export recordings/x.mcap --out x.npz             times, Θ, vertices, covariances, faces for NumPy
   abs-service export recordings/x.mcap --out meshes/sheet.ply  one mesh for each estimate, or .obj
+  abs-service export recordings/x.mcap --out x.glb             the mesh as an animation
+  abs-service export recordings/x.mcap --out x.mp4             the images as a film, with the mesh drawn over them
 
 A copy for viewers has depth in metres along the optical axis, meshes as foxglove.SceneUpdate and points as
 foxglove.PointCloud; images of every codec become raw ones. To track again, `replay` the recording itself.
@@ -13,13 +16,14 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 
 from abs_service.api.errors import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
 from abs_service.commands.parts.progress import bars
-from abs_service.export import arrays, series, table, viewers
+from abs_service.export import animation, arrays, series, table, viewers
 from abs_service.export.errors import ExportError
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire.estimate_messages import STATE
@@ -28,12 +32,18 @@ from drivers.replay.contents import scan
 #: Rate of the meshes and points for viewers [Hz].
 VIEW_HZ = 5.0
 
-_WRITERS: Mapping[str, Callable[[Iterable[Estimate], Path], int]] = {
+_Writer = Callable[[Iterable[Estimate], Path], int]
+
+_WRITERS: Mapping[str, _Writer] = {
     ".csv": table.write,
     ".npz": arrays.write,
+    ".glb": animation.write,
     ".obj": series.write,
     ".ply": series.write,
 }
+#: Formats that need another package: it, and the extra that has it.
+_EXTRAS = {".parquet": ("pyarrow", "parquet"), ".mp4": ("av", "import"), ".rrd": ("rerun", "rerun")}
+
 #: Formats of several files, whose folder is the output.
 _SERIES = (".obj", ".ply")
 
@@ -56,8 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Exports one recording."""
     source: Path = arguments.recording
     path: Path = arguments.out or source.with_name(f"{source.stem}_view.mcap")
-    if path.suffix not in (".mcap", *_WRITERS):
-        raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join(_WRITERS)}")
+    if path.suffix not in (".mcap", *_WRITERS, *_EXTRAS):
+        raise ExportError(f"--out {path}: its suffix must be one of .mcap, {', '.join([*_WRITERS, *_EXTRAS])}")
+    package, extra = _EXTRAS.get(path.suffix, ("", ""))
+    if package and find_spec(package) is None:
+        raise ExportError(f"--out {path} needs {package}: pip install 'abs-service[{extra}]'")
     if not 0 <= arguments.view_hz <= 1000:
         raise ExportError(f"--view-hz {arguments.view_hz:g}: must be 0 to 1000")
     if path.exists():
@@ -70,6 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         try:
             if path.suffix == ".mcap":
                 done = _write_view(source, arguments.view_hz, active)
+            elif path.suffix == ".rrd":
+                done = _write_rerun(source, arguments.tracker, arguments.view_hz, active)
             else:
                 done = _write_estimates(source, arguments.tracker, path.suffix, active)
             os.replace(active, path)
@@ -92,19 +107,59 @@ def _write_view(source: Path, view_hz: float, path: Path) -> str:
     return f"{written} messages"
 
 
+def _write_rerun(source: Path, tracker: str, view_hz: float, path: Path) -> str:
+    from abs_service.export import rerun_file  # noqa: PLC0415 - needs rerun-sdk
+
+    recording = _recording(source)
+    names = (tracker,) if tracker else recording.trackers
+    estimates = {name: _estimates(recording, name) for name in names}
+    with bars() as progress:
+        task = progress.add_task("images and estimates", total=None)
+        written, notes = rerun_file.write(recording, estimates, path, view_hz, lambda: progress.advance(task))
+    for note in notes:
+        print(f"abs-service: note: {note}", file=sys.stderr)
+    return f"{written} images and estimates"
+
+
 def _write_estimates(source: Path, tracker: str, suffix: str, path: Path) -> str:
+    recording = _recording(source)
+    estimates = _estimates(recording, tracker)
+    name = tracker or recording.trackers[0]
+    counts = {topic.name.split("/")[1]: topic.count for topic in scan(source).topics.values() if topic.schema == STATE}
+    with bars() as progress:
+        tracked = progress.track(estimates, counts[name], description="estimates")
+        written = _writer(suffix, recording)(tracked, path)
+    return (
+        f"{written} estimates of {name}"
+        if written == counts[name]
+        else f"{written} of {counts[name]} estimates of {name}"
+    )
+
+
+def _writer(suffix: str, recording: Recording) -> _Writer:
+    if suffix == ".parquet":
+        from abs_service.export import parquet  # noqa: PLC0415 - needs pyarrow
+
+        return parquet.write
+    if suffix == ".mp4":
+        from abs_service.export import film  # noqa: PLC0415 - needs PyAV
+
+        return lambda estimates, path: film.write(estimates, recording, path)
+    return _WRITERS[suffix]
+
+
+def _recording(source: Path) -> Recording:
     recording = Recording(source)
     if recording.truncated:
         print(
             f"abs-service: note: {source} was never finished; what follows is up to where it breaks off",
             file=sys.stderr,
         )
+    return recording
+
+
+def _estimates(recording: Recording, tracker: str) -> Iterable[Estimate]:
     try:
-        estimates = recording.estimates(tracker)
+        return recording.estimates(tracker)
     except ArgumentError as error:
         raise ExportError(f"{error}; `abs-service replay` makes estimates") from None
-    name = tracker or recording.trackers[0]
-    counts = {topic.name.split("/")[1]: topic.count for topic in scan(source).topics.values() if topic.schema == STATE}
-    with bars() as progress:
-        written = _WRITERS[suffix](progress.track(estimates, counts[name], description="estimates"), path)
-    return f"{written} estimates of {name}"

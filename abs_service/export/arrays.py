@@ -1,6 +1,6 @@
 """Estimates as arrays."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ def write(estimates: Iterable[Estimate], path: Path) -> int:
         OSError: the file cannot be written.
     """
     kept = list(estimates)
-    mesh = _meshes(kept)
+    mesh = mesh_numbers(kept)
     parts: dict[str, Any] = {f"faces_{m}": kept[mesh.index(m)].faces for m in set(mesh) - {-1}}
     parts |= {f"undeformed_{m}": kept[mesh.index(m)].undeformed for m in set(mesh) - {-1}}
     with path.open("wb") as stream:
@@ -40,7 +40,7 @@ def write(estimates: Iterable[Estimate], path: Path) -> int:
     return len(kept)
 
 
-def _meshes(kept: list[Estimate]) -> list[int]:
+def mesh_numbers(kept: Sequence[Estimate]) -> list[int]:
     """Number of each estimate's mesh, counted from 0; a tracker that starts again counts its versions anew."""
     found, last = [], -1
     before: Estimate | None = None

@@ -7,6 +7,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import cli
+from abs_service.commands import export
 from abs_service.supervision.exit_codes import Exit
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec
@@ -167,7 +168,7 @@ def test_a_missing_file_is_named(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--out", "x.usd"], "--out x.usd: its suffix must be one of .mcap, .csv, .npz, .obj, .ply"),
+        (["--out", "x.usd"], "--out x.usd: its suffix must be one of .mcap, .csv, .npz, .glb, .obj, .ply, .parquet"),
         (["--view-hz", "-1"], "--view-hz -1: must be 0 to 1000"),
         (["--view-hz", "nan"], "--view-hz nan: must be 0 to 1000"),
     ],
@@ -175,3 +176,11 @@ def test_a_missing_file_is_named(tmp_path, capsys):
 def test_options_say_what_is_allowed(recording, capsys, arguments, complaint):
     assert cli.main(["export", str(recording), *arguments]) == Exit.USER
     assert complaint in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("name", "extra"), [("x.parquet", "parquet"), ("x.mp4", "import"), ("x.rrd", "rerun")])
+def test_a_package_that_is_missing_is_named_with_its_extra(recording, tmp_path, capsys, monkeypatch, name, extra):
+    monkeypatch.setattr(export, "find_spec", lambda name: None)
+    assert cli.main(["export", str(recording), "--out", str(tmp_path / name)]) == Exit.USER
+    assert f"pip install 'abs-service[{extra}]'" in capsys.readouterr().err
+    assert not (tmp_path / name).exists()

@@ -61,6 +61,22 @@ def test_arrays_have_what_was_recorded(recording, tmp_path):
         assert np.isnan(found["covariance"][4]).all()  # LOST
 
 
+def test_a_parquet_file_has_the_columns_of_the_table(recording, tmp_path):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    found = parquet.read_table(export(recording, tmp_path / "x.parquet"))
+    with export(recording, tmp_path / "x.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert found.column_names == list(rows[0])
+    assert {name: str(found.schema.field(name).type) for name in ("time_s", "status", "evaluations", "theta_0")} == {
+        "time_s": "double",
+        "status": "string",
+        "evaluations": "int64",
+        "theta_0": "double",
+    }
+    for row, expected in zip(found.to_pylist(), rows, strict=True):
+        assert ["" if value is None else str(value) for value in row.values()] == list(expected.values())
+
+
 @pytest.mark.parametrize("suffix", ["obj", "ply"])
 def test_a_series_has_a_mesh_for_each_estimate_that_has_one(recording, tmp_path, suffix):
     trimesh = pytest.importorskip("trimesh")

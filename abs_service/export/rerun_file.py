@@ -1,0 +1,170 @@
+"""A recording for the viewer Rerun: mesh, points, images, cameras and plots on one timeline; needs rerun-sdk."""
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from abs_service.api.estimate import Estimate
+from abs_service.api.recording import Recording
+from abs_service.export import table
+from abs_service.pairing.observation import ObservationError
+from abs_service.pairing.points import z_image
+from abs_service.view.pictures import cloud, picture, radial
+from abs_service.wire.estimate_messages import State
+from abs_service.wire.viewer_messages import COLORS, ViewRate
+from calib.camera import Camera
+from calib.lenses.lens import LensError
+from calib.pose import to_quaternion
+from drivers.contract.frame import Frame, Kind
+from drivers.replay import RecordingError
+
+#: The timeline: seconds on the clock of the images.
+TIMELINE = "time"
+
+JPEG_QUALITY = 90
+
+_COLORS = {State.Status.Name(status).removeprefix("STATUS_"): color for status, color in COLORS.items()}
+_LEVELS = {"DEGRADED": "WARN", "LOST": "ERROR"}
+
+
+def write(
+    recording: Recording,
+    estimates: Mapping[str, Iterable[Estimate]],
+    path: Path,
+    view_hz: float,
+    advance: Callable[[], None],
+) -> tuple[int, tuple[str, ...]]:
+    """Writes an RRD file; see `RerunFile`.
+
+    Args:
+        recording: its images and cameras, if there are any.
+        estimates: by tracker.
+        path: of the file.
+        view_hz: largest rate of the points of a sensor [Hz]; 0 for none.
+        advance: called for each image and estimate.
+
+    Returns:
+        Number of images and estimates, and what could not be converted.
+
+    Raises:
+        RecordingError: a part of the recording is damaged.
+    """
+    file = RerunFile(path, view_hz)
+    written = 0
+    try:
+        cameras, frames = recording.cameras, recording.frames()
+    except RecordingError:  # there are no images, as in what `abs-service replay` writes
+        cameras, frames = {}, ()
+    for sensor, camera in cameras.items():
+        file.add_camera(sensor, camera)
+    for frame in frames:
+        file.add_frame(frame.at_middle(), cameras.get(frame.sensor))
+        written += 1
+        advance()
+    for tracker, found in estimates.items():
+        for estimate in found:
+            file.add_estimate(tracker, estimate)
+            written += 1
+            advance()
+    file.finish()
+    return written, tuple(file.notes.values())
+
+
+class RerunFile:
+    """Writes `/cameras/SENSOR`, `/images/SENSOR/STREAM`, `/points/SENSOR`, `/TRACKER/mesh`, and plots.
+
+    Poses and points are in the frame of the rig [m]. Depth images are metres along the optical axis, 0 without return;
+    colour is JPEG; other images have the sensor's values.
+
+    Args:
+        path: of the file.
+        view_hz: largest rate of the points of a sensor [Hz]; 0 for none.
+
+    Attributes:
+        notes: depth images that are pictures only, and why.
+    """
+
+    def __init__(self, path: Path, view_hz: float) -> None:
+        self.notes: dict[str, str] = {}
+        self._stream = rr.RecordingStream("abs-service")
+        self._stream.set_log_time_enabled(False)
+        self._stream.set_log_tick_enabled(False)
+        self._stream.save(path)
+        self._view_hz = view_hz
+        self._rates: dict[str, ViewRate] = {}
+        self._images: set[str] = set()
+        self._plots: set[str] = set()
+        self._stream.log("/", rr.ViewCoordinates.RDF, static=True)
+
+    def add_camera(self, sensor: str, camera: Camera) -> None:
+        """Adds pose and field of view of a camera, without its distortion."""
+        name = f"/cameras/{sensor}"
+        turn = rr.Quaternion(xyzw=to_quaternion(camera.T_rs))
+        self._stream.log(name, rr.Transform3D(translation=camera.T_rs[:3, 3], quaternion=turn), static=True)
+        matrix = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
+        shape = rr.Pinhole(
+            image_from_camera=matrix,
+            resolution=(camera.width, camera.height),
+            camera_xyz=rr.ViewCoordinates.RDF,
+            image_plane_distance=0.1,
+        )
+        self._stream.log(name, shape, static=True)
+
+    def add_frame(self, frame: Frame, camera: Camera | None) -> None:
+        """Adds an image, and points if it is one of depth."""
+        name = f"/images/{frame.sensor}/{frame.stream}"
+        self._images.add(name)
+        self._stream.set_time(TIMELINE, duration=frame.t_host_ns * 1e-9)
+        if frame.kind == Kind.DEPTH:
+            self._add_depth(name, frame, camera)
+        elif frame.kind in (Kind.COLOR, Kind.BAYER):
+            self._stream.log(name, rr.Image(picture(frame)).compress(jpeg_quality=JPEG_QUALITY))
+        else:
+            self._stream.log(name, rr.Image(frame.data, color_model="L"))
+
+    def add_estimate(self, tracker: str, estimate: Estimate) -> None:
+        """Adds mesh, status and numbers of an estimate."""
+        self._stream.set_time(TIMELINE, duration=estimate.time_s)
+        status = estimate.status.value
+        if len(estimate.faces):
+            color = _COLORS[status]
+            mesh = rr.Mesh3D(
+                vertex_positions=estimate.vertices, triangle_indices=estimate.faces, albedo_factor=[*color, 1.0]
+            )
+            self._stream.log(f"/{tracker}/mesh", mesh)
+        else:
+            self._stream.log(f"/{tracker}/mesh", rr.Clear(recursive=False))
+        text = f"{status}: {'; '.join(estimate.reasons)}" if estimate.reasons else status
+        self._stream.log(f"/{tracker}/status", rr.TextLog(text, level=_LEVELS.get(status, "INFO")))
+        numbers = {"deviation_m": table.deviation_m(estimate), "inlier_share": estimate.inlier_share}
+        for name, value in numbers.items():
+            self._stream.log(f"/{tracker}/{name}", rr.Scalars(value))
+            self._plots.add(f"/{tracker}/{name}")
+
+    def finish(self) -> None:
+        """Writes how it is shown, and what is left."""
+        space = rrb.Spatial3DView(origin="/", contents=["+ /**", "- /images/**"], name="rig")
+        images = [rrb.Spatial2DView(origin=name, name=name.removeprefix("/images/")) for name in sorted(self._images)]
+        plots = [rrb.TimeSeriesView(origin=name, name=name[1:]) for name in sorted(self._plots)]
+        columns = [rrb.Vertical(space, rrb.TextLogView(origin="/"), row_shares=[3, 1])]
+        columns += [rrb.Vertical(*views) for views in (images, plots) if views]
+        self._stream.send_blueprint(rrb.Blueprint(rrb.Horizontal(*columns)))
+        self._stream.disconnect()
+
+    def _add_depth(self, name: str, frame: Frame, camera: Camera | None) -> None:
+        try:
+            if camera is None:
+                raise ObservationError("no camera is recorded")
+            z = z_image(frame, camera)
+            rate = self._rates.setdefault(frame.sensor, ViewRate(self._view_hz))
+            points = cloud(radial(frame, camera), camera)[0] if rate.due(frame.t_host_ns) else None
+        except (ObservationError, LensError) as error:
+            self.notes[name] = f"{name} is a picture without metres, and without points: {error}"
+            self._stream.log(name, rr.Image(picture(frame)).compress(jpeg_quality=JPEG_QUALITY))
+            return
+        self._stream.log(name, rr.DepthImage(np.nan_to_num(z), meter=1.0))
+        if points is not None:
+            self._stream.log(f"/points/{frame.sensor}", rr.Points3D(points))
