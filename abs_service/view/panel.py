@@ -25,9 +25,16 @@ class Panel:
         server: that serves it.
         view_only: True leaves out everything that acts on the rig.
         reinitialize: called with the tracker that is to detect its object anew.
+        choose: called when the next click in the scene chooses the object of the tracker.
     """
 
-    def __init__(self, server: viser.ViserServer, view_only: bool, reinitialize: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        view_only: bool,
+        reinitialize: Callable[[str], None],
+        choose: Callable[[], None],
+    ) -> None:
         gui = self._gui = server.gui
         gui.configure_theme(
             control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
@@ -44,6 +51,8 @@ class Panel:
             if not view_only:
                 button = gui.add_button("Reinitialise", hint="Detect the object again, with a new mesh")
                 button.on_click(lambda _: reinitialize(self.tracker))
+                button = gui.add_button("Choose the object", hint="Detect the object that you click next")
+                button.on_click(lambda _: choose())
             self._answer = gui.add_markdown("", visible=False)
             self._table = gui.add_html("")
         self._image_tab = tabs.add_tab("Images")
