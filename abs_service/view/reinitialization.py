@@ -59,7 +59,9 @@ class Reinitialization:
         if asked is None:
             return
         if (now := self._version(asked.tracker)) != asked.version:
-            keep = f"\n\nTo keep this choice, write into the rig file:\n```toml\n{asked.region}```"
+            keep = (
+                f"\n\nTo keep this choice, write into the rig file, in place of its region:\n```toml\n{asked.region}```"
+            )
             self._say(f"New mesh, version {now}.{keep if asked.region else ''}")
         elif self._feed.now_s - asked.t_s > ANSWER_S:
             self._say("No object was found; the tracker goes on as it was.")

@@ -41,9 +41,9 @@ def test_a_chosen_pixel_is_sent_and_the_lines_that_keep_it_are_offered():
     assert bench.said == ["Asks the tracker to detect its object again at pixel [111, 133] …"]
     bench.publish(2)
     bench.page.look()
-    assert (
-        bench.said[-1] == f"New mesh, version 2.\n\nTo keep this choice, write into the rig file:\n```toml\n{REGION}```"
-    )
+    mesh, offer = bench.said[-1].split("\n\n", 1)
+    assert mesh == "New mesh, version 2."
+    assert offer == f"To keep this choice, write into the rig file, in place of its region:\n```toml\n{REGION}```"
     bench.page.look()
     assert len(bench.said) == 2
 
