@@ -106,11 +106,14 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     assert f'type = "seed"\npixel = [{column}, {row}]\n' in told.stdout
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh from the command line")
 
+    assert not page.get_by_text("lost its connection").first.is_visible()
     server.send_signal(signal.SIGTERM)
     assert server.wait(20) == 0
+    _says(page, "This page has lost its connection")
     said = len(listener.health("view"))
     launch("view", rig_file, "--port", port)
     wait_until(lambda: len(listener.health("view")) > said, 30, "health of the second page")
+    page.get_by_text("lost its connection").first.wait_for(state="hidden", timeout=60_000)
     _says(page, "Tracking", 60)
 
     rig.send_signal(signal.SIGTERM)
