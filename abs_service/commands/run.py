@@ -58,12 +58,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rig", metavar="NAME", help="name on the wire instead of the configuration's")
     parser.add_argument("--seed", metavar="N", type=int, help="seed of all simulated devices")
     parser.add_argument("--view", action="store_true", help="serve a page that shows the rig, as `abs-service view`")
+    parser.add_argument("--view-port", metavar="N", type=int, help=f"--view at this port (default: {view.PORT})")
+    parser.add_argument("--view-only", action="store_true", help="--view without anything that acts on the rig")
     parser.add_argument("--json", action="store_true", help="print one JSON object per estimate instead of a table")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Runs a rig until SIGTERM or SIGINT, the end of its devices, or a failure."""
-    if arguments.view:
+    page = page_options(arguments)
+    if page is not None:
         view.check()
     rig = effective(rig_process.load_config(arguments), arguments)
     if rig.record.enabled:
@@ -77,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         closing(starting(display, arguments)) as starts,
         metrics.served(rig.run.metrics_port) as measure,
     ):
-        supervisor = Supervisor(children(rig, path, arguments.view), starts, time.monotonic_ns, limits(rig))
+        supervisor = Supervisor(children(rig, path, page), starts, time.monotonic_ns, limits(rig))
         about = (rig.name, rig.bus.endpoint, rig.record.directory)
         notifier = systemd.notifier(os.environ)
         watchers = (notifier.update, measure)
@@ -119,6 +122,14 @@ def effective(rig: config.ServiceConfig, arguments: argparse.Namespace) -> confi
     return rig.model_copy(update=changes)
 
 
+def page_options(arguments: argparse.Namespace) -> list[str] | None:
+    """Options of `abs-service view` for the page of `run`; None if it serves none."""
+    port, only = arguments.view_port, arguments.view_only
+    if not (arguments.view or only or port is not None):
+        return None
+    return [*(["--port", str(port)] if port is not None else []), *(["--view-only"] if only else [])]
+
+
 def with_seed(uri: str, seed: int) -> str:
     """The address of a simulated device with another seed; any other address as it is."""
     parts = urlsplit(uri)
@@ -128,12 +139,18 @@ def with_seed(uri: str, seed: int) -> str:
     return urlunsplit(parts._replace(query=urlencode(query, safe=",")))
 
 
-def children(rig: config.ServiceConfig, path: Path, with_page: bool = False) -> list[Child]:
-    """The processes of a rig whose effective configuration is in the file `path`; the recorder is to stop last."""
+def children(rig: config.ServiceConfig, path: Path, page: Sequence[str] | None = None) -> list[Child]:
+    """The processes of a rig; the recorder is to stop last.
+
+    Args:
+        rig: the effective configuration.
+        path: the file that it is in.
+        page: options of `abs-service view`; None: without it.
+    """
     trackers = [Child(f"track/{name}", ("track", str(path), name), 1) for name in rig.trackers]
     recorder = [Child("record", ("record", str(path)), 2)] if rig.record.enabled else []
-    page = [Child("view", ("view", str(path)), 0)] if with_page else []
-    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder, *page]
+    pages = [] if page is None else [Child("view", ("view", str(path), *page), 0)]
+    return [Child("capture", ("capture", str(path)), 0), *trackers, *recorder, *pages]
 
 
 @contextmanager

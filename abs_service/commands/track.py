@@ -10,6 +10,7 @@ import argparse
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 from queue import SimpleQueue
 
 from absmsg.v1.sensor_model_pb2 import SensorModel
@@ -21,7 +22,7 @@ from abs_service.bus.contract import Bus
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands.parts import rig_process
+from abs_service.commands.parts import chosen_region, rig_process
 from abs_service.supervision import gc_tuning
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.estimate_publisher import EstimatePublisher
@@ -73,7 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         gc_tuning.freeze_loaded_objects()
         tracking = TrackingSession(rig, plan)
-        commands.answer_reinitialize(bus, name, headers, health, tracking.reinitialize)
+        act = partial(chosen_region.reinitialize, tracking, rig, plan, name)
+        commands.answer_reinitialize(bus, name, headers, health, act)
         clocks, measuring = _clocks(bus, headers, stop)
         live = _live(bus, settings, name, rig, tracking, headers, health, clocks)
         while not stop.is_set():

@@ -11,6 +11,8 @@ import argparse
 import time
 from importlib.util import find_spec
 
+from absmsg.v1.command_pb2 import CommandAnswer
+
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import rig_process
@@ -56,14 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "viewer", "operator") as bus:
         health = Health(bus, "view", headers)
 
-        def reinitialize(tracker: str) -> str:
-            answer = commands.reinitialize(bus, tracker, headers, ANSWER_S)
-            if answer is None:
-                return "it gives no answer"
-            return "" if answer.accepted else answer.reason
+        def send(tracker: str, seed: commands.Pixel | None) -> CommandAnswer | None:
+            return commands.reinitialize(bus, tracker, headers, ANSWER_S, seed)
 
         feed = Feed(bus, time.monotonic_ns)
-        page = Page(feed, arguments.connect or rig.bus.endpoint, arguments.port, arguments.view_only, reinitialize)
+        endpoint = arguments.connect or rig.bus.endpoint
+        references = {name: rig.reference(name)[0] for name in rig.trackers}
+        page = Page(feed, endpoint, arguments.port, arguments.view_only, references, send)
         print(f"live page: {page.url}", flush=True)
         try:
             page.run(stop, health.tick)

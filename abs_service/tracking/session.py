@@ -9,6 +9,7 @@ import numpy as np
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection, UndecidedError
 from abs_service.tracker.detection.plausibility import ExtentError, warnings
+from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.segmentation import detect_object
 from abs_service.tracker.estimate import Estimate, Status
 from abs_service.tracker.measurements import measurement
@@ -51,7 +52,7 @@ class TrackingSession:
         self._host_clock = ""
         self._rig = rig
         self._plan = plan
-        self._region = plan.region.build()
+        self._region = self._configured = plan.region.build()
         self._template = plan.template.build(plan.vertices)
         self._observer = Observer(rig)
         self._tracker: Tracker | None = None
@@ -59,7 +60,7 @@ class TrackingSession:
         self._loss_monitor = loss_monitor.LossMonitor(plan.reinitialization, plan.status)
         self._growth_monitor = GrowthMonitor(plan.reinitialization.grow_s)
         self._growth_due = False
-        self._reinitialize_requested = False
+        self._requested: Region | None = None
         self._without_appearance: frozenset[str] = frozenset()
         self._warnings: tuple[str, ...] = ()
 
@@ -84,25 +85,25 @@ class TrackingSession:
 
     def track_observation(self, observation: Observation, in_time: Callable[[], bool]) -> Estimate:
         """The estimate for an observation, see `track`."""
-        requested, self._reinitialize_requested = self._reinitialize_requested, False
+        requested, self._requested = self._requested, None
+        region = requested or self._region
         grow, self._growth_due = self._growth_due, False
         errors: tuple[str, ...] = ()
         doubts: tuple[str, ...] = ()
         try:
-            if self._tracker is None:
-                self._adopt(self._begin(observation), observation)
-            elif (
-                requested
-                or self._loss_monitor.attempt_due(observation.t_host_ns)
-                or self._without_appearance.difference(observation.missing)
+            if self._tracker is None or requested:
+                self._adopt(self._begin(observation, region), observation)
+                self._region = region
+            elif self._loss_monitor.attempt_due(observation.t_host_ns) or self._without_appearance.difference(
+                observation.missing
             ):
-                self._detect_again(self._tracker, requested, observation)
+                self._detect_again(self._tracker, observation)
             elif grow:
                 self._grow(self._tracker.model.mesh, observation)
         except (DetectionError, ModelError) as error:
             errors = (str(error),)
             if isinstance(error, UndecidedError):  # what was asked for is asked again, with more images
-                self._reinitialize_requested, self._growth_due = self._reinitialize_requested or requested, grow
+                self._requested, self._growth_due = self._requested or requested, grow
             doubts = errors if isinstance(error, ExtentError) else ()
         if self._tracker is None:
             return _initializing(observation, errors, doubts)
@@ -116,32 +117,36 @@ class TrackingSession:
         reasons = () if estimate.status == Status.TRACKING else reasons
         return replace(estimate, reasons=reasons, warnings=self._warnings)
 
-    def reinitialize(self) -> None:
-        """Requests a new detection in the next frame set; thread-safe."""
-        self._reinitialize_requested = True
+    def reinitialize(self, region: Region | None = None) -> None:
+        """Requests a new detection in the next frame set; thread-safe.
+
+        Args:
+            region: where the object is; once it is found, used for later detections as well. None: that of the plan.
+        """
+        self._requested = region or self._configured
 
     def _begin_anew(self, host_clock: str) -> None:
         """Forgets the object: on another clock, nobody knows how much time has passed since the last frame."""
         self._host_clock = host_clock
         self._tracker = None
-        self._region = self._plan.region.build()
+        self._region = self._configured = self._plan.region.build()
         self._loss_monitor = loss_monitor.LossMonitor(self._plan.reinitialization, self._plan.status)
         self._growth_due = False
 
-    def _detect_again(self, tracker: Tracker, requested: bool, observation: Observation) -> None:
+    def _detect_again(self, tracker: Tracker, observation: Observation) -> None:
         """Detects the object again; DetectionError or ModelError if it is not in view or does not match the model."""
-        if not requested and self._loss_monitor.keeps_mesh(observation.t_host_ns):
-            tracker.relocate(self._detect(observation).points)
+        if self._loss_monitor.keeps_mesh(observation.t_host_ns):
+            tracker.relocate(self._detect(observation, self._region).points)
             return
         lost = tracker.model.mesh
-        begun = self._begin(observation)
-        if not requested and self._loss_monitor.differs_in_size(begun.mesh, lost):
+        begun = self._begin(observation, self._region)
+        if self._loss_monitor.differs_in_size(begun.mesh, lost):
             raise DetectionError(f"what is in sight has {begun.mesh.area * 1e4:.0f} cm², not {lost.area * 1e4:.0f} cm²")
         self._adopt(begun, observation)
 
     def _grow(self, old: Mesh, observation: Observation) -> None:
         """Replaces the mesh if much more of the object is in sight; DetectionError or ModelError if that fails."""
-        begun = self._begin(observation)
+        begun = self._begin(observation, self._region)
         if begun.mesh.area > LEAST_GROWTH * old.area:
             self._adopt(begun, observation)
             self._loss_monitor.restart("a larger mesh was made")
@@ -158,11 +163,11 @@ class TrackingSession:
         self._growth_monitor = GrowthMonitor(self._plan.reinitialization.grow_s)
         self.mesh_version += 1
 
-    def _detect(self, observation: Observation) -> InitialDetection:
-        return detect_object(observation, self._rig, self._plan.reference, self._region, self._plan.vertices)
+    def _detect(self, observation: Observation, region: Region) -> InitialDetection:
+        return detect_object(observation, self._rig, self._plan.reference, region, self._plan.vertices)
 
-    def _begin(self, observation: Observation) -> "_Begun":
-        detection = self._detect(observation)
+    def _begin(self, observation: Observation, region: Region) -> "_Begun":
+        detection = self._detect(observation, region)
         return _Begun(*make_tracker(self._plan, self._template, self._rig, detection, observation), warnings(detection))
 
 

@@ -1,7 +1,7 @@
 """The page: reads the feed and updates scene and panel, a few times a second each, while somebody looks."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from os import devnull
 
@@ -10,6 +10,7 @@ import viser
 from absmsg.v1.deformation_state_pb2 import DeformationState
 from absmsg.v1.deformed_mesh_pb2 import DeformedMesh
 from absmsg.v1.health_pb2 import Health
+from numpy.typing import NDArray
 
 from abs_service.bus import keys
 from abs_service.tracking.tracker_log import points
@@ -17,6 +18,7 @@ from abs_service.view import pictures, words
 from abs_service.view.feed import Feed, rate_hz
 from abs_service.view.fields import FIELDS, ColorScale, MeshView
 from abs_service.view.panel import Panel
+from abs_service.view.reinitialization import Reinitialization, Send
 from abs_service.view.scene import Scene
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
@@ -24,8 +26,10 @@ from drivers.contract.frame import Frame, Kind
 #: Periods of the page: mesh, points and images, words and plots [s]; with nobody looking [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
-#: Time that a detection may take [s].
-ANSWER_S = 10.0
+#: A click means the first point that is so near to its ray, in distances between neighbouring points.
+REACH = 1.5
+#: The points of a sensor that has delivered none.
+NOTHING: pictures.Cloud = (np.empty((0, 3), np.float32), np.empty((0, 2), np.intp), 0.0)
 
 #: The page listens here only.
 HOST = "127.0.0.1"
@@ -39,23 +43,24 @@ class Page:
         endpoint: of the rig, for people to read.
         port: to listen at; the next free one is taken.
         view_only: True leaves out everything that acts on the rig.
-        reinitialize: asks a tracker to detect its object anew; returns why it refuses, "" if it does not.
+        references: by tracker, the sensor in whose depth image its object is detected.
+        send: asks a tracker to detect its object anew.
     """
 
     def __init__(
-        self, feed: Feed, endpoint: str, port: int, view_only: bool, reinitialize: Callable[[str], str]
+        self, feed: Feed, endpoint: str, port: int, view_only: bool, references: Mapping[str, str], send: Send
     ) -> None:
-        self._feed, self._endpoint = feed, endpoint
-        self._send = reinitialize
+        self._feed, self._endpoint, self._references = feed, endpoint, references
         with _quiet():
             self._server = viser.ViserServer(HOST, port, label="abs-service", verbose=False)
         self._scene = Scene(self._server)
-        self._panel = Panel(self._server, view_only, self._reinitialize)
+        self._panel = Panel(self._server, view_only, self._reinitialize, self._choose)
+        self._reinitialization = Reinitialization(feed, send, self._panel.answer)
         self._scales = {name: ColorScale(field) for name, field in FIELDS.items()}
         self._drawn: object = None
         self._view: MeshView | None = None
         self._exposure_ns = 0  # of that mesh
-        self._asked: tuple[str, float, int] | None = None  # tracker, when, and its mesh before
+        self._measured: dict[str, pictures.Cloud] = {}  # by sensor
         self._due_s = dict.fromkeys((self._draw_mesh, self._draw_images, self._write), 0.0)
 
     @property
@@ -130,7 +135,8 @@ class Page:
             stale = age_s > words.STALE_S
             image = pictures.picture(frame)
             if frame.kind == Kind.DEPTH:
-                points_r, _, spacing_m = pictures.cloud(pictures.radial(frame, camera), camera)
+                points_r, _, spacing_m = measured = pictures.cloud(pictures.radial(frame, camera), camera)
+                self._measured[frame.sensor] = measured
                 self._scene.show_points(frame.sensor, points_r, spacing_m, stale, self._panel.shows[1])
             faces = self._view.faces if self._view is not None else np.empty((0, 3), np.int32)
             vertices = self._view.vertices if self._view is not None else np.empty((0, 3))
@@ -147,7 +153,7 @@ class Page:
         self._panel.show_legend(self._scales[self._panel.field].end)
         self._panel.show_table(self._table(tracker))
         self._panel.show_plots(numbers, self._feed.now_s)
-        self._answer(tracker)
+        self._reinitialization.look()
 
     def _status(self, tracker: str) -> list[words.Words]:
         silent = words.silence(self._feed.age_s(), self._endpoint)
@@ -192,29 +198,23 @@ class Page:
         return rows
 
     def _reinitialize(self, tracker: str) -> None:
-        version = self._version(tracker)
-        self._panel.answer("Asks the tracker to detect its object again …")
-        if refused := self._send(tracker):
-            self._panel.answer(f"The tracker refuses: {refused}.")
-        else:
-            self._asked = tracker, self._feed.now_s, version
+        self._reinitialization.ask(tracker)
 
-    def _answer(self, tracker: str) -> None:
-        """Says what came of the last request."""
-        if self._asked is None:
-            return
-        asked, t_s, before = self._asked
-        if (now := self._version(asked)) != before:
-            self._panel.answer(f"New mesh, version {now}.")
-        elif self._feed.now_s - t_s > ANSWER_S:
-            self._panel.answer("No object was found; the tracker goes on as it was.")
-        else:
-            return
-        self._asked = None
+    def _choose(self) -> None:
+        """Waits for a click at the object."""
+        self._panel.answer("Click the object among the measured points.")
+        self._scene.on_next_click(self._pick)
 
-    def _version(self, tracker: str) -> int:
-        found = self._feed.newest(keys.state(tracker), DeformationState)
-        return found[0].mesh_version if found else 0
+    def _pick(self, origin: NDArray[np.float64], direction: NDArray[np.float64]) -> None:
+        """Asks for a detection at the measured point under a click, a ray in rig coordinates."""
+        tracker = self._panel.tracker
+        points_r, pixels, spacing_m = self._measured.get(self._references.get(tracker, ""), NOTHING)
+        found = pictures.under_ray(points_r, origin, direction, REACH * spacing_m)
+        if found is None:
+            self._panel.answer("There is no measured point of the tracker's reference sensor where you clicked.")
+            return
+        row, column = pixels[found].tolist()
+        self._reinitialization.ask(tracker, (column, row))
 
 
 @contextmanager

@@ -10,9 +10,21 @@ from viser import uplot
 from abs_service.view.feed import MINUTE_S, Numbers
 from abs_service.view.fields import FIELDS, PALETTES
 from abs_service.view.pictures import Picture
-from abs_service.view.words import Words
+from abs_service.view.words import STALE_COLOR, Words
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
+
+#: A status that is not renewed for so long [s] is grey, and a line above it says why: the browser does this by itself.
+GONE_S = 5
+
+_GONE = f"""<style>
+@keyframes abs-gone {{ to {{ visibility: visible; max-height: 20em; padding: 8px 12px; margin: 6px 8px }} }}
+@keyframes abs-old {{ to {{ filter: grayscale(1) opacity(.5) }} }}
+.abs-gone {{ visibility: hidden; max-height: 0; animation: abs-gone 0s {GONE_S}s forwards; background: {STALE_COLOR};
+  color: white; border-radius: 6px; overflow: hidden }}
+.abs-status {{ animation: abs-old 0s {GONE_S}s forwards }}
+</style><div class='abs-gone'><b>This page has lost its connection</b><br>Does abs-service still run?
+It connects again by itself; what it shows is old.</div>"""
 
 #: Columns of a plot: a point each half second.
 _STEPS = round(2 * MINUTE_S)
@@ -25,14 +37,21 @@ class Panel:
         server: that serves it.
         view_only: True leaves out everything that acts on the rig.
         reinitialize: called with the tracker that is to detect its object anew.
+        choose: called when the next click in the scene chooses the object of the tracker.
     """
 
-    def __init__(self, server: viser.ViserServer, view_only: bool, reinitialize: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        view_only: bool,
+        reinitialize: Callable[[str], None],
+        choose: Callable[[], None],
+    ) -> None:
         gui = self._gui = server.gui
         gui.configure_theme(
             control_layout="fixed", control_width="large", dark_mode=True, show_logo=False, show_share_button=False
         )
-        self._status = gui.add_html("")
+        self._status, self._renewed = gui.add_html(""), 0
         self._tracker = gui.add_dropdown("Tracker", list[str](["–"]), visible=False)
         tabs = gui.add_tab_group()
         with tabs.add_tab("View"):
@@ -44,6 +63,8 @@ class Panel:
             if not view_only:
                 button = gui.add_button("Reinitialise", hint="Detect the object again, with a new mesh")
                 button.on_click(lambda _: reinitialize(self.tracker))
+                button = gui.add_button("Choose the object", hint="Detect the object that you click next")
+                button.on_click(lambda _: choose())
             self._answer = gui.add_markdown("", visible=False)
             self._table = gui.add_html("")
         self._image_tab = tabs.add_tab("Images")
@@ -73,14 +94,15 @@ class Panel:
             self._tracker.options, self._tracker.visible = tuple(trackers), len(trackers) > 1
 
     def show_status(self, words: Iterable[Words]) -> None:
-        """Shows the status; the first line is the largest."""
-        lines = []
+        """Shows the status; the first line is the largest. To be called at least every `GONE_S` seconds."""
+        self._renewed += 1
+        lines = [f"<!-- {self._renewed} -->", _GONE]
         for number, one in enumerate(words):
             title = f"<b style='font-size:{1.0 if number else 1.25}em'>{escape(one.title)}</b>"
             text = f"<div style='margin-top:2px'>{escape(one.text)}</div>" if one.text else ""
             style = f"background:{one.color};color:white;padding:8px 12px;border-radius:6px;margin:6px 8px"
             lines.append(f"<div class='abs-status' style='{style}'>{title}{text}</div>")
-        _set(self._status, "".join(lines))
+        self._status.content = "".join(lines)
 
     def show_legend(self, end: float) -> None:
         """Shows the colours of the mesh; `end` has the last one."""

@@ -11,6 +11,9 @@ from drivers.contract.frame import Frame, Geometry, Kind
 
 Picture = NDArray[np.uint8]
 
+#: Points (n, 3) [m] in rig coordinates, the row and column (n, 2) of each, and the spacing of neighbours [m].
+Cloud = tuple[NDArray[np.float32], NDArray[np.intp], float]
+
 #: Width of pictures [px], and the largest number of points of a sensor.
 WIDTH, POINTS = 480, 20_000
 
@@ -33,7 +36,7 @@ def radial(frame: Frame, camera: Camera) -> NDArray[np.floating]:
     return distance / camera.rays()[..., 2] if frame.geometry == Geometry.Z else distance
 
 
-def cloud(distance: NDArray[np.floating], camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.intp], float]:
+def cloud(distance: NDArray[np.floating], camera: Camera) -> Cloud:
     """Points (n, 3) [m] in rig coordinates of every k-th pixel with a return, its row and column, and spacing [m].
 
     Args:
@@ -46,6 +49,27 @@ def cloud(distance: NDArray[np.floating], camera: Camera) -> tuple[NDArray[np.fl
     points_s = camera.rays()[row, column] * distance[row, column, None]
     spacing_m = step * float(np.median(distance[row, column])) / camera.fx if len(pixels) else 0.0
     return transform(camera.T_rs, points_s).astype(np.float32), pixels, spacing_m
+
+
+def under_ray(
+    points: NDArray[np.floating], origin: NDArray[np.floating], direction: NDArray[np.floating], reach_m: float
+) -> int | None:
+    """Index of the point that a ray meets: of those in front, the one nearest to it; None if none is within reach.
+
+    Args:
+        points: positions (n, 3) [m].
+        origin: of the ray (3,) [m].
+        direction: of the ray (3,), of length 1.
+        reach_m: largest distance of the point from the ray [m].
+    """
+    away = points - origin
+    along = away @ direction
+    beside = np.linalg.norm(away - along[:, None] * direction, axis=1)
+    met = (along > 0) & (beside <= reach_m)
+    if not met.any():
+        return None
+    in_front = met & (along <= along[met].min() + 2 * reach_m)
+    return int(np.argmin(np.where(in_front, beside, np.inf)))
 
 
 def picture(frame: Frame) -> Picture:

@@ -18,9 +18,16 @@ _log = logging.getLogger(__name__)
 REINITIALIZE = Reinitialize.DESCRIPTOR.full_name
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
 
+#: Column and row of a pixel.
+Pixel = tuple[int, int]
+
+
+class RefusedError(Exception):
+    """A valid command that cannot be carried out; the message is the answer's reason."""
+
 
 def answer_reinitialize(
-    bus: Bus, tracker: str, headers: HeaderFactory, health: Health, act: Callable[[], None]
+    bus: Bus, tracker: str, headers: HeaderFactory, health: Health, act: Callable[[Pixel | None], str]
 ) -> Subscription:
     """Answers requests to detect the object of a tracker anew; calls `act` for those that are valid.
 
@@ -31,27 +38,49 @@ def answer_reinitialize(
         tracker: its name.
         headers: of the answers.
         health: of the tracker.
-        act: detects anew; called from a thread of the transport.
+        act: detects anew, at a pixel if there is one, and returns the answer's `region`, or raises RefusedError; called
+            from a thread of the transport.
     """
 
     def answer(command: Sample) -> bytes:
         reason, sender = _refusal(command, headers.rig)
+        region, where = "", ""
         if not reason:
-            act()
+            seed = _seed(command)
+            where = f" at {list(seed)}" if seed else ""
+            try:
+                region = act(seed)
+            except RefusedError as error:
+                reason = str(error)
         count = health.counted("commands.refused" if reason else "commands.accepted")
-        line = printable(f"{keys.reinitialize(tracker)} from {sender}: {reason or 'accepted'}")
+        line = printable(f"{keys.reinitialize(tracker)}{where} from {sender}: {reason or 'accepted'}")
         _log.warning("command %d: %s", count, line)
         health.label("command", line)
-        header = headers.now(count)
-        return CommandAnswer(header=header, accepted=not reason, reason=printable(reason)).SerializeToString()
+        said = CommandAnswer(
+            header=headers.now(count), accepted=not reason, reason=printable(reason), region=printable(region)
+        )
+        return said.SerializeToString()
 
     return bus.answer_commands(keys.reinitialize(tracker), ANSWER, answer)
 
 
-def reinitialize(bus: Bus, tracker: str, headers: HeaderFactory, timeout_s: float) -> CommandAnswer | None:
-    """Asks a tracker to detect its object anew; returns its answer, None if there is none."""
-    command = Reinitialize(header=headers.now(0), tracker=tracker).SerializeToString()
-    answers = bus.command(keys.reinitialize(tracker), REINITIALIZE, command, timeout_s)
+def reinitialize(
+    bus: Bus, tracker: str, headers: HeaderFactory, timeout_s: float, seed: Pixel | None = None
+) -> CommandAnswer | None:
+    """Asks a tracker to detect its object anew; returns its answer, None if there is none.
+
+    Args:
+        bus: of the rig.
+        tracker: its name.
+        headers: of this process.
+        timeout_s: of the answer [s].
+        seed: a pixel of the object in the depth image of the tracker's reference; None: the region of its rig file.
+    """
+    command = Reinitialize(header=headers.now(0), tracker=tracker)
+    if seed is not None:
+        command.seed.column, command.seed.row = seed
+        command.seed.SetInParent()  # a pixel (0, 0) is one, too
+    answers = bus.command(keys.reinitialize(tracker), REINITIALIZE, command.SerializeToString(), timeout_s)
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
 
@@ -68,3 +97,8 @@ def _refusal(command: Sample, rig: str) -> tuple[str, str]:
     if header.boot_id:
         sender = f"process {header.boot_id} on {header.host_clock}"
     return "" if header.rig == rig else f"it is for rig {header.rig!r}", sender
+
+
+def _seed(command: Sample) -> Pixel | None:
+    parsed = Reinitialize.FromString(command.payload)
+    return (parsed.seed.column, parsed.seed.row) if parsed.HasField("seed") else None

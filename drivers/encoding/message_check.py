@@ -42,6 +42,8 @@ _RANGES: Mapping[str, tuple[int, int]] = {
     "absmsg.v1.FrameInfo.seq": (0, 1 << 62),
     "absmsg.v1.FrameInfo.t_sigma_ns": (0, _TIME_NS),
     "absmsg.v1.FrameInfo.t_arrival_ns": (-_TIME_NS, _TIME_NS),
+    "absmsg.v1.Reinitialize.Pixel.column": (0, LARGEST_SIDE - 1),
+    "absmsg.v1.Reinitialize.Pixel.row": (0, LARGEST_SIDE - 1),
     "absmsg.v1.DeformationState.Sensor.t_host_ns": (-_TIME_NS, _TIME_NS),
     "absmsg.v1.DeformationState.Sensor.seq": (0, 1 << 62),
     "absmsg.v1.SensorModel.width": (1, LARGEST_SIDE),

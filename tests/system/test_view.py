@@ -1,12 +1,13 @@
 """The live page in a headless browser, of a running rig."""
 
+import re
 import signal
 import socket
 import time
 
 import pytest
 
-from tests.system.running import START_S, RigListener, wait_until
+from tests.system.running import START_S, RigListener, abs_service, wait_until
 
 sync_api = pytest.importorskip("playwright.sync_api")
 pytest.importorskip("viser")
@@ -72,6 +73,18 @@ def _picture(page) -> bytes:
     return page.locator("canvas").first.screenshot()
 
 
+def _chosen_by_a_click(page, listener) -> int:
+    """Version of the mesh that is made after a click in the middle of the scene, at which the first view is aimed."""
+    version = listener.states()[-1][1].mesh_version
+    page.get_by_role("button", name="Choose the object").click(force=True)
+    _says(page, "Click the object")
+    box = page.locator("canvas").first.bounding_box()
+    page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a mesh of what was clicked")
+    _says(page, "To keep this choice")
+    return listener.states()[-1][1].mesh_version
+
+
 def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file, endpoint, launch, browser, port):
     rig, listener = run
     server = launch("view", rig_file, "--port", port)
@@ -87,12 +100,20 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     page.get_by_role("button", name="Reinitialise").click(force=True)
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh")
     _says(page, "New mesh, version")
+    version = _chosen_by_a_click(page, listener)
+    column, row = re.findall(r"\d+", page.inner_text("body").partition("pixel = ")[2])[:2]
+    told = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
+    assert f'type = "seed"\npixel = [{column}, {row}]\n' in told.stdout
+    wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh from the command line")
 
+    assert not page.get_by_text("lost its connection").first.is_visible()
     server.send_signal(signal.SIGTERM)
     assert server.wait(20) == 0
+    _says(page, "This page has lost its connection")
     said = len(listener.health("view"))
     launch("view", rig_file, "--port", port)
     wait_until(lambda: len(listener.health("view")) > said, 30, "health of the second page")
+    page.get_by_text("lost its connection").first.wait_for(state="hidden", timeout=60_000)
     _says(page, "Tracking", 60)
 
     rig.send_signal(signal.SIGTERM)

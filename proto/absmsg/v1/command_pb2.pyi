@@ -7,19 +7,30 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Reinitialize(_message.Message):
-    __slots__ = ("header", "tracker")
+    __slots__ = ("header", "tracker", "seed")
+    class Pixel(_message.Message):
+        __slots__ = ("column", "row")
+        COLUMN_FIELD_NUMBER: _ClassVar[int]
+        ROW_FIELD_NUMBER: _ClassVar[int]
+        column: int
+        row: int
+        def __init__(self, column: _Optional[int] = ..., row: _Optional[int] = ...) -> None: ...
     HEADER_FIELD_NUMBER: _ClassVar[int]
     TRACKER_FIELD_NUMBER: _ClassVar[int]
+    SEED_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     tracker: str
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ...) -> None: ...
+    seed: Reinitialize.Pixel
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., seed: _Optional[_Union[Reinitialize.Pixel, _Mapping]] = ...) -> None: ...
 
 class CommandAnswer(_message.Message):
-    __slots__ = ("header", "accepted", "reason")
+    __slots__ = ("header", "accepted", "reason", "region")
     HEADER_FIELD_NUMBER: _ClassVar[int]
     ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
+    REGION_FIELD_NUMBER: _ClassVar[int]
     header: _common_pb2.Header
     accepted: bool
     reason: str
-    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ...) -> None: ...
+    region: str
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., accepted: _Optional[bool] = ..., reason: _Optional[str] = ..., region: _Optional[str] = ...) -> None: ...

@@ -7,6 +7,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import STATE
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
+from abs_service.cli import main
 from abs_service.commands import reinitialize
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
@@ -28,15 +29,14 @@ class Tracker:
     def publish(self) -> None:
         self._states.put(deformation_state_pb2.DeformationState(mesh_version=self._version).SerializeToString())
 
-    def _on_command(self) -> None:
+    def _on_command(self, seed: commands.Pixel | None) -> str:
         self._version += self._finds
         self.publish()
+        return f"[trackers.sheet.region]\npixel = {list(seed)}\n" if seed else ""
 
 
-@pytest.mark.parametrize(
-    ("finds", "code", "words"), [(True, 0, "has a new mesh, version 2"), (False, 1, "found no object within")]
-)
-def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, finds, code, words):
+def bus_of(monkeypatch, finds: bool) -> LoopbackBus:
+    """A bus on which a tracker answers each new subscriber."""
     monkeypatch.setattr(reinitialize, "TIMEOUT_S", 0.2)
     bus = LoopbackBus()
     tracker = Tracker(bus, finds)
@@ -48,8 +48,29 @@ def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, find
         return subscription
 
     monkeypatch.setattr(bus, "subscribe", and_publish)
-    assert reinitialize.request(bus, "sheet", HeaderFactory("demo", WallClock())) == code
-    assert words in capsys.readouterr().out
+    return bus
+
+
+@pytest.mark.parametrize(
+    ("finds", "code", "words"), [(True, 0, "has a new mesh, version 2"), (False, 1, "found no object within")]
+)
+def test_the_request_is_sent_and_the_new_mesh_reported(monkeypatch, capsys, finds, code, words):
+    assert reinitialize.request(bus_of(monkeypatch, finds), "sheet", HeaderFactory("demo", WallClock())) == code
+    said = capsys.readouterr().out
+    assert words in said
+    assert "rig file" not in said
+
+
+def test_with_a_seed_the_lines_that_keep_it_are_printed(monkeypatch, capsys):
+    assert reinitialize.request(bus_of(monkeypatch, True), "sheet", HeaderFactory("demo", WallClock()), (111, 133)) == 0
+    assert capsys.readouterr().out.endswith("region:\n\n[trackers.sheet.region]\npixel = [111, 133]\n")
+
+
+@pytest.mark.parametrize("seed", [["-1", "2"], ["1", "16384"], ["1.5", "2"], ["1"]])
+def test_a_seed_that_is_no_pixel_is_a_mistake_of_the_user(seed):
+    with pytest.raises(SystemExit) as ended:
+        main(["reinitialize", "--seed", *seed])
+    assert ended.value.code == 2
 
 
 def test_a_silent_tracker_is_named(monkeypatch, capsys):

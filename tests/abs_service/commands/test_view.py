@@ -5,14 +5,27 @@ from pathlib import Path
 import pytest
 
 from abs_service import config
-from abs_service.cli import main
+from abs_service.cli import command_parser, main
 from abs_service.commands import run, view
 
 
-def test_run_serves_a_page_only_if_asked():
-    rig = config.load_default()
-    components = [[child.component for child in run.children(rig, Path("rig.toml"), page)] for page in (False, True)]
-    assert components == [["capture", "track/sheet", "record"], ["capture", "track/sheet", "record", "view"]]
+@pytest.mark.parametrize(
+    ("options", "given"),
+    [
+        ([], None),
+        (["--view"], ()),
+        (["--view", "--view-port", "8081", "--view-only"], ("--port", "8081", "--view-only")),
+        (["--view-port", "0"], ("--port", "0")),
+        (["--view-only"], ("--view-only",)),
+    ],
+)
+def test_run_serves_a_page_only_if_asked_with_the_options_of_view(options, given):
+    page = run.page_options(command_parser("run", run).parse_args(options))
+    children = {child.component: child.arguments for child in run.children(config.load_default(), Path("x.toml"), page)}
+    assert [*children] == ["capture", "track/sheet", "record", *(["view"] if given is not None else [])]
+    assert children.get("view") == (None if given is None else ("view", "x.toml", *given))
+    if given is not None:
+        command_parser("view", view).parse_args(children["view"][1:])  # they are options of view
 
 
 @pytest.mark.parametrize("command", ["view", "run"])

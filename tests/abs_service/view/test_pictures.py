@@ -45,6 +45,21 @@ def test_large_images_are_thinned_out(monkeypatch):
     assert (pixels % 4 == 0).all()
 
 
+def test_a_ray_meets_the_pixel_that_it_was_cast_through_in_front_of_all_behind():
+    distance = np.full((48, 64), 2.0)
+    distance[20:30, 20:40] = 1.0
+    points, pixels, spacing_m = pictures.cloud(distance, CAMERA)
+    for target in ([25, 30], [20, 20], [5, 50]):
+        point = CAMERA.unproject(distance)[tuple(target)]
+        for eye in (CAMERA.center, point + np.array([0.2, -0.1, -1.5])):
+            direction = (point - eye) / np.linalg.norm(point - eye)
+            found = pictures.under_ray(points, eye, direction, 1.5 * spacing_m)
+            assert found is not None
+            np.testing.assert_allclose(pixels[found], target, atol=1)
+    assert pictures.under_ray(points, CAMERA.center, -CAMERA.T_rs[:3, 2], 1.5 * spacing_m) is None
+    assert pictures.under_ray(np.empty((0, 3)), CAMERA.center, CAMERA.T_rs[:3, 2], 0.1) is None
+
+
 def test_an_image_without_any_return_has_no_points():
     assert len(pictures.cloud(np.full((48, 64), np.nan), CAMERA)[0]) == 0
 

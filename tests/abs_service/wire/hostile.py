@@ -63,7 +63,7 @@ VALID: Mapping[str, Message] = {
     "sheet/state": DeformationState(tracker="sheet", theta=[0.0], status=DeformationState.STATUS_TRACKING),
     "sheet/mesh": DeformedMesh(tracker="sheet", vertices_f32=bytes(24), covariance_f32=bytes(48)),
     "sheet/topology": MeshTopology(tracker="sheet", rest_vertices_f32=bytes(24), faces_u32=bytes(12)),
-    "sheet/reinitialize": Reinitialize(tracker="sheet"),
+    "sheet/reinitialize": Reinitialize(tracker="sheet", seed=Reinitialize.Pixel(column=111, row=133)),
     **{f"health/{name}": Health(component=name) for name in ("capture", "record", "run", "track/sheet")},
     "clock/there": Header(host_clock="there", t_host_ns=1),
 }

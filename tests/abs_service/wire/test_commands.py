@@ -12,6 +12,8 @@ from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.waiting import eventually
 
+OUTSIDE = (700, 3)
+REGION = '[trackers.sheet.region]\ntype = "seed"\npixel = [111, 133]\n'
 SENDER = Header(rig="demo", boot_id="5f1c", host_clock="0b6c")
 
 
@@ -19,14 +21,18 @@ class Bench:
     """A tracker called sheet that counts how often it was told to detect its object anew."""
 
     def __init__(self, bus=None):
-        self.bus, self.acted = bus or LoopbackBus(), 0
+        self.bus, self.acted, self.seeds = bus or LoopbackBus(), 0, []
         self.headers = HeaderFactory("demo", WallClock())
         self.health_bus = LoopbackBus()
         self.health = Health(self.health_bus, "track/sheet", self.headers)
         commands.answer_reinitialize(self.bus, "sheet", self.headers, self.health, self.act)
 
-    def act(self):
+    def act(self, seed):
         self.acted += 1
+        self.seeds.append(seed)
+        if seed == OUTSIDE:
+            raise commands.RefusedError("the pixel is outside the image")
+        return REGION if seed else ""
 
     @property
     def said(self):
@@ -45,6 +51,24 @@ def test_a_command_is_carried_out_answered_and_told(caplog):
     assert line in caplog.text
 
 
+@pytest.mark.parametrize("seed", [(111, 133), (0, 0)])
+def test_a_seed_arrives_and_the_answer_says_how_to_keep_it(seed):
+    bench = Bench()
+    answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0, seed)
+    assert answer is not None
+    assert (answer.accepted, answer.region, bench.seeds) == (True, REGION, [seed])
+    assert f"sheet/reinitialize at {list(seed)} from" in bench.said.labels["command"]
+
+
+def test_a_seed_that_the_tracker_cannot_use_is_refused_and_told():
+    bench = Bench()
+    answer = commands.reinitialize(bench.bus, "sheet", bench.headers, 1.0, OUTSIDE)
+    assert answer is not None
+    assert (answer.accepted, answer.reason, answer.region) == (False, "the pixel is outside the image", "")
+    assert bench.said.counters["commands.refused"] == 1
+    assert "at [700, 3] from" in bench.said.labels["command"]
+
+
 @pytest.mark.parametrize(
     ("message", "payload", "reason"),
     [
@@ -59,6 +83,11 @@ def test_a_command_is_carried_out_answered_and_told(caplog):
             commands.REINITIALIZE,
             Reinitialize(tracker="sheet", header=Header(boot_id="\x1b[2J")).SerializeToString(),
             r"boot_id = '\x1b[2J' is too long or cannot be printed",
+        ),
+        (
+            commands.REINITIALIZE,
+            Reinitialize(tracker="sheet", header=SENDER, seed=Reinitialize.Pixel(row=1 << 14)).SerializeToString(),
+            "Pixel.row = 16384 must be in 0 … 16383",
         ),
     ],
 )

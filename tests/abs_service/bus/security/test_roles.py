@@ -148,7 +148,12 @@ def test_commands_are_for_operators(name, rig, secured):
     acted = []
     headers, tracker = HeaderFactory("demo", WallClock()), secured("tracker")
     health = Health(LoopbackBus(), "track/sheet", headers)
-    commands.answer_reinitialize(tracker, "sheet", headers, health, lambda: acted.append(True))
+
+    def act(seed):
+        acted.append(seed)
+        return ""
+
+    commands.answer_reinitialize(tracker, "sheet", headers, health, act)
     assert eventually(lambda: commands.reinitialize(rig, "sheet", headers, 1.0) is not None)
     acted.clear()
     client = secured(name)

@@ -1,0 +1,68 @@
+"""The region of a tracker whose user says where the object is: for the running tracker, and for the rig file."""
+
+import json
+from dataclasses import fields, replace
+
+from abs_service.config import plugins
+from abs_service.tracker.detection.initial_detection import DetectionError
+from abs_service.tracker.detection.regions import above_plane, distance, nearest, seed
+from abs_service.tracking.plan import Plan, RegionSettings
+from abs_service.tracking.session import TrackingSession
+from abs_service.wire.commands import Pixel, RefusedError
+from calib.rig import Rig
+
+
+def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, pixel: Pixel | None) -> str:
+    """Makes a tracker look for its object anew; returns the table of the rig file that keeps a pixel, else "".
+
+    Args:
+        tracking: the tracker.
+        rig: its sensors.
+        plan: as its rig file has it.
+        tracker: its name.
+        pixel: of the object in the depth image of its reference; None: what the rig file says.
+
+    Raises:
+        RefusedError: the pixel is outside the image, or the region's mask is gone.
+    """
+    if pixel is None:
+        tracking.reinitialize()
+        return ""
+    camera = rig.sensors[plan.reference].camera
+    if pixel[0] >= camera.width or pixel[1] >= camera.height:
+        size = f"{camera.width} × {camera.height} pixels"
+        raise RefusedError(f"the pixel {list(pixel)} is outside the depth image of {size}")
+    region = at_pixel(plan.region, pixel)
+    try:
+        tracking.reinitialize(region.build())
+    except DetectionError as error:
+        raise RefusedError(str(error)) from error
+    return toml(tracker, region)
+
+
+def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
+    """The region of a rig file, with a pixel of the object.
+
+    What the rig file says of surfaces is kept: the plane that the object lies on, steps, edges of colours, a mask.
+
+    Args:
+        region: of the rig file.
+        pixel: column and row in the depth image.
+    """
+    match region:
+        case above_plane.Settings():
+            return replace(region, seed=pixel)
+        case seed.Settings():
+            return replace(region, pixel=pixel, color=None, motion_s=None)
+        case nearest.Settings() | distance.Settings():
+            return seed.Settings(pixel, largest_step_m=region.largest_step_m, within=region.within)
+        case _:
+            return seed.Settings(pixel)
+
+
+def toml(tracker: str, region: RegionSettings) -> str:
+    """The table of a rig file that describes a region of this package; defaults are left out."""
+    defaults = {field.name: field.default for field in fields(type(region))}  # pyright: ignore[reportArgumentType]
+    values = {key: value for key, value in plugins.table(region).items() if key == "type" or value != defaults[key]}
+    lines = (f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in values.items())
+    return "\n".join((f"[trackers.{tracker}.region]", *lines, ""))

@@ -1,0 +1,74 @@
+"""What the page asks of a tracker: to detect its object anew, where its rig file says or where the user clicked."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from absmsg.v1.command_pb2 import CommandAnswer
+from absmsg.v1.deformation_state_pb2 import DeformationState
+
+from abs_service.bus import keys
+from abs_service.view.feed import Feed
+
+#: Time that a detection may take [s].
+ANSWER_S = 10.0
+
+#: Column and row of a pixel in the depth image of a tracker's reference.
+Pixel = tuple[int, int]
+
+#: Sends the command to a tracker; returns its answer, None if there is none.
+Send = Callable[[str, Pixel | None], CommandAnswer | None]
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A request: tracker, when [s], version of its mesh before, and the lines that make its choice last."""
+
+    tracker: str
+    t_s: float
+    version: int
+    region: str
+
+
+class Reinitialization:
+    """Asks for one detection at a time, and says in words what comes of it.
+
+    Args:
+        feed: of the rig.
+        send: sends the command.
+        say: shows text, as Markdown.
+    """
+
+    def __init__(self, feed: Feed, send: Send, say: Callable[[str], None]) -> None:
+        self._feed, self._send, self._say = feed, send, say
+        self._asked: _Asked | None = None
+
+    def ask(self, tracker: str, seed: Pixel | None = None) -> None:
+        """Asks a tracker to detect its object anew, at a pixel if there is one."""
+        version, where = self._version(tracker), f" at pixel {list(seed)}" if seed else ""
+        self._say(f"Asks the tracker to detect its object again{where} …")
+        answer = self._send(tracker, seed)
+        if answer is None or not answer.accepted:
+            self._asked = None
+            self._say(f"The tracker refuses: {answer.reason if answer else 'it gives no answer'}.")
+        else:
+            self._asked = _Asked(tracker, self._feed.now_s, version, answer.region)
+
+    def look(self) -> None:
+        """Says what came of the last request, once that is known."""
+        asked = self._asked
+        if asked is None:
+            return
+        if (now := self._version(asked.tracker)) != asked.version:
+            keep = (
+                f"\n\nTo keep this choice, write into the rig file, in place of its region:\n```toml\n{asked.region}```"
+            )
+            self._say(f"New mesh, version {now}.{keep if asked.region else ''}")
+        elif self._feed.now_s - asked.t_s > ANSWER_S:
+            self._say("No object was found; the tracker goes on as it was.")
+        else:
+            return
+        self._asked = None
+
+    def _version(self, tracker: str) -> int:
+        found = self._feed.newest(keys.state(tracker), DeformationState)
+        return found[0].mesh_version if found else 0
