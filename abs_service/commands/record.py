@@ -19,7 +19,8 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import disk, rig_process
 from abs_service.recording.disk_watch import DiskWatch
 from abs_service.recording.first_tracking import FirstTracking
-from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recorder import Recorder
+from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.exit_codes import Exit
@@ -60,13 +61,13 @@ def run(arguments: argparse.Namespace) -> int:
             return Exit.OK
         recorder.start()
         gc_tuning.freeze_loaded_objects()
-        watch = DiskWatch(disk.retention(rig), settings.minimum_free_bytes, health, clock)
+        watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
         while not stop.wait(0.2):
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()
                 recorder.report()
-                watch.look(recorder.written_bytes)
+                watch.look(recorder.written)
                 bus.report(health)
                 health.tick()
         recorder.stop(DRAIN_S)
@@ -94,6 +95,7 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
         rotate_bytes=table.rotate_bytes,
         rotate_s=table.rotate_s,
         minimum_free_bytes=table.minimum_free_bytes,
+        estimates=table.estimates,
         queue_bytes=table.queue_bytes,
     )
 

@@ -139,6 +139,9 @@ class RecordTable(Table):
         retain_s: age at which a recording is deleted [s]; without it, none is. Those beside which there is a file
             `*.keep` (`touch x.mcap.keep`) are never deleted.
         retain_bytes: size of all recordings together beyond which the oldest are deleted [bytes]; without it, none is.
+        estimates: `x_estimates.mcap` is written beside each recording `x.mcap`, with the states, meshes, calibrations,
+            configuration and health alone: without images it is small, and can be kept longer.
+        retain_estimates_s, retain_estimates_bytes: the same for these files; without them, none is deleted.
         minimum_free_bytes: free space on the disk at which recording stops [bytes]; it resumes with half as much again.
         queue_bytes: size of the messages that may wait for a slow disk [bytes]; more are dropped and counted.
     """
@@ -155,6 +158,9 @@ class RecordTable(Table):
     rotate_s: Positive = 3600.0
     retain_s: Positive | None = None
     retain_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
+    estimates: bool = False
+    retain_estimates_s: Positive | None = None
+    retain_estimates_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
     minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
     queue_bytes: Annotated[int, Field(ge=1 << 20)] = 256 << 20
 

@@ -8,7 +8,8 @@ from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recorder import Recorder
+from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec

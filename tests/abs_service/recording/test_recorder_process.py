@@ -205,6 +205,19 @@ def test_the_oldest_recordings_are_deleted_as_the_configuration_says(rig, endpoi
         assert not (rig.parent / "kept" / health.labels["deleted"]).exists()
 
 
+def test_estimates_of_deleted_recordings_are_kept_as_the_configuration_says(rig, endpoint, launch):
+    rig.write_text(rig.read_text() + "rotate_bytes = 100_000\nretain_bytes = 1_000_000\nestimates = true\n")
+    recorder = launch("record", rig)
+    with Stream(endpoint) as stream:
+        health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 0
+    names = {path.name.removesuffix(".mcap") for path in rig.parent.glob("kept/*.mcap")}
+    assert health.labels["deleted"].removesuffix(".mcap") not in names
+    assert health.labels["deleted"].removesuffix(".mcap") + "_estimates" in names
+    assert {f"{name}_estimates" for name in names if not name.endswith("_estimates")} < names
+
+
 def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, launch):
     recorder = launch("record", rig)
     with Stream(endpoint) as stream:
