@@ -11,10 +11,12 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
+from abs_service.recording.pre_roll import PreRoll
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import free_path, open_for_writing
 from abs_service.recording.sample_writer import SampleWriter
 from abs_service.recording.take import Take
+from abs_service.recording.trigger import ALWAYS, Trigger
 
 _log = logging.getLogger(__name__)
 
@@ -24,6 +26,10 @@ QUERY_S = 1.0
 LOOK_S = 1.0
 #: Time between two attempts to record after a failure [s].
 RETRY_S = 1.0
+#: Time between two looks whether there is something to record [s].
+IDLE_S = 0.05
+#: Why a file ends when the trigger does.
+ENDED = "trigger"
 #: Free space at which recording resumes, relative to that at which it ended: or it would end again at once.
 RESUME_FACTOR = 1.5
 
@@ -43,6 +49,7 @@ class Recorder:
         open_file: creates a file; a test may give a slow or full one.
         free_bytes: free space of the file system of a folder.
         retry_s: time between two attempts after a failure [s].
+        trigger: when to record.
     """
 
     def __init__(
@@ -54,6 +61,7 @@ class Recorder:
         open_file: Callable[[Path], BinaryIO] = open_for_writing,
         free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
         retry_s: float = RETRY_S,
+        trigger: Trigger = ALWAYS,
     ) -> None:
         self._bus = bus
         self._settings = settings
@@ -62,8 +70,16 @@ class Recorder:
         self._open_file = open_file
         self._free_bytes = free_bytes
         self._retry_s = retry_s
-        self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes)
+        self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes + settings.pre_roll_bytes)
         self._writer = SampleWriter(settings.encode_image, health, clock)
+        self._pre_roll = PreRoll(
+            self._queue,
+            trigger,
+            settings.pre_roll_s,
+            settings.pre_roll_bytes,
+            clock.monotonic,
+            lambda sample: self._writer.latch([sample]),
+        )
         self._stopping = threading.Event()
         self._failed = ""
         self._is_short_of_space = False
@@ -80,12 +96,14 @@ class Recorder:
 
     def start(self) -> None:
         """Subscribes and begins to write."""
-        self._subscription = self._bus.subscribe(
-            "**", lambda sample: self._queue.put(sample.topic, sample, sample.size)
-        )
+        self._subscription = self._bus.subscribe("**", self._pre_roll.put)
         # Only now, so that nothing falls between the answers and the subscription.
         self._writer.latch(self._bus.query("**", QUERY_S))
         self._thread.start()
+
+    def ask(self, recording: bool) -> str:
+        """Begins with what was before, or ends, as somebody asks; returns why that is refused, "" if it is not."""
+        return self._pre_roll.ask(recording)
 
     def stop(self, timeout_s: float) -> None:
         """Writes what waits and finishes the file; gives up after `timeout_s`, which leaves it to be recovered."""
@@ -100,6 +118,7 @@ class Recorder:
         """Updates the counters and gauges of health; call it before `Health.tick`."""
         self._health.count_up_to(self._queue.dropped, "dropped.")
         self._health.gauge("queue_bytes", self._queue.size)
+        self._pre_roll.report(self._health)
         lost = sum(self._queue.dropped.values())
         if self._failed:
             self._failure_drops = lost - self._slow_drops
@@ -110,6 +129,9 @@ class Recorder:
 
     def _run(self) -> None:
         while not self._queue.is_drained:
+            if not self._queue.size and not self._pre_roll.is_open:
+                self._stopping.wait(IDLE_S)
+                continue
             if self._attempt():
                 continue
             if self._stopping.is_set():
@@ -163,6 +185,9 @@ class Recorder:
             self._writer.begin(take)
             reason = self._fill(take, started_ns)
             fate = take.fate
+            if reason == ENDED:
+                self._writer.pause()
+                self._health.label("file", "")
             take.finish({"ended": reason, **self._writer.summary(self._queue.dropped)})
         except BaseException:
             self._health.label("file", take.abandon().name)
@@ -183,6 +208,8 @@ class Recorder:
                 self._writer.write(take, sample)
             elif self._queue.is_drained:
                 return "stopped"
+            elif not self._pre_roll.is_open:
+                return ENDED
             now_ns = self._clock.monotonic()
             if now_ns < next_look_ns:
                 continue

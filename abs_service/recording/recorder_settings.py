@@ -21,6 +21,8 @@ class RecorderSettings:
         rotate_bytes, rotate_s: size and age at which a new file begins.
         minimum_free_bytes: free space at which recording ends.
         estimates: whether estimates are written to a file of their own as well.
+        pre_roll_s, pre_roll_bytes: what is held of the time before a trigger; the oldest beyond the bytes are
+            dropped and counted.
         queue_bytes: messages that may wait for a slow disk; more are dropped and counted.
     """
 
@@ -35,4 +37,6 @@ class RecorderSettings:
     rotate_s: float = 3600.0
     minimum_free_bytes: int = 1_000_000_000
     estimates: bool = False
+    pre_roll_s: float = 0.0
+    pre_roll_bytes: int = 0
     queue_bytes: int = 256 << 20

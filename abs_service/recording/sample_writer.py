@@ -1,5 +1,6 @@
 """Writes the messages of a rig to one file after the other, and counts them."""
 
+import threading
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
@@ -35,6 +36,7 @@ class SampleWriter:
         self._encode_image = encode_image
         self._health = health
         self._clock = clock
+        self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
         self._last_seq: dict[str, int] = {}
         self._counts: Counter[str] = Counter()  # of the open file
@@ -43,20 +45,27 @@ class SampleWriter:
         self.unsaved = 0  # messages written since `saved` was called
 
     def latch(self, samples: Iterable[Sample]) -> None:
-        """Remembers those of the samples that each file begins with."""
-        self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
+        """Remembers those of the samples that each file begins with; called from any thread."""
+        with self._lock:
+            self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
 
     def begin(self, take: Take) -> None:
         """Begins a recording with what makes it self-contained. Raises as `write`."""
         self._counts = Counter()
         self._attached = {}
         self.unsaved = 0
-        for sample in self._latched.values():
+        with self._lock:
+            latched = list(self._latched.values())
+        for sample in latched:
             self.write(take, sample, is_repeated=True)
 
     def saved(self) -> None:
         """All that was written is on disk."""
         self.unsaved = 0
+
+    def pause(self) -> None:
+        """Nothing is written for a while, on purpose: what comes afterwards tells no loss."""
+        self._last_seq = {}
 
     def write(self, take: Take, sample: Sample, is_repeated: bool = False) -> None:
         """Writes one message and counts it.

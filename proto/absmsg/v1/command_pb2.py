@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from absmsg.v1 import common_pb2 as absmsg_dot_v1_dot_common__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x61\x62smsg/v1/command.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"B\n\x0cReinitialize\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\"T\n\rCommandAnswer\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x02 \x01(\x08\x12\x0e\n\x06reason\x18\x03 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x17\x61\x62smsg/v1/command.proto\x12\tabsmsg.v1\x1a\x16\x61\x62smsg/v1/common.proto\"B\n\x0cReinitialize\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x0f\n\x07tracker\x18\x02 \x01(\t\">\n\x06Record\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x11\n\trecording\x18\x02 \x01(\x08\"T\n\rCommandAnswer\x12!\n\x06header\x18\x01 \x01(\x0b\x32\x11.absmsg.v1.Header\x12\x10\n\x08\x61\x63\x63\x65pted\x18\x02 \x01(\x08\x12\x0e\n\x06reason\x18\x03 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -34,6 +34,8 @@ if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_REINITIALIZE']._serialized_start=62
   _globals['_REINITIALIZE']._serialized_end=128
-  _globals['_COMMANDANSWER']._serialized_start=130
-  _globals['_COMMANDANSWER']._serialized_end=214
+  _globals['_RECORD']._serialized_start=130
+  _globals['_RECORD']._serialized_end=192
+  _globals['_COMMANDANSWER']._serialized_start=194
+  _globals['_COMMANDANSWER']._serialized_end=278
 # @@protoc_insertion_point(module_scope)

@@ -14,6 +14,14 @@ class Reinitialize(_message.Message):
     tracker: str
     def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ...) -> None: ...
 
+class Record(_message.Message):
+    __slots__ = ("header", "recording")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    RECORDING_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    recording: bool
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., recording: _Optional[bool] = ...) -> None: ...
+
 class CommandAnswer(_message.Message):
     __slots__ = ("header", "accepted", "reason")
     HEADER_FIELD_NUMBER: _ClassVar[int]
