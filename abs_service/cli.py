@@ -37,6 +37,7 @@ COMMANDS = {
     "capture": "only the devices: publish their images",
     "track": "only one tracker: subscribe to images, publish the deformation",
     "reinitialize": "make a running tracker detect its object again",
+    "trigger": "make a running recorder record, with the seconds before, or wait again",
     "keys": "make the certificates with which hosts and applications prove who they are",
     "completion": "print a script that completes commands and options in bash, zsh or fish",
     "record": "only the recorder: subscribe to everything, write MCAP files",

@@ -6,12 +6,14 @@ ROOT = "abs"
 CONFIG = "config"
 SCHEMA = "schema"
 TRANSFORMS = "tf"
+#: Topic of commands to the recorder: queries with an absmsg.v1.Record.
+RECORD = "record"
 
 #: Coordinate frame that all poses and vertices refer to.
 RIG_FRAME = "rig"
 
 #: First parts of topics, not allowed as names of sensors, devices and trackers.
-RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live"})
+RESERVED = frozenset({CONFIG, SCHEMA, TRANSFORMS, "clock", "health", "live", RECORD})
 
 
 class KeyNameError(ValueError):

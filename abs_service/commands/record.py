@@ -12,6 +12,7 @@ import errno
 import os
 import shutil
 import threading
+import time
 
 from abs_service import config
 from abs_service.bus.health import Health, Level
@@ -19,16 +20,21 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import disk, rig_process
 from abs_service.recording.disk_watch import DiskWatch
 from abs_service.recording.first_tracking import FirstTracking
-from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recorder import Recorder
+from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
+from abs_service.recording.trigger import ALWAYS, Asked, Trigger
 from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.exit_codes import Exit
+from abs_service.wire import commands
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec
 from drivers.encoding.mcap_file import Compression
 
 #: Time to drain the queue at the end [s].
 DRAIN_S = 2.5
+#: Age of an unfinished file below which the recorder before this one was killed while it recorded [s].
+INTERRUPTED_S = 60.0
 #: Niceness: capture and tracking go first where cores are scarce; recording has a queue.
 NICE = 5
 
@@ -49,9 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
     with rig_process.open_bus(rig, arguments, "recorder") as bus:
         health = Health(bus, "record", headers)
         bus.declare_liveliness("record")
+        trigger = _trigger(rig, clock)
         # In parallel: it may take minutes.
         threading.Thread(target=_recover_leftovers, args=(settings, health), daemon=True).start()
-        recorder = Recorder(bus, settings, health, clock)
+        recorder = Recorder(bus, settings, health, clock, trigger=trigger)
         os.nice(NICE)  # this thread and those that it starts from now on: not those that receive
         tracking = FirstTracking(bus, rig.trackers)
         if rig.record.begin == "tracking":
@@ -59,14 +66,15 @@ def run(arguments: argparse.Namespace) -> int:
         if stop.is_set():
             return Exit.OK
         recorder.start()
+        commands.answer_record(bus, headers, health, recorder.ask)
         gc_tuning.freeze_loaded_objects()
-        watch = DiskWatch(disk.retention(rig), settings.minimum_free_bytes, health, clock)
+        watch = DiskWatch(disk.recordings(rig), disk.estimates(rig), settings.minimum_free_bytes, health, clock)
         while not stop.wait(0.2):
             health.label("tracking", "" if tracking.seen.is_set() else "nothing is tracked yet")
             if health.due():
                 clock.measure()
                 recorder.report()
-                watch.look(recorder.written_bytes)
+                watch.look(recorder.written)
                 bus.report(health)
                 health.tick()
         recorder.stop(DRAIN_S)
@@ -94,8 +102,21 @@ def _settings(rig: config.ServiceConfig) -> RecorderSettings:
         rotate_bytes=table.rotate_bytes,
         rotate_s=table.rotate_s,
         minimum_free_bytes=table.minimum_free_bytes,
+        pre_roll_s=table.pre_roll_s,
+        pre_roll_bytes=0 if table.when == "always" else table.pre_roll_bytes,
+        estimates=table.estimates,
         queue_bytes=table.queue_bytes,
     )
+
+
+def _trigger(rig: config.ServiceConfig, clock: WallClock) -> Trigger:
+    table = rig.record
+    if table.when == "always":
+        return ALWAYS
+    trigger = Asked(table.when == "not_tracking", table.post_roll_s, clock.monotonic)
+    if any(time.time() - path.stat().st_mtime < INTERRUPTED_S for path in leftovers(table.directory)):
+        trigger.resume()
+    return trigger
 
 
 def _recover_leftovers(settings: RecorderSettings, health: Health) -> None:

@@ -76,5 +76,10 @@ def _trackers(file: dict[str, Any]) -> Iterator[Problem]:
 
 def _record(file: dict[str, Any]) -> Iterator[Problem]:
     record = file.get("record")
-    if isinstance(record, dict) and record.get("begin") == "tracking" and not _tables(file, "trackers"):
+    if not isinstance(record, dict) or _tables(file, "trackers"):
+        return
+    if record.get("begin") == "tracking":
         yield Problem(("record", "begin"), 'the rig has no tracker to wait for; allowed is "start"', "tracking")
+    if record.get("when") == "not_tracking":
+        allowed = 'the rig has no tracker; allowed are "always" and "asked"'
+        yield Problem(("record", "when"), allowed, "not_tracking")

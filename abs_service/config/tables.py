@@ -128,6 +128,11 @@ class RecordTable(Table):
         directory: folder of the recordings, created if it does not exist.
         begin: `start`: at once, and what is recorded before something is tracked is said to be; `tracking`: with
             the first TRACKING of any tracker, from whose next images on everything is kept.
+        when: `always`; `asked`: from `abs-service trigger` on until `abs-service trigger --stop`; `not_tracking`: then,
+            and when a tracker leaves TRACKING for DEGRADED or LOST. Each time with the last `pre_roll_s`.
+        pre_roll_s: time before the trigger that is held in memory and recorded with it [s].
+        pre_roll_bytes: size of the messages held in memory [bytes]; the oldest beyond it are dropped and counted.
+        post_roll_s: time that is recorded after a tracker has left TRACKING for the last time [s].
         depth_codec: form of images with one channel, such as distances and amplitudes; viewers show `raw` ones only.
         color_codec: form of colour images and mosaics; viewers show `raw` and `jpeg`, which loses details
             and is for colour images alone: mosaics are `lossless` then.
@@ -139,6 +144,9 @@ class RecordTable(Table):
         retain_s: age at which a recording is deleted [s]; without it, none is. Those beside which there is a file
             `*.keep` (`touch x.mcap.keep`) are never deleted.
         retain_bytes: size of all recordings together beyond which the oldest are deleted [bytes]; without it, none is.
+        estimates: `x_estimates.mcap` is written beside each recording `x.mcap`, with the states, meshes, calibrations,
+            configuration and health alone: without images it is small, and can be kept longer.
+        retain_estimates_s, retain_estimates_bytes: the same for these files; without them, none is deleted.
         minimum_free_bytes: free space on the disk at which recording stops [bytes]; it resumes with half as much again.
         queue_bytes: size of the messages that may wait for a slow disk [bytes]; more are dropped and counted.
     """
@@ -146,6 +154,10 @@ class RecordTable(Table):
     enabled: bool = True
     directory: RelativePath = Path("recordings")
     begin: Literal["start", "tracking"] = "start"
+    when: Literal["always", "asked", "not_tracking"] = "always"
+    pre_roll_s: Annotated[float, Field(ge=0)] = 10.0
+    pre_roll_bytes: Annotated[int, Field(ge=0)] = 1 << 30
+    post_roll_s: Positive = 10.0
     depth_codec: Literal["raw", "lossless"] = "raw"
     color_codec: Literal["raw", "lossless", "jpeg"] = "raw"
     compression: Literal["none", "lz4", "zstd"] = "lz4"
@@ -155,6 +167,9 @@ class RecordTable(Table):
     rotate_s: Positive = 3600.0
     retain_s: Positive | None = None
     retain_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
+    estimates: bool = False
+    retain_estimates_s: Positive | None = None
+    retain_estimates_bytes: Annotated[int, Field(ge=1 << 16)] | None = None
     minimum_free_bytes: Annotated[int, Field(ge=0)] = 1_000_000_000
     queue_bytes: Annotated[int, Field(ge=1 << 20)] = 256 << 20
 

@@ -42,6 +42,7 @@ def _record(health: Health) -> list[str]:
         f"{size(health.gauges['free_bytes'])} free" if "free_bytes" in health.gauges else "",
         f"{dropped} dropped" if dropped else "",
         health.labels.get("tracking", ""),
+        health.labels.get("trigger", ""),
     ]
 
 

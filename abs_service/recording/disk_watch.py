@@ -18,10 +18,11 @@ STEP_NS = 86_400_000_000_000
 
 
 class DiskWatch:
-    """Applies a retention and publishes a forecast, both in the recorder's health.
+    """Applies retentions and publishes a forecast, both in the recorder's health.
 
     Args:
-        retention: what is kept.
+        recordings: which of these are kept.
+        estimates: which of the files that have the estimates alone.
         minimum_free_bytes: free space at which recording stops [bytes].
         health: of the recorder.
         clock: time.
@@ -30,35 +31,37 @@ class DiskWatch:
 
     def __init__(
         self,
-        retention: Retention,
+        recordings: Retention,
+        estimates: Retention,
         minimum_free_bytes: int,
         health: Health,
         clock: WallClock,
         free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
     ) -> None:
-        self._retention = retention
+        self._recordings = recordings
+        self._estimates = estimates
         self._minimum_free_bytes = minimum_free_bytes
         self._health = health
         self._clock = clock
         self._free_bytes = free_bytes
-        self._meter = forecast.RateMeter()
+        self._meters = forecast.RateMeter(), forecast.RateMeter()
         self._offset_ns = clock.wall(0)
         self._next_ns = 0
 
-    def look(self, written_bytes: int) -> None:
+    def look(self, written: tuple[int, int]) -> None:
         """Does both every ten seconds.
 
         Args:
-            written_bytes: what has been written so far, to all files.
+            written: what has been written so far, to all recordings and to all files of estimates [bytes].
         """
         now_ns = self._clock.monotonic()
-        rate = self._meter.add(now_ns, written_bytes)
+        rates = [meter.add(now_ns, total) for meter, total in zip(self._meters, written, strict=True)]
         if now_ns < self._next_ns:
             return
         self._next_ns = now_ns + PERIOD_NS
         self._delete(now_ns)
         try:
-            self._forecast(rate)
+            self._forecast(*rates)
         except OSError:  # no folder; the recorder says so
             self._health.label("forecast", "")
 
@@ -66,7 +69,8 @@ class DiskWatch:
         # A wall clock that jumps years ahead makes all recordings old.
         is_steady = abs(self._clock.wall(0) - self._offset_ns) < STEP_NS
         try:
-            deleted = self._retention.apply(self._clock.wall(now_ns) if is_steady else 0)
+            wall_ns = self._clock.wall(now_ns) if is_steady else 0
+            deleted = [path for kept in (self._recordings, self._estimates) for path in kept.apply(wall_ns)]
         except OSError as error:
             self._health.report("retention", Level.WARNING, f"an old recording cannot be deleted: {error}")
             return
@@ -75,12 +79,10 @@ class DiskWatch:
             self._health.count("deleted")
             self._health.label("deleted", path.name)
 
-    def _forecast(self, rate: float) -> None:
-        kept = self._retention
-        room = self._free_bytes(kept.directory) - self._minimum_free_bytes
-        used = sum(file.size for file in kept.files())
-        numbers = (rate, room, used, kept.retain_s, kept.retain_bytes)
-        self._health.label("forecast", forecast.text(*numbers))
-        seconds = forecast.room_s(*numbers)
+    def _forecast(self, rate: float, estimates_rate: float) -> None:
+        room = self._free_bytes(self._recordings.directory) - self._minimum_free_bytes
+        recordings, estimates = self._recordings.growth(rate), self._estimates.growth(estimates_rate)
+        self._health.label("forecast", forecast.text(recordings, estimates, room))
+        seconds = forecast.room_s((recordings, estimates), room)
         message = f"the disk is full in {forecast.duration(seconds)}" if seconds < WARN_S else ""
         self._health.report("room", Level.WARNING if message else Level.OK, message)

@@ -1,6 +1,8 @@
 """How long the disk lasts."""
 
 from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 #: Time over which the rate is averaged [ns].
 WINDOW_NS = 60_000_000_000
@@ -21,27 +23,60 @@ class RateMeter:
         return (total - before) * 1e9 / (t_ns - then_ns) if t_ns > then_ns else 0.0
 
 
-def room_s(rate: float, room: float, used: float, retain_s: float, retain_bytes: float) -> float:
-    """Time until the disk is full [s]; infinite if recordings are deleted before it is.
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """Files of one kind, which are written and, when they are too old or too large, deleted.
 
-    Args:
+    Attributes:
         rate: of recording [bytes/s].
-        room: bytes that may still be written.
-        used: size of the recordings that may be deleted, together [bytes].
+        used: size of those that may be deleted, together [bytes].
         retain_s, retain_bytes: see `Retention`.
     """
-    kept = min(retain_bytes, retain_s * rate)
-    return float("inf") if rate <= 0 or kept <= used + room else max(room, 0.0) / rate
+
+    rate: float
+    used: float
+    retain_s: float
+    retain_bytes: float
+
+    @property
+    def more(self) -> float:
+        """How much larger they get before as much is deleted as is written [bytes]; negative if they get smaller."""
+        return min(self.retain_bytes, self.retain_s * self.rate) - self.used
+
+    @property
+    def kept_s(self) -> float:
+        """Time of which there are files then [s]."""
+        return min(self.retain_s, self.retain_bytes / self.rate)
 
 
-def text(rate: float, room: float, used: float, retain_s: float, retain_bytes: float) -> str:
+def room_s(kinds: Sequence[Growth], room: float) -> float:
+    """Time until the disk is full [s]; infinite if files are deleted before it is.
+
+    Args:
+        kinds: of files on the disk.
+        room: bytes that may still be written.
+    """
+    growing = sorted((kind for kind in kinds if kind.rate > 0), key=lambda kind: kind.more / kind.rate)
+    left, now_s = room + sum(max(-kind.more, 0.0) for kind in growing), 0.0
+    for number, kind in enumerate(growing):
+        rate = sum(other.rate for other in growing[number:])
+        until_s = max(kind.more, 0.0) / kind.rate
+        if rate * (until_s - now_s) > left:
+            return now_s + max(left, 0.0) / rate
+        left -= rate * (until_s - now_s)
+        now_s = until_s
+    return float("inf")
+
+
+def text(recordings: Growth, estimates: Growth, room: float) -> str:
     """The same for people: "2.6 days on this disk", "the last 2.6 days are kept", "" if nothing is recorded."""
-    if rate <= 0:
+    if recordings.rate <= 0:
         return ""
-    seconds = room_s(rate, room, used, retain_s, retain_bytes)
-    if seconds == float("inf"):
-        return f"the last {duration(min(retain_s, retain_bytes / rate))} are kept"
-    return f"{duration(seconds)} on this disk"
+    seconds = room_s((recordings, estimates), room)
+    if seconds < float("inf"):
+        return f"{duration(seconds)} on this disk"
+    kept = f"the last {duration(recordings.kept_s)} are kept"
+    return f"{kept}, estimates of {duration(estimates.kept_s)}" if estimates.rate > 0 else kept
 
 
 def duration(seconds: float) -> str:

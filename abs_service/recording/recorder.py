@@ -4,7 +4,6 @@ import logging
 import shutil
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -12,10 +11,12 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
-from abs_service.recording.recording_file import RecordingFile, open_for_writing
+from abs_service.recording.pre_roll import PreRoll
+from abs_service.recording.recorder_settings import RecorderSettings
+from abs_service.recording.recording_file import free_path, open_for_writing
 from abs_service.recording.sample_writer import SampleWriter
-from drivers.encoding.encoded_image import ImageEncoder, unchanged
-from drivers.encoding.mcap_file import CHUNK_SIZE, Compression
+from abs_service.recording.take import Take
+from abs_service.recording.trigger import ALWAYS, Trigger
 
 _log = logging.getLogger(__name__)
 
@@ -25,37 +26,12 @@ QUERY_S = 1.0
 LOOK_S = 1.0
 #: Time between two attempts to record after a failure [s].
 RETRY_S = 1.0
+#: Time between two looks whether there is something to record [s].
+IDLE_S = 0.05
+#: Why a file ends when the trigger does.
+ENDED = "trigger"
 #: Free space at which recording resumes, relative to that at which it ended: or it would end again at once.
 RESUME_FACTOR = 1.5
-
-
-@dataclass(frozen=True, slots=True)
-class RecorderSettings:
-    """Settings of the recorder.
-
-    Attributes:
-        directory: where the files go; made when it does not exist.
-        name: beginning of their names.
-        rig_toml: effective configuration, attached to every file.
-        encode_image: makes the recorded message of an image.
-        compression, chunk_bytes: of the MCAP chunks.
-        flush_s: longest time until a message is on disk, and so the most that a crash can lose.
-        rotate_bytes, rotate_s: size and age at which a new file begins.
-        minimum_free_bytes: free space at which recording ends.
-        queue_bytes: messages that may wait for a slow disk; more are dropped and counted.
-    """
-
-    directory: Path
-    name: str
-    rig_toml: str
-    encode_image: ImageEncoder = unchanged
-    compression: Compression = Compression.LZ4
-    chunk_bytes: int = CHUNK_SIZE
-    flush_s: float = 1.0
-    rotate_bytes: int = 4_000_000_000
-    rotate_s: float = 3600.0
-    minimum_free_bytes: int = 1_000_000_000
-    queue_bytes: int = 256 << 20
 
 
 class Recorder:
@@ -73,6 +49,7 @@ class Recorder:
         open_file: creates a file; a test may give a slow or full one.
         free_bytes: free space of the file system of a folder.
         retry_s: time between two attempts after a failure [s].
+        trigger: when to record.
     """
 
     def __init__(
@@ -84,6 +61,7 @@ class Recorder:
         open_file: Callable[[Path], BinaryIO] = open_for_writing,
         free_bytes: Callable[[Path], int] = lambda folder: shutil.disk_usage(folder).free,
         retry_s: float = RETRY_S,
+        trigger: Trigger = ALWAYS,
     ) -> None:
         self._bus = bus
         self._settings = settings
@@ -92,15 +70,23 @@ class Recorder:
         self._open_file = open_file
         self._free_bytes = free_bytes
         self._retry_s = retry_s
-        self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes)
+        self._queue: BoundedQueue[Sample] = BoundedQueue(settings.queue_bytes + settings.pre_roll_bytes)
         self._writer = SampleWriter(settings.encode_image, health, clock)
+        self._pre_roll = PreRoll(
+            self._queue,
+            trigger,
+            settings.pre_roll_s,
+            settings.pre_roll_bytes,
+            clock.monotonic,
+            lambda sample: self._writer.latch([sample]),
+        )
         self._stopping = threading.Event()
         self._failed = ""
         self._is_short_of_space = False
         self._slow_drops = self._failure_drops = 0
-        self._finished_bytes = 0
+        self._finished = (0, 0)
         self.failures = 0
-        self.written_bytes = 0  # to all files
+        self.written = (0, 0)  # bytes to all recordings, and to all files of estimates
         self._thread = threading.Thread(target=self._run, name="record", daemon=True)
 
     @property
@@ -110,12 +96,14 @@ class Recorder:
 
     def start(self) -> None:
         """Subscribes and begins to write."""
-        self._subscription = self._bus.subscribe(
-            "**", lambda sample: self._queue.put(sample.topic, sample, sample.size)
-        )
+        self._subscription = self._bus.subscribe("**", self._pre_roll.put)
         # Only now, so that nothing falls between the answers and the subscription.
         self._writer.latch(self._bus.query("**", QUERY_S))
         self._thread.start()
+
+    def ask(self, recording: bool) -> str:
+        """Begins with what was before, or ends, as somebody asks; returns why that is refused, "" if it is not."""
+        return self._pre_roll.ask(recording)
 
     def stop(self, timeout_s: float) -> None:
         """Writes what waits and finishes the file; gives up after `timeout_s`, which leaves it to be recovered."""
@@ -130,6 +118,7 @@ class Recorder:
         """Updates the counters and gauges of health; call it before `Health.tick`."""
         self._health.count_up_to(self._queue.dropped, "dropped.")
         self._health.gauge("queue_bytes", self._queue.size)
+        self._pre_roll.report(self._health)
         lost = sum(self._queue.dropped.values())
         if self._failed:
             self._failure_drops = lost - self._slow_drops
@@ -140,6 +129,9 @@ class Recorder:
 
     def _run(self) -> None:
         while not self._queue.is_drained:
+            if not self._queue.size and not self._pre_roll.is_open:
+                self._stopping.wait(IDLE_S)
+                continue
             if self._attempt():
                 continue
             if self._stopping.is_set():
@@ -176,32 +168,36 @@ class Recorder:
 
     def _record_one_file(self) -> None:
         settings, started_ns = self._settings, self._clock.monotonic()
-        file = RecordingFile(
-            settings.directory,
-            settings.name,
-            self._clock.wall(started_ns),
+        wall_ns = self._clock.wall(started_ns)
+        take = Take(
+            free_path(settings.directory, settings.name, wall_ns),
+            settings.estimates,
+            wall_ns,
             {"rig.toml": settings.rig_toml},
             settings.compression,
             settings.chunk_bytes,
             self._open_file,
         )
-        self._finished_bytes = self.written_bytes
-        self._health.label("file", file.path.name)
+        self._finished = self.written
+        self._health.label("file", take.path.name)
         self._health.count("files")
         try:
-            self._writer.begin(file)
-            reason = self._fill(file, started_ns)
-            fate = file.fate
-            file.finish({"ended": reason, **self._writer.summary(self._queue.dropped)})
+            self._writer.begin(take)
+            reason = self._fill(take, started_ns)
+            fate = take.fate
+            if reason == ENDED:
+                self._writer.pause()
+                self._health.label("file", "")
+            take.finish({"ended": reason, **self._writer.summary(self._queue.dropped)})
         except BaseException:
-            self._health.label("file", file.abandon().name)
+            self._health.label("file", take.abandon().name)
             self._health.count("unsaved", self._writer.unsaved)
             raise
         if fate:
             self._health.label("file", "")
-            raise OSError(f"{file.path.name} was {fate} while it was written")
+            raise OSError(f"{fate} while it was written")
 
-    def _fill(self, file: RecordingFile, started_ns: int) -> str:
+    def _fill(self, take: Take, started_ns: int) -> str:
         """Records until a reason to end the file, which is returned."""
         settings, flush_ns = self._settings, int(self._settings.flush_s * 1e9)
         look_ns = min(flush_ns, int(LOOK_S * 1e9))
@@ -209,32 +205,34 @@ class Recorder:
         while True:
             sample = self._queue.take(max(0.0, (next_look_ns - self._clock.monotonic()) / 1e9))
             if sample is not None:
-                self._writer.write(file, sample)
+                self._writer.write(take, sample)
             elif self._queue.is_drained:
                 return "stopped"
+            elif not self._pre_roll.is_open:
+                return ENDED
             now_ns = self._clock.monotonic()
             if now_ns < next_look_ns:
                 continue
             next_look_ns = now_ns + look_ns
-            if file.fate:
+            if take.fate:
                 return "gone"
             if now_ns >= next_flush_ns:
                 next_flush_ns = now_ns + flush_ns
-                self._flush(file)
+                self._flush(take)
             free = self._free_bytes(settings.directory)
             self._health.gauge("free_bytes", free)
             if free < settings.minimum_free_bytes:
                 return "low space"
-            if file.size >= settings.rotate_bytes or now_ns - started_ns >= settings.rotate_s * 1e9:
+            if take.size >= settings.rotate_bytes or now_ns - started_ns >= settings.rotate_s * 1e9:
                 return "rotated"
 
-    def _flush(self, file: RecordingFile) -> None:
-        file.flush()
+    def _flush(self, take: Take) -> None:
+        take.flush()
         self._writer.saved()
-        self._health.gauge("file_bytes", file.size)
-        self.written_bytes = self._finished_bytes + file.size
+        self._health.gauge("file_bytes", take.size)
+        self.written = (self._finished[0] + take.size, self._finished[1] + take.estimates_size)
         if self._failed:
-            _log.warning("recording again, to %s", file.path.name)
+            _log.warning("recording again, to %s", take.path.name)
             self._failed = ""
             self._health.report("record", Level.OK)
 

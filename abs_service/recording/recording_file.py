@@ -12,6 +12,8 @@ from drivers.encoding.mcap_file import CHUNK_SIZE, Compression, McapFile
 
 #: Added to the name while the file is written; a file that still has it and is not locked was interrupted.
 ACTIVE = ".active"
+#: End of the name of the file that has the estimates alone.
+ESTIMATES = "_estimates"
 
 
 def private(path: str, flags: int) -> int:
@@ -30,8 +32,7 @@ class RecordingFile:
     The file is locked as long as this process lives and writes, so that no other process recovers it.
 
     Args:
-        directory: where it goes.
-        name: its beginning; the time follows.
+        path: its final path, see `free_path`.
         wall_ns: wall-clock time of its beginning [ns].
         attachments: texts to attach at the start, by name.
         compression, chunk_size: see `McapFile`.
@@ -43,15 +44,14 @@ class RecordingFile:
 
     def __init__(
         self,
-        directory: Path,
-        name: str,
+        path: Path,
         wall_ns: int,
         attachments: Mapping[str, str],
         compression: Compression = Compression.LZ4,
         chunk_size: int = CHUNK_SIZE,
         open_file: Callable[[Path], BinaryIO] = open_for_writing,
     ) -> None:
-        self.path = _free_name(directory, name, wall_ns)
+        self.path = path
         self._active = self.path.with_name(self.path.name + ACTIVE)
         self._stream = open_file(self._active)
         try:
@@ -115,10 +115,21 @@ class RecordingFile:
         return self._active
 
 
-def _free_name(directory: Path, name: str, wall_ns: int) -> Path:
-    """A path that no finished, unfinished or recovered recording uses."""
+def estimates_path(path: Path) -> Path:
+    """The file beside a recording that has its estimates alone: `x_estimates.mcap` beside `x.mcap`."""
+    return path.with_name(f"{path.stem}{ESTIMATES}.mcap")
+
+
+def free_path(directory: Path, name: str, wall_ns: int) -> Path:
+    """A path for a recording that no finished, unfinished or recovered one uses, nor that of the estimates beside it.
+
+    Args:
+        directory: where it goes.
+        name: its beginning; the time follows.
+        wall_ns: wall-clock time of its beginning [ns].
+    """
     start = f"{name}_{datetime.fromtimestamp(wall_ns // 10**9, UTC):%Y-%m-%dT%H-%M-%SZ}"
-    taken = {path.name.split(".")[0] for path in directory.iterdir()}
+    taken = {path.name.split(".")[0].removesuffix(ESTIMATES) for path in directory.iterdir()}
     counter = 1
     stem = start
     while stem in taken:

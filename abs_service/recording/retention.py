@@ -5,6 +5,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from abs_service.recording.forecast import Growth
+
 #: Beside a recording, `x.mcap.keep` for `x.mcap`: it is never deleted.
 KEEP = ".keep"
 
@@ -28,19 +30,22 @@ class Retention:
     Attributes:
         directory: the folder.
         name: name of the rig, with which its recordings begin.
+        kind: what their names have after the time: "", or that of the files of estimates.
         retain_s: age at which a recording is deleted [s]; infinite to keep all.
         retain_bytes: size of all recordings together beyond which the oldest are deleted; infinite to keep all.
     """
 
     directory: Path
     name: str
+    kind: str
     retain_s: float
     retain_bytes: float
 
     def files(self) -> list[Kept]:
         """The recordings that count, finished or not, oldest first; none if the folder cannot be read."""
         pattern = re.compile(
-            rf"{re.escape(self.name)}_\d{{4}}-\d\d-\d\dT\d\d-\d\d-\d\dZ(_\d+)?(\.recovered)?\.mcap(\.broken|\.active)?"
+            rf"{re.escape(self.name)}_\d{{4}}-\d\d-\d\dT\d\d-\d\d-\d\dZ(_\d+)?"
+            rf"{re.escape(self.kind)}(\.recovered)?\.mcap(\.broken|\.active)?"
         )
         try:
             names = set(os.listdir(self.directory))
@@ -53,6 +58,10 @@ class Retention:
                 about = path.stat()
                 found.append(Kept(path, about.st_size, about.st_mtime_ns))
         return sorted(found, key=lambda file: (file.mtime_ns, file.path))
+
+    def growth(self, rate: float) -> Growth:
+        """How they grow when so much is recorded [bytes/s]."""
+        return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, wall_ns: int) -> list[Path]:
         """Deletes what is not to be kept, and returns it.

@@ -1,5 +1,6 @@
 """Writes the messages of a rig to one file after the other, and counts them."""
 
+import threading
 from collections import Counter
 from collections.abc import Iterable, Mapping
 
@@ -11,7 +12,7 @@ from abs_service.bus import keys
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import WallClock
-from abs_service.recording.recording_file import RecordingFile
+from abs_service.recording.take import Take
 from abs_service.wire import message_header as header
 from drivers.encoding.encoded_image import ImageEncoder
 from drivers.encoding.mcap_file import McapFileError
@@ -35,6 +36,7 @@ class SampleWriter:
         self._encode_image = encode_image
         self._health = health
         self._clock = clock
+        self._lock = threading.Lock()
         self._latched: dict[str, Sample] = {}
         self._last_seq: dict[str, int] = {}
         self._counts: Counter[str] = Counter()  # of the open file
@@ -43,22 +45,29 @@ class SampleWriter:
         self.unsaved = 0  # messages written since `saved` was called
 
     def latch(self, samples: Iterable[Sample]) -> None:
-        """Remembers those of the samples that each file begins with."""
-        self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
+        """Remembers those of the samples that each file begins with; called from any thread."""
+        with self._lock:
+            self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
 
-    def begin(self, file: RecordingFile) -> None:
-        """Begins a file with what makes it self-contained. Raises as `write`."""
+    def begin(self, take: Take) -> None:
+        """Begins a recording with what makes it self-contained. Raises as `write`."""
         self._counts = Counter()
         self._attached = {}
         self.unsaved = 0
-        for sample in self._latched.values():
-            self.write(file, sample, is_repeated=True)
+        with self._lock:
+            latched = list(self._latched.values())
+        for sample in latched:
+            self.write(take, sample, is_repeated=True)
 
     def saved(self) -> None:
         """All that was written is on disk."""
         self.unsaved = 0
 
-    def write(self, file: RecordingFile, sample: Sample, is_repeated: bool = False) -> None:
+    def pause(self) -> None:
+        """Nothing is written for a while, on purpose: what comes afterwards tells no loss."""
+        self._last_seq = {}
+
+    def write(self, take: Take, sample: Sample, is_repeated: bool = False) -> None:
         """Writes one message and counts it.
 
         Raises:
@@ -74,10 +83,10 @@ class SampleWriter:
             if message == header.IMAGE:
                 message, payload = self._encode_image(payload)
             if sample.message == header.MODEL:
-                self._attach_calibration(file, sample, stamp_ns)
-            file.write(sample.topic, message, payload, stamp_ns, about.seq)
+                self._attach_calibration(take, sample, stamp_ns)
+            take.write(sample.topic, message, payload, stamp_ns, about.seq)
             if keys.is_image(sample.topic) and sample.attachment:
-                file.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
+                take.write(keys.info(sample.topic), header.INFO, sample.attachment, stamp_ns, about.seq)
         except (CodecError, McapFileError, JsonError, ValueError) as error:
             # Other programs can publish below our keys; that must not end the recording.
             self._health.count("refused")
@@ -94,13 +103,13 @@ class SampleWriter:
         self._reported_drops = total
         return {name: str(number) for name, number in sorted(self._counts.items())}
 
-    def _attach_calibration(self, file: RecordingFile, sample: Sample, stamp_ns: int) -> None:
+    def _attach_calibration(self, take: Take, sample: Sample, stamp_ns: int) -> None:
         """Attaches what a sensor is, when the file does not hold it yet, to be had without reading messages."""
         model = SensorModel.FromString(sample.payload)
         keys.check_name(model.sensor)  # a program that saves attachments as files must not leave its folder
         if self._attached.get(model.sensor) != model.calib_id:
             text = MessageToJson(model, preserving_proto_field_name=True)
-            file.attach(f"calibration/{model.sensor}.json", "application/json", text, stamp_ns)
+            take.attach(f"calibration/{model.sensor}.json", "application/json", text, stamp_ns)
             self._attached[model.sensor] = model.calib_id
 
     def _stamp_ns(self, stamp_ns: int, is_repeated: bool) -> int:

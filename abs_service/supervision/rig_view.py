@@ -99,8 +99,9 @@ class RigView:
 
     @property
     def recording_remark(self) -> str:
-        """What the recorder says as long as nothing is tracked; "" afterwards."""
-        return self.live.health("record").labels.get("tracking", "")
+        """What the recorder says as long as nothing is tracked, or of its trigger; "" if it records anyway."""
+        labels = self.live.health("record").labels
+        return labels.get("tracking") or labels.get("trigger", "")
 
     @property
     def troubles(self) -> list[tuple[str, int, str]]:

@@ -1,9 +1,9 @@
-"""Commands to a tracker: what may be asked, the answer, and a line in health and log for each."""
+"""Commands to a tracker and to the recorder: what may be asked, the answer, and a line in health and log for each."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
-from absmsg.v1.command_pb2 import CommandAnswer, Reinitialize
+from absmsg.v1.command_pb2 import CommandAnswer, Record, Reinitialize
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Bus, Sample, Subscription
@@ -16,6 +16,8 @@ from drivers.encoding.message_check import MessageError
 _log = logging.getLogger(__name__)
 
 REINITIALIZE = Reinitialize.DESCRIPTOR.full_name
+RECORD = Record.DESCRIPTOR.full_name
+_SCHEMAS: Mapping[str, type[Reinitialize | Record]] = {REINITIALIZE: Reinitialize, RECORD: Record}
 ANSWER = CommandAnswer.DESCRIPTOR.full_name
 
 #: Column and row of a pixel.
@@ -42,26 +44,32 @@ def answer_reinitialize(
             from a thread of the transport.
     """
 
-    def answer(command: Sample) -> bytes:
-        reason, sender = _refusal(command, headers.rig)
-        region, where = "", ""
-        if not reason:
-            seed = _seed(command)
-            where = f" at {list(seed)}" if seed else ""
-            try:
-                region = act(seed)
-            except RefusedError as error:
-                reason = str(error)
-        count = health.counted("commands.refused" if reason else "commands.accepted")
-        line = printable(f"{keys.reinitialize(tracker)}{where} from {sender}: {reason or 'accepted'}")
-        _log.warning("command %d: %s", count, line)
-        health.label("command", line)
-        said = CommandAnswer(
-            header=headers.now(count), accepted=not reason, reason=printable(reason), region=printable(region)
-        )
-        return said.SerializeToString()
+    def on_command(payload: bytes) -> str:
+        return act(_seed(payload))
 
-    return bus.answer_commands(keys.reinitialize(tracker), ANSWER, answer)
+    def detail(payload: bytes) -> str:
+        seed = _seed(payload)
+        return f" at {list(seed)}" if seed else ""
+
+    return _answer(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, detail)
+
+
+def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[bool], str]) -> Subscription:
+    """Answers requests to record, or to wait; counts and tells them as `answer_reinitialize`.
+
+    Args:
+        bus: of the rig.
+        headers: of the answers.
+        health: of the recorder.
+        act: records, or waits; returns why it does not, "" if it does. Called from a thread of the transport.
+    """
+
+    def on_command(payload: bytes) -> str:
+        if reason := act(Record.FromString(payload).recording):
+            raise RefusedError(reason)
+        return ""
+
+    return _answer(bus, keys.RECORD, RECORD, headers, health, on_command, lambda _: "")
 
 
 def reinitialize(
@@ -84,21 +92,70 @@ def reinitialize(
     return CommandAnswer.FromString(answers[0].payload) if answers else None
 
 
-def _refusal(command: Sample, rig: str) -> tuple[str, str]:
+def record(bus: Bus, headers: HeaderFactory, recording: bool, timeout_s: float) -> CommandAnswer | None:
+    """Asks the recorder to record, or to wait; returns its answer, None if there is none."""
+    command = Record(header=headers.now(0), recording=recording).SerializeToString()
+    answers = bus.command(keys.RECORD, RECORD, command, timeout_s)
+    return CommandAnswer.FromString(answers[0].payload) if answers else None
+
+
+def _answer(
+    bus: Bus,
+    topic: str,
+    message: str,
+    headers: HeaderFactory,
+    health: Health,
+    act: Callable[[bytes], str],
+    detail: Callable[[bytes], str],
+) -> Subscription:
+    """Answers commands on a topic.
+
+    Args:
+        bus: of the rig.
+        topic: of the commands.
+        message: full name of their type.
+        headers: of the answers.
+        health: where they are counted and told.
+        act: gets the payload of those that are valid, and returns the answer's `region`, or raises RefusedError.
+        detail: what else is told of a valid command.
+    """
+
+    def answer(command: Sample) -> bytes:
+        reason, sender = _refusal(command, message, headers.rig)
+        region, what = "", topic
+        if not reason:
+            what += detail(command.payload)
+            try:
+                region = act(command.payload)
+            except RefusedError as error:
+                reason = str(error)
+        count = health.counted("commands.refused" if reason else "commands.accepted")
+        line = printable(f"{what} from {sender}: {reason or 'accepted'}")
+        _log.warning("command %d: %s", count, line)
+        health.label("command", line)
+        said = CommandAnswer(
+            header=headers.now(count), accepted=not reason, reason=printable(reason), region=printable(region)
+        )
+        return said.SerializeToString()
+
+    return bus.answer_commands(topic, ANSWER, answer)
+
+
+def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:
     """Why a command is refused, "" if it is not, and who sent it."""
     sender = "an unknown process"
     try:
-        if command.message != REINITIALIZE:
-            return f"{command.message[:100]!r} is no {REINITIALIZE}", sender
+        if command.message != message:
+            return f"{command.message[:100]!r} is no {message}", sender
         check_sample(command)
     except MessageError as error:
         return str(error), sender
-    header = Reinitialize.FromString(command.payload).header
+    header = _SCHEMAS[message].FromString(command.payload).header
     if header.boot_id:
         sender = f"process {header.boot_id} on {header.host_clock}"
     return "" if header.rig == rig else f"it is for rig {header.rig!r}", sender
 
 
-def _seed(command: Sample) -> Pixel | None:
-    parsed = Reinitialize.FromString(command.payload)
+def _seed(payload: bytes) -> Pixel | None:
+    parsed = Reinitialize.FromString(payload)
     return (parsed.seed.column, parsed.seed.row) if parsed.HasField("seed") else None

@@ -152,6 +152,7 @@ SCHEMAS: Mapping[str, type[Message]] = {
         PointCloud_pb2.PointCloud,
         common_pb2.Header,
         command_pb2.Reinitialize,
+        command_pb2.Record,
         command_pb2.CommandAnswer,
         FileDescriptorSet,
     )
@@ -169,5 +170,6 @@ _TOPICS: Mapping[type[Message], Callable[[Any], str]] = {
     FrameTransforms_pb2.FrameTransforms: lambda message: keys.TRANSFORMS,
     common_pb2.Header: lambda message: keys.clock(message.host_clock),
     command_pb2.Reinitialize: lambda message: keys.reinitialize(message.tracker),
+    command_pb2.Record: lambda message: keys.RECORD,
     FileDescriptorSet: lambda message: keys.SCHEMA,
 }

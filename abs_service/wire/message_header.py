@@ -91,6 +91,7 @@ POINTS = PointCloud_pb2.PointCloud.DESCRIPTOR.full_name
 SCENE = SceneUpdate_pb2.SceneUpdate.DESCRIPTOR.full_name
 MODEL = sensor_model_pb2.SensorModel.DESCRIPTOR.full_name
 CONFIG = sensor_model_pb2.Config.DESCRIPTOR.full_name
+HEALTH = health_pb2.Health.DESCRIPTOR.full_name
 TOPOLOGY = deformed_mesh_pb2.MeshTopology.DESCRIPTOR.full_name
 
 #: Full names of all messages that a rig publishes.

@@ -82,7 +82,7 @@ def test_from_a_device_to_the_frames_of_a_reader(benchmark, open_bus):
 
 
 def test_into_a_recording(benchmark, tmp_path):
-    file = RecordingFile(tmp_path, "demo", CLOCK.wall(CLOCK.monotonic()), {})
+    file = RecordingFile(tmp_path / "demo.mcap", CLOCK.wall(CLOCK.monotonic()), {})
     exposures = Exposures()
 
     def write():

@@ -5,19 +5,26 @@ import shutil
 
 from abs_service import config
 from abs_service.recording import forecast
+from abs_service.recording.recording_file import ESTIMATES
 from abs_service.recording.retention import Retention
 
 
-def retention(rig: config.ServiceConfig) -> Retention:
+def recordings(rig: config.ServiceConfig) -> Retention:
     """What is kept of the recordings."""
     table = rig.record
-    return Retention(table.directory, rig.name, table.retain_s or math.inf, table.retain_bytes or math.inf)
+    return Retention(table.directory, rig.name, "", table.retain_s or math.inf, table.retain_bytes or math.inf)
+
+
+def estimates(rig: config.ServiceConfig) -> Retention:
+    """What is kept of the files that have the estimates alone."""
+    table = rig.record
+    limits = table.retain_estimates_s or math.inf, table.retain_estimates_bytes or math.inf
+    return Retention(table.directory, rig.name, ESTIMATES, *limits)
 
 
 def lasts(rig: config.ServiceConfig, rate: float) -> str:
-    """How long the disk lasts at a rate of recording [bytes/s], see `forecast.text`."""
-    kept = retention(rig)
-    folder = next(path for path in (kept.directory, *kept.directory.parents) if path.is_dir())
+    """How long the disk lasts at a rate of recording [bytes/s], without estimates, see `forecast.text`."""
+    directory = rig.record.directory
+    folder = next(path for path in (directory, *directory.parents) if path.is_dir())
     room = shutil.disk_usage(folder).free - rig.record.minimum_free_bytes
-    used = sum(file.size for file in kept.files())
-    return forecast.text(rate, room, used, kept.retain_s, kept.retain_bytes)
+    return forecast.text(recordings(rig).growth(rate), estimates(rig).growth(0.0), room)

@@ -165,7 +165,7 @@ def _record(streams: Sequence[Sequence[Frame]], depth: ImageCodec, color: ImageC
     """Records sets of images as the recorder does, without its queue."""
     encode, set_s = encoded_image.encoder(depth, color), []
     with tempfile.TemporaryDirectory() as folder:
-        file = RecordingFile(Path(folder), "rig", 0, {})
+        file = RecordingFile(Path(folder) / "rig.mcap", 0, {})
         for seq, frames in enumerate(zip(*streams), 1):
             published = [images.as_stream(frame, f"s{number}", seq) for number, frame in enumerate(frames)]
             payloads = [codec.encode_image(frame, seq) for frame in published]

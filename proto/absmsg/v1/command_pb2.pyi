@@ -23,6 +23,14 @@ class Reinitialize(_message.Message):
     seed: Reinitialize.Pixel
     def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., tracker: _Optional[str] = ..., seed: _Optional[_Union[Reinitialize.Pixel, _Mapping]] = ...) -> None: ...
 
+class Record(_message.Message):
+    __slots__ = ("header", "recording")
+    HEADER_FIELD_NUMBER: _ClassVar[int]
+    RECORDING_FIELD_NUMBER: _ClassVar[int]
+    header: _common_pb2.Header
+    recording: bool
+    def __init__(self, header: _Optional[_Union[_common_pb2.Header, _Mapping]] = ..., recording: _Optional[bool] = ...) -> None: ...
+
 class CommandAnswer(_message.Message):
     __slots__ = ("header", "accepted", "reason", "region")
     HEADER_FIELD_NUMBER: _ClassVar[int]

@@ -224,6 +224,8 @@ def test_mistakes_are_told_with_those_of_the_calibration_file(tmp_path):
 def test_a_recording_that_begins_with_tracking_needs_a_tracker():
     (found,) = mistakes(SENSORS + '[record]\nbegin = "tracking"\n')
     assert found == 'record.begin = "tracking": the rig has no tracker to wait for; allowed is "start"'
+    (found,) = mistakes(SENSORS + '[record]\nwhen = "not_tracking"\n')
+    assert found == 'record.when = "not_tracking": the rig has no tracker; allowed are "always" and "asked"'
 
 
 def test_a_tracker_needs_sensors_with_noise_models_and_a_reference():

@@ -8,8 +8,10 @@ from abs_service.bus import keys
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recorder import Recorder
+from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
+from abs_service.recording.trigger import ALWAYS, Trigger
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
@@ -22,13 +24,20 @@ DEPTH = keys.image("tof", "depth")
 class Rig:
     """A rig on a loopback bus, with a recorder."""
 
-    def __init__(self, directory, free_bytes=lambda folder: 1 << 40, open_file=open_for_writing, **settings):
+    def __init__(
+        self,
+        directory,
+        free_bytes=lambda folder: 1 << 40,
+        open_file=open_for_writing,
+        trigger: Trigger = ALWAYS,
+        **settings,
+    ):
         self.bus = LoopbackBus()
         self.clock = WallClock()
         self.headers = HeaderFactory("demo", self.clock)
         self.health = Health(self.bus, "record", self.headers)
         settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)
-        self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes, RETRY_S)
+        self.recorder = Recorder(self.bus, settings, self.health, self.clock, open_file, free_bytes, RETRY_S, trigger)
 
     def publish_image(self, frame):
         header = self.headers.at(frame.t_host_ns, frame.seq)

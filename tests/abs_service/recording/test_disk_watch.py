@@ -9,6 +9,8 @@ from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.recording import forecast
 from abs_service.recording.disk_watch import DiskWatch
+from abs_service.recording.forecast import Growth
+from abs_service.recording.recording_file import ESTIMATES
 from abs_service.recording.retention import Retention
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.recording.test_retention import DAY_NS, NOW_NS, put, take
@@ -30,7 +32,31 @@ MB = 1_000_000
     ],
 )
 def test_a_forecast(rate, room, used, retain_s, retain_bytes, expected):
-    assert forecast.text(rate, room, used, retain_s, retain_bytes) == expected
+    recordings = Growth(rate, used, retain_s, retain_bytes)
+    assert forecast.text(recordings, Growth(0.0, 0, math.inf, math.inf), room) == expected
+
+
+@pytest.mark.parametrize(
+    ("retain_s", "retain_bytes", "expected"),
+    [
+        (math.inf, math.inf, "2.8 hours on this disk"),  # nothing is deleted: 50 MB/s
+        (3600.0, math.inf, "19.0 hours on this disk"),  # 180 GB in the first hour, then estimates alone: 5 MB/s
+        (3600.0, 180_000 * MB, "the last 60.0 min are kept, estimates of 10.0 hours"),
+    ],
+)
+def test_estimates_that_are_kept_for_longer_fill_the_disk_later(retain_s, retain_bytes, expected):
+    recordings, estimates = Growth(45 * MB, 0, retain_s, math.inf), Growth(5 * MB, 0, math.inf, retain_bytes)
+    assert forecast.text(recordings, estimates, 504_000 * MB) == expected
+
+
+def test_the_forecast_is_when_a_disk_written_second_by_second_is_full():
+    kinds = Growth(7.0, 40, 30.0, math.inf), Growth(2.0, 0, math.inf, 500.0), Growth(0.0, 9, math.inf, math.inf)
+    room, seconds, used = 600.0, 0, [kind.used for kind in kinds]
+    while sum(used) - sum(kind.used for kind in kinds) < room:
+        seconds += 1
+        used = [min(size + k.rate, max(k.used, k.used + k.more)) for size, k in zip(used, kinds)]
+    assert seconds == math.ceil(forecast.room_s(kinds, room))
+    assert forecast.room_s(kinds, room + 100) == math.inf
 
 
 def test_the_rate_is_that_of_the_last_minute():
@@ -49,14 +75,15 @@ class Watch:
         clock = WallClock(lambda: self.now_ns, lambda: NOW_NS + self.now_ns + self.jump_ns)
         self.clock, self.bus = clock, LoopbackBus()
         self.health = Health(self.bus, "record", HeaderFactory("demo", clock))
-        retention = Retention(folder, "demo", retain_s, retain_bytes)
-        self.watch = DiskWatch(retention, 0, self.health, clock, lambda folder: free)
+        recordings = Retention(folder, "demo", "", retain_s, retain_bytes)
+        estimates = Retention(folder, "demo", ESTIMATES, math.inf, math.inf)
+        self.watch = DiskWatch(recordings, estimates, 0, self.health, clock, lambda folder: free)
 
     def pass_seconds(self, seconds):
         for _ in range(seconds):
             self.now_ns += 10**9
             self.clock.measure()
-            self.watch.look(self.now_ns // 100)
+            self.watch.look((self.now_ns // 100, 0))
         return health_now(self.health, self.bus)
 
 
@@ -72,6 +99,14 @@ def test_old_recordings_are_deleted_and_counted(tmp_path):
         put(tmp_path, take(day), 8 - day)
     said = Watch(tmp_path, 1, retain_s=4.5 * 86_400).pass_seconds(11)
     assert (said.counters["deleted"], said.labels["deleted"]) == (3, take(3))
+
+
+def test_estimates_outlive_their_recordings(tmp_path):
+    names = (take(1), take(1).replace(".mcap", "_estimates.mcap"))
+    for name in names:
+        put(tmp_path, name, 7)
+    Watch(tmp_path, 1, retain_s=86_400).pass_seconds(11)
+    assert [path.name for path in tmp_path.iterdir()] == [names[1]]
 
 
 def test_a_wall_clock_that_jumps_by_years_makes_no_recording_old(tmp_path):
@@ -93,5 +128,6 @@ def test_what_cannot_be_deleted_is_said(tmp_path, monkeypatch):
 
 def test_without_a_folder_there_is_no_forecast(tmp_path):
     watch = Watch(tmp_path, 1)
-    watch.watch = DiskWatch(Retention(tmp_path / "gone", "demo", 1.0, 1.0), 0, watch.health, watch.clock)
+    gone = Retention(tmp_path / "gone", "demo", "", 1.0, 1.0)
+    watch.watch = DiskWatch(gone, gone, 0, watch.health, watch.clock)
     assert watch.pass_seconds(30).labels["forecast"] == ""

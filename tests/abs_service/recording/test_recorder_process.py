@@ -2,6 +2,7 @@
 
 import queue
 import random
+import re
 import resource
 import signal
 import threading
@@ -203,6 +204,46 @@ def test_the_oldest_recordings_are_deleted_as_the_configuration_says(rig, endpoi
         health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
         assert health.labels["forecast"].startswith("the last ")
         assert not (rig.parent / "kept" / health.labels["deleted"]).exists()
+
+
+def test_estimates_of_deleted_recordings_are_kept_as_the_configuration_says(rig, endpoint, launch):
+    rig.write_text(rig.read_text() + "rotate_bytes = 100_000\nretain_bytes = 1_000_000\nestimates = true\n")
+    recorder = launch("record", rig)
+    with Stream(endpoint) as stream:
+        health = stream.wait_for(lambda health: health.counters["deleted"] > 0)
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 0
+    names = {path.name.removesuffix(".mcap") for path in rig.parent.glob("kept/*.mcap")}
+    assert health.labels["deleted"].removesuffix(".mcap") not in names
+    assert health.labels["deleted"].removesuffix(".mcap") + "_estimates" in names
+    assert {f"{name}_estimates" for name in names if not name.endswith("_estimates")} < names
+
+
+def test_it_records_with_what_was_before_when_it_is_asked_and_goes_on_after_a_kill(rig, endpoint, launch):
+    rig.write_text(rig.read_text() + 'when = "asked"\npre_roll_s = 0.5\n')
+    with Stream(endpoint) as stream:
+        recorder = launch("record", rig)
+        stream.wait_for(lambda health: health.labels["trigger"] == "waits, and holds the last 1 s")
+        assert not list(rig.parent.glob("kept/*"))
+        asked_s = time.time()
+        assert launch("trigger", rig).wait(20) == 0
+        stream.wait_for(is_recording)
+        recorder.send_signal(signal.SIGKILL)
+        recorder.wait()
+        recorder = launch("record", rig)
+        stream.wait_for(lambda health: health.labels["trigger"] == "asked for" and is_recording(health))
+        assert launch("trigger", rig, "--stop").wait(20) == 0
+        health = stream.wait_for(
+            lambda health: health.labels["trigger"].startswith("waits") and not health.labels["file"]
+        )
+        assert re.fullmatch(r"record from process \w+ on \S+: accepted", health.labels["command"])
+        recorder.send_signal(signal.SIGTERM)
+        assert recorder.wait(5) == 0
+    first, second = sorted(rig.parent.glob("kept/*.mcap"))
+    for path in (first, second):
+        saved = frames(path)
+        assert [seq for seq, _ in saved] == list(range(saved[0][0], saved[-1][0] + 1))
+    assert frames(first)[0][1] > asked_s - 0.6
 
 
 def test_sigterm_while_frames_come_ends_with_a_complete_file(rig, endpoint, launch):

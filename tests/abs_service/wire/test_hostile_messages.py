@@ -26,7 +26,8 @@ from abs_service.commands import track
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import draw
 from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
-from abs_service.recording.recorder import Recorder, RecorderSettings
+from abs_service.recording.recorder import Recorder
+from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.supervision.rig_view import Display
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Supervisor

@@ -37,6 +37,7 @@ PUBLISHERS = {
     "sheet/topology": "tracker",
     "sheet/reinitialize": "tracker",
     "health/track/sheet": "tracker",
+    "record": "recorder",
     "health/record": "recorder",
     "health/run": "rig",
     "anything": "rig",
@@ -166,6 +167,18 @@ def test_commands_are_for_operators(name, rig, secured):
     assert not acted
 
 
+@pytest.mark.parametrize("name", [*CLIENTS, "rig"])
+def test_only_operators_tell_the_recorder(name, rig, secured):
+    acted = []
+    headers, recorder = HeaderFactory("demo", WallClock()), secured("recorder")
+    health = Health(LoopbackBus(), "record", headers)
+    commands.answer_record(recorder, headers, health, lambda recording: acted.append(recording) or "")
+    assert eventually(lambda: commands.record(rig, headers, False, 1.0) is not None)
+    answer = commands.record(secured(name), headers, True, 1.0)
+    allowed = name in ("operator", "rig")
+    assert (answer is not None and answer.accepted, True in acted) == (allowed, allowed)
+
+
 def test_who_connects_is_in_the_log_of_the_router(rig, secured, caplog):
     with caplog.at_level(logging.INFO, "abs_service.bus.security.link_log"):
         secured("operator").close()
@@ -181,6 +194,7 @@ def test_every_topic_of_the_bus_has_a_publisher():
             topics.TRANSFORMS,
             topics.CONFIG,
             topics.SCHEMA,
+            topics.RECORD,
         ),
         *(part("a") for part in (topics.calibration, topics.model, topics.truth, topics.clock)),
         *(part("a") for part in (topics.state, topics.mesh, topics.scene, topics.topology, topics.reinitialize)),
