@@ -47,11 +47,11 @@ def answer_reinitialize(
     def on_command(payload: bytes) -> str:
         return act(_seed(payload))
 
-    def detail(payload: bytes) -> str:
+    def where(payload: bytes) -> str:
         seed = _seed(payload)
         return f" at {list(seed)}" if seed else ""
 
-    return _answer(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, detail)
+    return _answer(bus, keys.reinitialize(tracker), REINITIALIZE, headers, health, on_command, where)
 
 
 def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callable[[bool], str]) -> Subscription:
@@ -69,7 +69,10 @@ def answer_record(bus: Bus, headers: HeaderFactory, health: Health, act: Callabl
             raise RefusedError(reason)
         return ""
 
-    return _answer(bus, keys.RECORD, RECORD, headers, health, on_command, lambda _: "")
+    def which(payload: bytes) -> str:
+        return " on" if Record.FromString(payload).recording else " off"
+
+    return _answer(bus, keys.RECORD, RECORD, headers, health, on_command, which)
 
 
 def reinitialize(
@@ -106,37 +109,30 @@ def _answer(
     headers: HeaderFactory,
     health: Health,
     act: Callable[[bytes], str],
-    detail: Callable[[bytes], str],
+    details: Callable[[bytes], str],
 ) -> Subscription:
     """Answers commands on a topic.
 
-    Args:
-        bus: of the rig.
-        topic: of the commands.
-        message: full name of their type.
-        headers: of the answers.
-        health: where they are counted and told.
-        act: gets the payload of those that are valid, and returns the answer's `region`, or raises RefusedError.
-        detail: what else is told of a valid command.
+    `act` gets the payload of those that are valid and returns the answer's region or raises RefusedError; `details`
+    makes what the log says of them.
     """
 
     def answer(command: Sample) -> bytes:
         reason, sender = _refusal(command, message, headers.rig)
-        region, what = "", topic
+        region, said = "", ""
         if not reason:
-            what += detail(command.payload)
+            said = details(command.payload)
             try:
                 region = act(command.payload)
             except RefusedError as error:
                 reason = str(error)
         count = health.counted("commands.refused" if reason else "commands.accepted")
-        line = printable(f"{what} from {sender}: {reason or 'accepted'}")
+        line = printable(f"{topic}{said} from {sender}: {reason or 'accepted'}")
         _log.warning("command %d: %s", count, line)
         health.label("command", line)
-        said = CommandAnswer(
+        return CommandAnswer(
             header=headers.now(count), accepted=not reason, reason=printable(reason), region=printable(region)
-        )
-        return said.SerializeToString()
+        ).SerializeToString()
 
     return bus.answer_commands(topic, ANSWER, answer)
 

@@ -236,7 +236,7 @@ def test_it_records_with_what_was_before_when_it_is_asked_and_goes_on_after_a_ki
         health = stream.wait_for(
             lambda health: health.labels["trigger"].startswith("waits") and not health.labels["file"]
         )
-        assert re.fullmatch(r"record from process \w+ on \S+: accepted", health.labels["command"])
+        assert re.fullmatch(r"record off from process \w+ on \S+: accepted", health.labels["command"])
         recorder.send_signal(signal.SIGTERM)
         assert recorder.wait(5) == 0
     first, second = sorted(rig.parent.glob("kept/*.mcap"))
