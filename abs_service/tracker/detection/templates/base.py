@@ -33,13 +33,12 @@ class BindsToMesh(Protocol[Model_co]):
 
 
 class Sight(Protocol):
-    """Knowledge of the surface's place and appearance from the template and the first depth image.
+    """Knowledge of the surface's place and appearance from the template and the first depth image."""
 
-    Attributes:
-        placement_m: standard deviation of the place of the mesh at rest; 0 if the first depth image defines it [m].
-    """
-
-    placement_m: float
+    @property
+    def placement_m(self) -> float:
+        """Standard deviation of the place of the mesh at rest; 0 if the first depth image defines it [m]."""
+        ...
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
         """True for the vertices (n,) that the first depth image shows."""
