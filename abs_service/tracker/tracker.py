@@ -30,6 +30,7 @@ class Tracker:
         optimizer: proposes candidates.
         evaluations: maximum number of cost evaluations per frame.
         limits: thresholds of the status.
+        placement_m: standard deviation of the place of the mesh at rest; 0 if the first frame defines it [m].
 
     Attributes:
         model: see above.
@@ -42,13 +43,14 @@ class Tracker:
         optimizer: Optimizer,
         evaluations: int,
         limits: status.Settings,
+        placement_m: float = 0.0,
     ):
         self.model = model
         self._posterior = posterior
         self._optimizer = optimizer
         self._evaluations = evaluations
         self._limits = limits
-        self._uncertainty = Uncertainty(model, posterior.motion)
+        self._uncertainty = Uncertainty(model, posterior.motion, placement_m)
         self._shape_judge = ShapeJudge(model.mesh)
         self._is_warm = False
         self._last_tracked = model.rest

@@ -45,7 +45,7 @@ class Objective(Protocol):
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains."""
+        """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
         ...
 
 
@@ -82,10 +82,10 @@ class TermSum:
         return [term.fit(surface) for term in self._active]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains; the largest."""
-        none = np.zeros(surface.vertices.shape[2])
+        """Signed distance of each vertex from its measurements, the largest, and its deviation by noise (2, n) [m]."""
+        none = np.zeros((2, surface.vertices.shape[2]))
         return reduce(_larger, (term.misfit(surface) for term in self._active), none)
 
 
 def _larger(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.where(np.abs(one) >= np.abs(other), one, other)
+    return np.where(np.abs(one[0]) >= np.abs(other[0]), one, other)

@@ -1,9 +1,10 @@
 """Misfit of the model: where measurements disagree with the mesh by more than noise, the mesh is off by as much.
 
-A model of few parameters cannot follow every shape. Its covariance does not know: outliers have no part in it. Where it
-misses the shape, neighbouring vertices miss it to the same side; an outlier of the sensor stands alone. So the signed
-distances are averaged over each vertex and its neighbours, and the squares of these means, averaged once more, are
-added to the covariance of the vertices in all directions.
+A model of few parameters cannot follow every shape. Its covariance does not know: at the optimum, what its parameters
+can do balances the residuals, and outliers have no part in it. Where it misses the shape, neighbouring vertices miss it
+to the same side; noise and an outlier of the sensor stand alone. So the signed distances are averaged over each vertex
+and its neighbours. What the squares of these means have beyond three of their deviations by noise, averaged once more,
+is added to the covariance of the vertices in all directions.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ import scipy  # its parts are imported when they are first used
 from numpy.typing import NDArray
 
 from abs_service.tracker.mesh import Mesh
+from abs_service.tracker.terms.base import INLIER_DEVIATIONS
 
 
 class Misfit:
@@ -25,7 +27,10 @@ class Misfit:
         rows, columns = np.concatenate([edges, edges[:, ::-1], np.tile(np.arange(n)[:, None], 2)]).T
         ring = scipy.sparse.csr_array((np.ones(len(rows)), (rows, columns)), shape=(n, n))
         self._mean = scipy.sparse.csr_array(scipy.sparse.diags_array(1 / ring.sum(axis=1)) @ ring)
+        self._squared = self._mean.power(2)
 
-    def variance(self, excess: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Variance (n,) [m²] from signed distances (n,) [m] beyond what noise explains."""
-        return self._mean @ (self._mean @ excess) ** 2 if excess.any() else excess
+    def variance(self, distance: NDArray[np.float64], deviation: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variance (n,) [m²] from signed distances (n,) [m] of independent noise with a deviation (n,) [m]."""
+        noise = self._squared @ deviation**2
+        excess = np.maximum((self._mean @ distance) ** 2 - INLIER_DEVIATIONS**2 * noise, 0.0)
+        return self._mean @ excess

@@ -163,7 +163,7 @@ class FramePosterior:
         return self._fitted[1]
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Signed distance (n,) [m] of each vertex from its measurements beyond what noise explains."""
+        """Signed distance of each vertex from its measurements, and its deviation by noise (2, n) [m]."""
         return self._of.objective.misfit(surface)
 
     def outlier_share(self, theta: NDArray[np.float64]) -> float:

@@ -19,6 +19,7 @@ from abs_service.tracker.posterior.covariance import (
 )
 from abs_service.tracker.posterior.mesh_noise import MeshNoise
 from abs_service.tracker.posterior.misfit import Misfit
+from abs_service.tracker.posterior.placement import placement_covariance
 from abs_service.tracker.posterior.posterior import FramePosterior
 from abs_service.tracker.posterior.priors.motion_prior import MotionPrior
 from abs_service.tracker.posterior.propagation import ErrorPropagation
@@ -45,13 +46,14 @@ class Uncertainty:
     Args:
         model: the deformation model.
         motion: the motion prior.
+        placement_m: standard deviation of the place of the mesh at rest; 0 if the first frame defines it [m].
     """
 
-    def __init__(self, model: DeformationModel, motion: MotionPrior):
+    def __init__(self, model: DeformationModel, motion: MotionPrior, placement_m: float):
         self._motion = motion
         self._mesh_noise = MeshNoise(model)
         self._effects = DesignEffects(model.mesh)
-        self._errors = ErrorPropagation(len(model.rest))
+        self._errors = ErrorPropagation(placement_covariance(model, placement_m))
         self._misfit = Misfit(model.mesh)
         self._begun = False
 
@@ -82,11 +84,12 @@ class Uncertainty:
         shared = shared_covariance(near.sensed, len(theta))
         without_motion, least_precision = curvature - precision, self._motion.least_precision
         moved = unseen_motion(self._motion.unseen, without_motion, least_precision)
-        covariance = self._errors.update(self._motion.unpredicted, moved, inverse, scores, shared, precision)
+        motion = self._motion.unpredicted, moved, self._motion.persistence
+        covariance = self._errors.update(*motion, inverse, scores, shared, precision)
         vertices = (
             propagated(near.sparse_jacobian, covariance)
             + along_normals(surface, self._mesh_noise.variance)
-            + isotropic(self._misfit.variance(frame.misfit(surface)))
+            + isotropic(self._misfit.variance(*frame.misfit(surface)))
         )
         unheld_m = unheld_deviation(without_motion, least_precision, near.sparse_jacobian)
         return Covariances(covariance, vertices, unheld_m)

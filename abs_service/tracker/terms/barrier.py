@@ -58,7 +58,7 @@ class BarrierTerm:
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: a beam has no vertex."""
-        return np.zeros(())
+        return np.zeros((2, 1))
 
     def _crossing(self, surface: Surface) -> NDArray[np.bool_]:
         crossing = np.zeros(len(surface.vertices), np.bool_)

@@ -183,5 +183,5 @@ class Term(Protocol):
         ...
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Signed distance (n,) [m] of each vertex from its measurement beyond what noise explains; or one zero ()."""
+        """Signed distance of each vertex from its measurement, its deviation by noise (2, n) [m]; or zeros (2, 1)."""
         ...

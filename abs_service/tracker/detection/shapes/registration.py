@@ -117,6 +117,14 @@ def register(samples: Samples, detection: InitialDetection) -> Pose:
     return T_ro
 
 
+def placement_deviation(samples: Samples) -> float:
+    """Standard deviation of the place of a registered surface along itself [m].
+
+    Points that lie beside the surface by less than `REACH` draw on nothing, so that every place within it is alike.
+    """
+    return REACH * samples.thinned(STAGES[-1][0]).spacing / np.sqrt(3)
+
+
 def _distinct(fits: list[tuple[Pose, float]]) -> list[tuple[Pose, float]]:
     """Those of poses and their costs, the best first, that differ in rotation from all better ones."""
     kept: list[tuple[Pose, float]] = []

@@ -33,7 +33,12 @@ class BindsToMesh(Protocol[Model_co]):
 
 
 class Sight(Protocol):
-    """Knowledge of the surface's appearance from the template and the first depth image."""
+    """Knowledge of the surface's place and appearance from the template and the first depth image."""
+
+    @property
+    def placement_m(self) -> float:
+        """Standard deviation of the place of the mesh at rest; 0 if the first depth image defines it [m]."""
+        ...
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
         """True for the vertices (n,) that the first depth image shows."""
@@ -46,6 +51,8 @@ class Sight(Protocol):
 
 class AllSeen:
     """Sight of a mesh that was made from the first depth image: it shows every vertex."""
+
+    placement_m: float = 0.0
 
     def seen(self, mesh: Mesh) -> NDArray[np.bool_]:
         """True for all vertices (n,)."""

@@ -82,6 +82,11 @@ class MotionPrior:
         return (MARGIN * self._elapsed_s) ** 2 * self._innovations.squared_speed * self._metric.inverse
 
     @property
+    def persistence(self) -> float:
+        """Share of the last velocity that is predicted for the current frame, 0…1."""
+        return float(np.exp(-self._elapsed_s / self._settings.memory_s))
+
+    @property
     def _deviation_m(self) -> float:
         return self.speed * self._elapsed_s
 
@@ -93,7 +98,7 @@ class MotionPrior:
         self._t_ns = t_ns
         self.speed = self._next_speed
         self.reach_m = FARTHEST * self._settings.speed * self._elapsed_s if self._began else np.inf
-        travel = self._elapsed_s * np.exp(-self._elapsed_s / self._settings.memory_s)
+        travel = self._elapsed_s * self.persistence
         self.predicted = self._theta + travel * self._velocity
 
     def restart(self, theta: NDArray[np.float64]) -> None:

@@ -10,7 +10,7 @@ from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesis, Synthesizer
 from abs_service.tracker.synthesis.window import WHOLE, Bordered, Placed, Window, corner, within
-from abs_service.tracker.terms.base import INLIER_DEVIATIONS, Bounds, SensorFit, facing, summarize
+from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
 from abs_service.tracker.terms.depth.background import Background, dropouts
 from abs_service.tracker.terms.depth.depth_cost import (
     FREE_SCALE_M,
@@ -193,21 +193,22 @@ class DepthTerm:
         )
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
-        """Signed distance (n,) [m] of each vertex from its measurement beyond what noise explains.
+        """Signed distance of each vertex from its measurement, and the deviation of that by noise (2, n) [m].
 
-        In free space it is that from the object. Zero where nothing is measured, and everywhere if the samples of the
-        synthesis are not the vertices.
+        In free space it is that from the object, without noise. Zero where nothing is measured, and everywhere if the
+        samples of the synthesis are not the vertices.
         """
         seen = self._view.synthesize(surface)
         if seen.pixel.shape[1] != surface.vertices.shape[2]:
-            return np.zeros(())
+            return np.zeros((2, 1))
         residual, inverse, cost = self._residuals(seen)
         pixel = np.maximum(seen.pixel[0], 0)
-        excess = np.sqrt(np.maximum(residual**2 - INLIER_DEVIATIONS**2, 0.0)) / np.maximum(inverse, 1e-9)
-        signed = np.copysign(np.minimum(excess, LARGEST_MISFIT_M), residual)
+        deviation = 1 / np.maximum(inverse, 1e-9)
+        signed = np.clip(residual * deviation, -LARGEST_MISFIT_M, LARGEST_MISFIT_M)
         free = self._free_m.ravel()[pixel].astype(np.float64)
         usable = (seen.pixel[0] > 0) & ~(self._obscured[pixel] | self._doubtful[pixel])
-        return np.where(usable, np.where(cost < np.inf, signed, free), 0.0)
+        measured = cost < np.inf
+        return np.stack([np.where(measured, signed, free), np.where(measured, deviation, 0.0)]) * usable
 
     def _residuals(self, seen: Synthesis) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, inverse deviation, and unbounded cost, infinite without a measurement, each (n,)."""

@@ -134,7 +134,7 @@ class ChannelTerm:
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: brightness carries no distance."""
-        return np.zeros(())
+        return np.zeros((2, 1))
 
     def _slopes(self, surface: Surface) -> NDArray[np.float64]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].

@@ -114,7 +114,7 @@ class ColorTerm:
 
     def misfit(self, surface: Surface) -> NDArray[np.float64]:
         """Zero: colours carry no distance."""
-        return np.zeros(())
+        return np.zeros((2, 1))
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Normalised residuals (n, 3) and mask of the measured samples (n,)."""

@@ -30,29 +30,53 @@ def test_it_is_the_covariance_of_the_errors_when_a_share_of_the_noise_is_that_of
             score = lasting + np.sqrt(1 - LASTING) * half @ generator.standard_normal(DIM)
             error = inverse @ (PRECISION @ (error + moved) + score)
         errors.append(error)
-    propagation, found = ErrorPropagation(DIM), np.eye(DIM)
+    propagation, found = ErrorPropagation(NONE), np.eye(DIM)
     for _ in range(FRAMES):
-        found = propagation.update(step**2 * np.eye(DIM), NONE, inverse, measured + PRECISION, NONE, PRECISION)
+        found = propagation.update(step**2 * np.eye(DIM), NONE, 0.0, inverse, measured + PRECISION, NONE, PRECISION)
     scale = np.sqrt(np.outer(np.diag(found), np.diag(found)))
     np.testing.assert_allclose(np.cov(np.transpose(errors)) / scale, found / scale, atol=0.08)
 
 
 def test_what_nothing_holds_grows_with_every_frame_and_what_is_measured_does_not():
     measured, inverse = setting()
-    propagation, moved = ErrorPropagation(DIM), np.diag([0.1, 0.1, 0.2]) ** 2
+    propagation, moved = ErrorPropagation(NONE), np.diag([0.1, 0.1, 0.2]) ** 2
     scores = measured + PRECISION
-    found = [np.diag(propagation.update(NONE, moved, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
+    found = [np.diag(propagation.update(NONE, moved, 0.0, inverse, scores, NONE, PRECISION)) for _ in range(FRAMES)]
     assert found[0][2] == pytest.approx(0, abs=1e-12)  # the first frame defines where the points are
     np.testing.assert_allclose(np.diff([variance[2] for variance in found]), 0.2**2, rtol=1e-6)
     assert found[-1][0] < 1.5 * found[5][0]
 
 
+def test_a_motion_that_nothing_shows_goes_on_as_it_began():
+    """Errors of an object whose velocity lasts: far larger than those of a random walk of the same size."""
+    persistence, step, frames, generator, ends = 0.7, 0.3, 20, np.random.default_rng(2), []
+    for _ in range(4000):
+        error, motion = np.zeros(DIM), step * generator.standard_normal(DIM)
+        for _ in range(frames):
+            error = error + motion
+            motion = persistence * motion + np.sqrt(1 - persistence**2) * step * generator.standard_normal(DIM)
+        ends.append(error)
+    propagation, found = ErrorPropagation(NONE), NONE
+    unmeasured = np.asarray(np.linalg.inv(PRECISION))  # with it, the gain is one
+    for _ in range(frames + 1):
+        found = propagation.update(NONE, step**2 * np.eye(DIM), persistence, unmeasured, PRECISION, NONE, PRECISION)
+    np.testing.assert_allclose(np.diag(found), np.var(ends, axis=0), rtol=0.08)
+    assert found[0, 0] > 4 * frames * step**2
+
+
+def test_a_template_begins_with_the_error_of_its_place():
+    _, inverse = setting()
+    found = ErrorPropagation(4 * np.eye(DIM)).update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
+    assert found[2, 2] == pytest.approx(4)  # nothing measures it
+    assert found[0, 0] < 0.5
+
+
 def test_after_a_relocation_it_begins_with_what_that_leaves_open():
     _, inverse = setting()
-    propagation = ErrorPropagation(DIM)
-    propagation.update(NONE, NONE, inverse, PRECISION, NONE, PRECISION)
+    propagation = ErrorPropagation(NONE)
+    propagation.update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
     propagation.restart(25 * np.eye(DIM))
-    found = propagation.update(NONE, NONE, inverse, PRECISION, NONE, PRECISION)
+    found = propagation.update(NONE, NONE, 0.0, inverse, PRECISION, NONE, PRECISION)
     assert found[2, 2] == pytest.approx(25)
 
 

@@ -7,6 +7,7 @@ from trimesh.visual import ColorVisuals
 
 import abs_service as a
 from calib import pose
+from evaluation.coverage import inside_region
 from tests.abs_service.tracker.detection.templates.scenes import CAMERA, NOISE, SIGMA_M, Box, Ellipsoid, Scene, print_of
 
 SEEDS = (1, 2, 3)
@@ -98,6 +99,33 @@ def test_a_sheet_of_known_size_is_tracked_as_a_whole(model, board):
         assert diagonal == pytest.approx(np.hypot(*SHEET), rel=0.005)
 
 
+@pytest.mark.parametrize("model", [a.Rigid(), a.FlexPad(), a.Nurbs()], ids=["rigid", "flexpad", "nurbs"])
+def test_the_first_covariance_contains_the_error_of_the_registration(model):
+    """Two fifths of the sheet are hidden, and no outline corrects where the registration has laid it."""
+    inside, registered = [], []
+    for seed in SEEDS:
+        template = {"type": "sheet", "size": SHEET}
+        tracker = a.Tracker(
+            CAMERA, model, noise=NOISE, template=template, objective={"type": "likelihood", "outline_px": 0.0}
+        )
+        at = pose.from_rotation_vector(np.random.default_rng(seed).uniform(-0.35, 0.35, 3), [0.0, 0.0, 0.7])
+        estimate, scene = next(follow(tracker, Scene(FLAT.shape, at, BOARD), seed))
+        grid = (np.asarray(estimate.undeformed) - np.mean(estimate.undeformed, axis=0)) @ scene.T_ro[:3, :3]
+        places = pose.transform(scene.T_ro, nearest_places(grid))
+        registered.append(np.linalg.norm(estimate.undeformed - places, axis=1).mean())
+        inside.append(np.mean(inside_region(estimate.vertices - places, estimate.vertex_covariance)))
+    print(f"registration off by {1e3 * np.mean(registered):.1f} mm, {np.mean(inside):.1%} in their 95 % regions")
+    assert np.mean(registered) > 0.003
+    assert np.mean(inside) > 0.9
+
+
+def nearest_places(points):
+    """The vertices of the sheet's grid (n, 3) [m] nearest to points (n, 3) in its frame."""
+    size, cells = np.array((*SHEET, 0.0)), np.array((20, 13, 1))
+    steps = np.clip(np.round((points / np.where(size, size, 1) + 0.5) * cells), 0, cells)
+    return (steps / cells - 0.5) * size
+
+
 def is_behind(board, points):
     """True for points (n, 3) [m] behind a board."""
     if not board:
@@ -109,10 +137,9 @@ def is_behind(board, points):
 
 def sheet_errors(estimate, scene):
     """Distances (n,) [m] of vertices from their places on the true sheet: those of the nearest vertex of its grid."""
-    points, size, cells = in_object(estimate, scene), np.array((*SHEET, 0.0)), np.array((20, 13, 1))
+    points = in_object(estimate, scene)
     assert len(points) == 21 * 14
-    steps = np.clip(np.round((points / np.where(size, size, 1) + 0.5) * cells), 0, cells)
-    return np.linalg.norm(points - (steps / cells - 0.5) * size, axis=1)
+    return np.linalg.norm(points - nearest_places(points), axis=1)
 
 
 def test_sides_that_come_into_sight_have_no_colour_and_count_for_nothing(files):

@@ -1,0 +1,23 @@
+"""Covariance of Θ by the pose in which a template was found: it is laid over the first image as a rigid body."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from abs_service.tracker.models.base import DeformationModel
+
+
+def placement_covariance(model: DeformationModel, deviation: float) -> NDArray[np.float64]:
+    """Covariance (dim, dim) of errors that displace and turn the mesh at rest as a whole.
+
+    Args:
+        model: the deformation model; changes of theta follow the displacements as well as they can.
+        deviation: standard deviation of a displacement along each axis, and of what a turn about each does to a vertex
+            at the radius of gyration [m].
+    """
+    arms = model.mesh.vertices - model.mesh.vertices.mean(axis=0)
+    radius = max(float(np.sqrt(np.mean(np.sum(arms**2, axis=1)))), np.finfo(float).eps)
+    shifts = np.broadcast_to(np.eye(3), (len(arms), 3, 3))
+    turns = np.cross(np.eye(3)[None], arms[:, None] / radius).transpose(0, 2, 1)
+    moves = np.concatenate([shifts, turns], axis=2).reshape(-1, 6)
+    changes = np.asarray(np.linalg.lstsq(model.jacobian(model.rest).reshape(len(moves), -1), moves)[0], np.float64)
+    return deviation**2 * changes @ changes.T
