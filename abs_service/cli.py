@@ -43,8 +43,14 @@ COMMANDS = {
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
-#: Modules that are not called as their command is.
-MODULES = {"import": "images.import_images", "new": "new.new"}
+#: Modules of `abs_service.commands` that do not lie there under the name of their command.
+MODULES = {
+    "import": "images.import_images",
+    "new": "new.new",
+    **{name: f"running.{name}" for name in ("reinitialize", "status", "trigger", "view")},
+    **{name: f"processes.{name}" for name in ("capture", "record", "track")},
+    **{name: f"recordings.{name}" for name in ("export", "info", "recover")},
+}
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads
 #: cost time, and BLAS its order of summation. One thread in each process is also what shares the cores fairly.

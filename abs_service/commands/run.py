@@ -26,8 +26,8 @@ from abs_service import config
 from abs_service.bus import keys
 from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
-from abs_service.commands import view
 from abs_service.commands.parts import logs, rig_process
+from abs_service.commands.running import view
 from abs_service.display import journal
 from abs_service.display.journal import JournalDisplay
 from abs_service.display.lines import JsonDisplay, PlainDisplay

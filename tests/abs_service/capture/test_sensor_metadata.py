@@ -17,9 +17,9 @@ from abs_service.bus import keys
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
-from abs_service.commands import capture as command
-from abs_service.commands.capture import MetadataPublisher
 from abs_service.commands.parts.rig_devices import HeadError
+from abs_service.commands.processes import capture as command
+from abs_service.commands.processes.capture import MetadataPublisher
 from abs_service.wire.message_header import MESSAGES
 from calib import pose
 from calib.lenses.fisheye import KannalaBrandt

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from abs_service import cli
-from abs_service.commands import check, reinitialize
+from abs_service.commands import check
+from abs_service.commands.running import reinitialize
 from abs_service.supervision.exit_codes import Exit
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service import cli
-from abs_service.commands import export
+from abs_service.commands.recordings import export
 from abs_service.supervision.exit_codes import Exit
 from drivers.encoding import encoded_image
 from drivers.encoding.encoded_image import ImageCodec

@@ -8,7 +8,7 @@ from abs_service.bus.contract import STATE
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.cli import main
-from abs_service.commands import reinitialize
+from abs_service.commands.running import reinitialize
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
 

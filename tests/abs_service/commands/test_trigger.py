@@ -4,7 +4,7 @@ import pytest
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import trigger
+from abs_service.commands.running import trigger
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
 

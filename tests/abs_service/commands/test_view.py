@@ -6,7 +6,8 @@ import pytest
 
 from abs_service import config
 from abs_service.cli import command_parser, main
-from abs_service.commands import run, view
+from abs_service.commands import run
+from abs_service.commands.running import view
 
 
 @pytest.mark.parametrize(

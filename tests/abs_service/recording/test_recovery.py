@@ -14,7 +14,7 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import recover as command
+from abs_service.commands.recordings import recover as command
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec

@@ -22,7 +22,7 @@ from abs_service.bus.contract import Sample
 from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import track
+from abs_service.commands.processes import track
 from abs_service.display.lines import JsonDisplay, PlainDisplay
 from abs_service.display.table import draw
 from abs_service.pairing.synchroniser import FOREIGN, Synchroniser

@@ -1,0 +1,1 @@
+"""The processes of `run`, each as a command of its own."""
