@@ -43,7 +43,7 @@ COMMANDS = {
     "record": "only the recorder: subscribe to everything, write MCAP files",
 }
 
-#: Modules of `abs_service.commands` that do not lie there under the name of their command.
+#: Modules of `abs_service.commands` that do not lie there under the name of their command, by its whole name.
 MODULES = {
     "import": "images.import_images",
     "new": "new.new",
@@ -103,7 +103,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return Exit.USER
         chosen = parser.parse_args(given[:1]).command
         name, given = f"{name} {chosen}".strip(), given[1:]
-        path = f"{module.__name__}.{MODULES.get(chosen, chosen)}"
+        path = f"{module.__name__}.{MODULES.get(name, chosen)}"
         parent_watchdog.load_gently(path)
         module = import_module(path)
         commands = getattr(module, "COMMANDS", {})

@@ -116,8 +116,8 @@ def _commands() -> str:
 def _help(name: str, commands: Mapping[str, str], package: str) -> Iterator[str]:
     os.environ["COLUMNS"] = "100"
     for command in commands:
-        module = import_module(f"{package}.{cli.MODULES.get(command, command)}")
         full = f"{name} {command}".strip()
+        module = import_module(f"{package}.{cli.MODULES.get(full, command)}")
         if below := getattr(module, "COMMANDS", None):
             yield from _help(full, below, module.__name__)
         else:

@@ -9,7 +9,7 @@ from calib import pose
 from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
-from calib.solve.bundle.adjustment import adjust
+from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import Formulation, formulate, groups_of
 from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters, Layout
 from calib.solve.bundle.parameters.lens_parameters import kind_of
@@ -17,13 +17,21 @@ from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates
+from calib.solve.validation.diagnoses import unlike_the_rest
 
 
 def solve(stored: Stored, views: Views, moving: Collection[str]) -> Solution:
-    """Board poses and the poses of `moving` sensors, with estimated deviations."""
+    """Board poses and the poses of `moving` sensors, with estimated deviations.
+
+    Raises:
+        NotSolvedError: no convergence; names the shots that even the stored calibration explains worst.
+    """
     equations = formulation(stored, views, moving)
-    count = len(groups_of(equations.task))
-    return Solution(equations.task, adjust(equations, _start(stored, views), count, lambda _: None))
+    start, count = _start(stored, views), len(groups_of(equations.task))
+    try:
+        return Solution(equations.task, adjust(equations, start, count, lambda _: None))
+    except NotSolvedError as error:
+        raise NotSolvedError(f"{error}{unlike_the_rest(equations.task, start)}") from error
 
 
 def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = ()) -> Formulation:

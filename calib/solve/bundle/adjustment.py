@@ -34,6 +34,7 @@ STEPS = 25
 STAGES = 12
 
 #: Convergence: smallest decrease of the cost in a stage, a tenth of a deviation of the worst determined parameter.
+#: Deviations are as large as the residuals say: before the first estimate they may be many times too small.
 MIN_GAIN = 0.005
 
 #: Damping relative to the diagonal of the curvature, for the redundant parameters of a rational lens without
@@ -163,7 +164,8 @@ def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
         max_nfev=STEPS,
     )
     gained = _cost(residuals) - float(found.cost)
-    return metric @ found.x, found.status > 0 or gained < MIN_GAIN
+    least = MIN_GAIN * max(1.0, 2 * float(found.cost) / len(residuals))
+    return metric @ found.x, found.status > 0 or gained < least
 
 
 def _cost(residuals: NDArray[np.float64]) -> float:

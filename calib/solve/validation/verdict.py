@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from calib.solve.calibrate import calibrate
 from calib.solve.solution import Solution
 from calib.solve.validation import projection_uncertainty
-from calib.solve.validation.contradictions import Contradiction, contradictions, scatter
+from calib.solve.validation.contradictions import Contradiction, Scatter, contradictions, scatter
 from calib.solve.validation.cross_validation import Agreement, TooFewToSplitError, cross_validate
 from calib.solve.validation.projection_uncertainty import UncertaintyMap
 from calib.solve.validation.weak_directions import weak_directions
@@ -70,8 +71,10 @@ def assess(
         for target in solution.task.sensors
         if target != source
     }
-    scattered = _scattered(solution)
-    contradicting = [] if scattered else contradictions(solution)  # without a rest, nothing contradicts it
+    contradicting = contradictions(solution)
+    scattered = _scattered(solution, contradicting)
+    if scattered:
+        contradicting = []  # without a rest, nothing contradicts it
     reasons = [*scattered, *_contradicting(contradicting), *weak_directions(solution, distance)]
     reasons += _outliers(solution, {one.shot for one in contradicting})
     reasons += _uncertain({**images, **pairs}, needed_px)
@@ -131,13 +134,24 @@ def _contradicting(found: Sequence[Contradiction]) -> list[str]:
     ]
 
 
-def _scattered(solution: Solution) -> list[str]:
+def _scattered(solution: Solution, contradicting: Sequence[Contradiction]) -> list[str]:
+    found = scatter(solution)
+    if found and contradicting:  # a few wrong shots spoil the others until they are left out
+        found = _scatter_without({one.shot for one in contradicting}, solution)
     return [
         f"{' and '.join(one.sensors)}: each fits its own corners to {one.alone_px:.2g} px, but together they miss by "
         f"{one.apart_px:.2g} px in most shots: the images of a shot were not taken at the same moment, or a sensor was "
         "moved between them; hold the board still in every shot, or synchronise the sensors"
-        for one in scatter(solution)
+        for one in found
     ]
+
+
+def _scatter_without(shots: Collection[int], solution: Solution) -> list[Scatter]:
+    rest = solution.task.of_shots([shot for shot in solution.task.shots if shot not in shots])
+    try:
+        return scatter(calibrate(rest))
+    except ValueError:  # nor can the rest be calibrated
+        return scatter(solution)
 
 
 def _outliers(solution: Solution, named: Collection[int]) -> list[str]:

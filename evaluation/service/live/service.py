@@ -23,14 +23,11 @@ class Service:
     """
 
     def __init__(self, rig: Path) -> None:
-        self._output = (rig.parent / "output.jsonl").open("w+", encoding="utf-8")
+        self._log = rig.parent / "output.jsonl"
         self.started_ns = time.monotonic_ns()
-        # To a file: a pipe that is not read would block the service.
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "abs_service", "run", str(rig), "--json"],
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-        )
+        command = [sys.executable, "-m", "abs_service", "run", str(rig), "--json"]
+        with self._log.open("wb") as log:  # a pipe that is not read would block the service
+            self._process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
 
     def processes(self) -> Mapping[str, int]:
         """Numbers of the processes that run, by the command of each: run, capture, track, record."""
@@ -44,8 +41,7 @@ class Service:
         """
         code = self._process.poll()
         if code is not None:
-            self._output.seek(0)
-            last = self._output.read().strip().rpartition("\n")[2]
+            last = self._log.read_text(encoding="utf-8").strip().rpartition("\n")[2]
             raise ServiceError(f"the service ended by itself with code {code}: {last}")
 
     def stop(self, timeout_s: float = 15.0, number: signal.Signals = signal.SIGINT) -> int:
@@ -63,4 +59,3 @@ class Service:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        self._output.close()

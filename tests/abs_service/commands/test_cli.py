@@ -179,7 +179,7 @@ def test_a_process_of_a_rig_does_not_begin_with_imports_that_it_may_never_need(c
     """`scipy.optimize` takes a quarter of a second, and as much again in each of the other processes."""
     heavy = ("numba", "scipy.optimize", "scipy.stats", "scipy.spatial")
     code = (
-        f"import sys, abs_service.commands.{command}\nfrom abs_service import config\nconfig.load_default()\n"
+        f"import sys, abs_service.commands.processes.{command}\nfrom abs_service import config\nconfig.load_default()\n"
         f"print([name for name in {heavy} if name in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
