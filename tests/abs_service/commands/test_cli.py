@@ -174,12 +174,12 @@ def test_a_reader_that_goes_away_ends_the_command_quietly(tmp_path):
     assert talker.wait(10) == Exit.PIPE_CLOSED
 
 
-@pytest.mark.parametrize("command", ["run", "capture", "track", "record"])
+@pytest.mark.parametrize("command", ["run", "processes.capture", "processes.track", "processes.record"])
 def test_a_process_of_a_rig_does_not_begin_with_imports_that_it_may_never_need(command):
     """`scipy.optimize` takes a quarter of a second, and as much again in each of the other processes."""
     heavy = ("numba", "scipy.optimize", "scipy.stats", "scipy.spatial")
     code = (
-        f"import sys, abs_service.commands.processes.{command}\nfrom abs_service import config\nconfig.load_default()\n"
+        f"import sys, abs_service.commands.{command}\nfrom abs_service import config\nconfig.load_default()\n"
         f"print([name for name in {heavy} if name in sys.modules])"
     )
     out = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
