@@ -4,7 +4,7 @@ import math
 
 import pytest
 from absmsg.v1.health_pb2 import Health as HealthMessage
-from tests.abs_service.recording.test_retention import DAY_NS, NOW_NS, put, take
+from tests.abs_service.recording.disk.test_retention import DAY_NS, NOW_NS, put, take
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
