@@ -49,7 +49,7 @@ MODULES = {
     "new": "new.new",
     **{name: f"running.{name}" for name in ("reinitialize", "status", "trigger", "view")},
     **{name: f"processes.{name}" for name in ("capture", "record", "track")},
-    **{name: f"recordings.{name}" for name in ("export", "info", "recover")},
+    **{name: f"recordings.{name}" for name in ("export", "info", "recover", "replay", "stiffness")},
 }
 
 #: Threads of the libraries that compute, read when they are first imported. Arrays are small here, so that more threads

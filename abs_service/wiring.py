@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from abs_service.config import ServiceConfig, plugins
-from abs_service.config.tables import TrackerTable
+from abs_service.config.tables.service import TrackerTable
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import BindsToMesh

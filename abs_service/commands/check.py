@@ -23,11 +23,11 @@ from abs_service import config, wiring
 from abs_service.bus import keys
 from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import TlsError
-from abs_service.commands import replay
 from abs_service.commands.parts import data_rates, device_checks, disk, harmless_devices, preview_option, rig_process
 from abs_service.commands.parts.device_checks import CheckError
 from abs_service.commands.parts.harmless_devices import HarmlessError
 from abs_service.commands.parts.preview_option import PictureOptionError
+from abs_service.commands.recordings import replay
 from abs_service.config import addresses, plugins
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, Problem

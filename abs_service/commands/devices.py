@@ -22,7 +22,7 @@ from typing import Any
 from rich.console import Console
 
 from abs_service.commands.parts import rig_process
-from abs_service.display import devices as display
+from abs_service.display.terminal import devices as display
 from abs_service.supervision.exit_codes import Exit
 from drivers import opening
 from drivers.contract.device import Device
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Lists, watches, describes or prints the rules."""
     console = Console(soft_wrap=False)
     if arguments.udev:
-        print(resources.files("abs_service").joinpath(RULES).read_text(encoding="utf-8"), end="")
+        print(resources.files("drivers.contract").joinpath(RULES).read_text(encoding="utf-8"), end="")
     elif arguments.watch:
         _watch(console, arguments)
     elif arguments.device:

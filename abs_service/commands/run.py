@@ -28,11 +28,11 @@ from abs_service.bus.session import Role
 from abs_service.bus.stamps import WallClock
 from abs_service.commands.parts import logs, rig_process
 from abs_service.commands.running import view
-from abs_service.display import journal
-from abs_service.display.journal import JournalDisplay
-from abs_service.display.lines import JsonDisplay, PlainDisplay
-from abs_service.display.table import TableDisplay
-from abs_service.recording import folder
+from abs_service.display.terminal import journal
+from abs_service.display.terminal.journal import JournalDisplay
+from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
+from abs_service.display.terminal.table import TableDisplay
+from abs_service.recording.disk import folder
 from abs_service.supervision import log_lines, metrics, parent_watchdog, systemd
 from abs_service.supervision.child_process import ChildProcess, Process
 from abs_service.supervision.exit_codes import Exit

@@ -3,12 +3,12 @@
 Only commands see these objects; everything behind them takes plain arguments.
 """
 
-from abs_service.config.calibration import CalibrationFile, CalibrationOrigin, DepthTable
-from abs_service.config.camera import CameraTable, PoseTable
 from abs_service.config.errors import ConfigError
 from abs_service.config.loading import from_tables, load, load_default, loads, to_toml
 from abs_service.config.merging import load_calibration
-from abs_service.config.tables import (
+from abs_service.config.tables.calibration import CalibrationFile, CalibrationOrigin, DepthTable
+from abs_service.config.tables.camera import CameraTable, PoseTable
+from abs_service.config.tables.service import (
     BusTable,
     DeviceTable,
     MeshTable,

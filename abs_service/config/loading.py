@@ -13,7 +13,7 @@ from abs_service.config import addresses, references
 from abs_service.config.errors import ConfigError, allowed_at, error_of
 from abs_service.config.merging import merge, without_calibrated
 from abs_service.config.problems import ProblemsError, from_pydantic
-from abs_service.config.tables import ServiceConfig
+from abs_service.config.tables.service import ServiceConfig
 from calib.files import limited, nested
 
 
@@ -34,7 +34,7 @@ def load(path: Path) -> ServiceConfig:
 
 def load_default() -> ServiceConfig:
     """The simulated rig that comes with the service; it records below the current directory."""
-    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    text = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     return loads(text, "demo.toml", Path.cwd())
 
 

@@ -9,9 +9,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from abs_service.config.calibration import SHARED, CalibratedSensor, CalibrationFile, CalibrationOrigin, SensorOrigin
 from abs_service.config.errors import ConfigError, allowed_at, error_of
 from abs_service.config.problems import Key, Problem, allowed_instead, dotted, from_pydantic
+from abs_service.config.tables.calibration import (
+    SHARED,
+    CalibratedSensor,
+    CalibrationFile,
+    CalibrationOrigin,
+    SensorOrigin,
+)
 from calib.files import limited, nested
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from abs_service.config.problems import Problem, allowed_instead
-from abs_service.config.values import URI
+from abs_service.config.tables.values import URI
 
 
 def check(file: dict[str, Any]) -> list[Problem]:

@@ -1,1 +1,1 @@
-"""Displays of a running rig: a live table, plain lines, JSON."""
+"""What people see of a rig: the terminal, a page in the browser, pictures."""

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.api.estimate import Estimate
+from abs_service.display.page.gltf import INDICES, VERTICES, Buffer
 from abs_service.export.arrays import mesh_numbers
 from abs_service.export.errors import ExportError
-from abs_service.view.gltf import INDICES, VERTICES, Buffer
 
 #: Largest number of poses. Weights of all of them are stored for each one, and programs slow down with many.
 POSES = 240

@@ -11,8 +11,8 @@ import numpy as np
 
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
+from abs_service.display.page.pictures import Picture, grey, picture, with_mesh
 from abs_service.export.errors import ExportError
-from abs_service.view.pictures import Picture, grey, picture, with_mesh
 from calib.camera import Camera
 from drivers.contract.frame import Frame
 

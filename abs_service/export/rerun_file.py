@@ -9,10 +9,10 @@ import rerun.blueprint as rrb
 
 from abs_service.api.estimate import Estimate
 from abs_service.api.recording import Recording
+from abs_service.display.page.pictures import cloud, picture, radial
 from abs_service.export import table
 from abs_service.pairing.observation import ObservationError
 from abs_service.pairing.points import z_image
-from abs_service.view.pictures import cloud, picture, radial
 from abs_service.wire.estimate_messages import State
 from abs_service.wire.viewer_messages import COLORS, ViewRate
 from calib.camera import Camera

@@ -11,12 +11,12 @@ from abs_service.bus.contract import Bus, Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
 from abs_service.bus.stamps import WallClock
-from abs_service.recording.pre_roll import PreRoll
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import free_path, open_for_writing
 from abs_service.recording.sample_writer import SampleWriter
 from abs_service.recording.take import Take
-from abs_service.recording.trigger import ALWAYS, Trigger
+from abs_service.recording.triggers.pre_roll import PreRoll
+from abs_service.recording.triggers.trigger import ALWAYS, Trigger
 
 _log = logging.getLogger(__name__)
 

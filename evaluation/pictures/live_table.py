@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from abs_service.commands import run
-from abs_service.display.table import TableDisplay, draw
+from abs_service.display.terminal.table import TableDisplay, draw
 from abs_service.supervision.rig_view import RigView
 
 #: Length of the run [s].

@@ -14,8 +14,9 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 
 from pydantic import BaseModel
 
-from abs_service.config import plugins, values
-from abs_service.config.tables import ServiceConfig
+from abs_service.config import plugins
+from abs_service.config.tables import values
+from abs_service.config.tables.service import ServiceConfig
 from tests.repository.configuration_values import WORDS, default_words, value_words
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "configuration.md"
@@ -25,7 +26,7 @@ INTRO = """\
 <!-- Written by `.venv/bin/python -m tests.repository.configuration_page`: edit the docstrings that it is made from. -->
 
 The sections follow the order of a rig file; `NAME` is a name of your choice.
-[abs_service/rigs/demo.toml](../../abs_service/rigs/demo.toml) is a complete file to begin with,
+[abs_service/config/demo.toml](../../abs_service/config/demo.toml) is a complete file to begin with,
 [examples/rigs](../../examples/rigs) has others, and `abs-service check rig.toml` says which keys or values are wrong.
 
 *value* is the type and range: an integer may stand for a number, but not "3" for 3; paths start from the folder of the

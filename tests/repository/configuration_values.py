@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import PydanticUndefined
 
-from abs_service.config import values
-from abs_service.config.calibration import CalibrationOrigin
+from abs_service.config.tables import values
+from abs_service.config.tables.calibration import CalibrationOrigin
 
 #: Types of which one word says what they are, or an example.
 WORDS: dict[Any, str] = {

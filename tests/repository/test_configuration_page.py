@@ -9,8 +9,8 @@ import pytest
 from annotated_types import Gt, Interval
 from pydantic import Field
 
-from abs_service.config.table import Table
-from abs_service.config.values import Stream
+from abs_service.config.tables.table import Table
+from abs_service.config.tables.values import Stream
 from tests.repository.configuration_page import PAGE, page, rows
 from tests.repository.configuration_values import default_words, value_words
 

@@ -27,7 +27,7 @@ TRACKING = DeformationState.STATUS_TRACKING
 
 def write_rig(path: Path, endpoint: str) -> Path:
     """The demo rig on an endpoint of its own; records to `takes` beside the file."""
-    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    text = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     text = text.replace("tcp/127.0.0.1:7447", endpoint).replace('directory = "recordings"', 'directory = "takes"')
     text = text.replace("minimum_free_bytes = 1_000_000_000", "minimum_free_bytes = 0")
     assert endpoint in text

@@ -14,7 +14,7 @@ from abs_service.calibration.files.rig_file import (
     read_covariance,
 )
 from abs_service.config import plugins
-from abs_service.config.calibration import CovarianceTable, ProvenanceTable, SensorEvidence
+from abs_service.config.tables.calibration import CovarianceTable, ProvenanceTable, SensorEvidence
 from abs_service.report.provenance import DataFile, Provenance
 from calib.camera import Camera
 from calib.files import limited, nested

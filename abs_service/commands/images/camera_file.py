@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
 
-from abs_service.config.camera import PoseTable
 from abs_service.config.positions import located
 from abs_service.config.problems import Key, from_pydantic
+from abs_service.config.tables.camera import PoseTable
 from calib.camera import Camera
 from calib.files import limited, nested
 from calib.lenses.by_name import LensName, lens_of

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from abs_service.config.tables import RecordTable
+from abs_service.config.tables.service import RecordTable
 from drivers.contract.capabilities import StreamInfo
 from drivers.contract.frame import ENCODINGS
 from drivers.encoding.encoded_image import ImageCodec, codec_of

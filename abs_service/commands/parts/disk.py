@@ -4,9 +4,9 @@ import math
 import shutil
 
 from abs_service import config
-from abs_service.recording import forecast
+from abs_service.recording.disk import forecast
+from abs_service.recording.disk.retention import Retention
 from abs_service.recording.recording_file import ESTIMATES
-from abs_service.recording.retention import Retention
 
 
 def recordings(rig: config.ServiceConfig) -> Retention:

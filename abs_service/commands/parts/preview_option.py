@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from abs_service import config, wiring
-from abs_service.display import preview_picture
+from abs_service.display.pictures import preview_picture
 from abs_service.tracking.preview import PreviewError, preview
 from calib.rig import Rig
 from drivers.contract.frame import FrameSet

@@ -18,12 +18,12 @@ from abs_service import config
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.parts import disk, rig_process
-from abs_service.recording.disk_watch import DiskWatch
-from abs_service.recording.first_tracking import FirstTracking
+from abs_service.recording.disk.disk_watch import DiskWatch
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recovery import RecoveryError, leftovers, recover, remove_interrupted
-from abs_service.recording.trigger import ALWAYS, Asked, Trigger
+from abs_service.recording.triggers.first_tracking import FirstTracking
+from abs_service.recording.triggers.trigger import ALWAYS, Asked, Trigger
 from abs_service.supervision import gc_tuning, parent_watchdog
 from abs_service.supervision.exit_codes import Exit
 from abs_service.wire import commands

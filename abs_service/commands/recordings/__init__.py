@@ -1,1 +1,1 @@
-"""Commands on recordings."""
+"""Commands that read a recording."""

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 from abs_service.commands.parts.progress import bars
-from abs_service.display import recording_info
+from abs_service.display.terminal import recording_info
 from abs_service.recording.summary import Summary, summarize
 from abs_service.supervision.exit_codes import Exit
 from drivers.replay.contents import RecordingError

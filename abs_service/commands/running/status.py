@@ -21,7 +21,7 @@ from abs_service.bus.security import roles
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import DEFAULT_ENDPOINT, BusError, check_endpoint
 from abs_service.commands.parts import rig_process
-from abs_service.display.health_words import words
+from abs_service.display.terminal.health_words import words
 from abs_service.supervision.exit_codes import Exit
 from drivers.contract.text import printable
 

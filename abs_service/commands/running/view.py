@@ -49,8 +49,8 @@ def check() -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Serves the page until SIGTERM or SIGINT."""
     check()
-    from abs_service.view.feed import Feed  # noqa: PLC0415 - needs viser
-    from abs_service.view.page import Page  # noqa: PLC0415 - needs viser
+    from abs_service.display.page.feed import Feed  # noqa: PLC0415 - needs viser
+    from abs_service.display.page.page import Page  # noqa: PLC0415 - needs viser
 
     rig = rig_process.load_config(arguments)
     stop = rig_process.stop_on_signals()

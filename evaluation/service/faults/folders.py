@@ -116,7 +116,7 @@ FAULTS = (
     Elsewhere(
         "the disk is slower than the cameras",
         "nobody waits; every drop is counted",
-        "tests/abs_service/recording/test_recorder_disk.py",
+        "tests/abs_service/recording/disk/test_recorder_disk.py",
     ),
     Elsewhere(
         "truncated or flipped bytes in a recording",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from abs_service import wiring
 from abs_service.bus import keys
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.commands import replay
+from abs_service.commands.recordings import replay
 from abs_service.tracker.estimate import Status
 from abs_service.tracking.session import TrackingSession
 from abs_service.wire import estimate_messages

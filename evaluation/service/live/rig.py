@@ -34,7 +34,7 @@ def write_rig(folder: Path, seed: int) -> Path:
 
 def demo_table(name: str) -> dict[str, Any]:
     """The demo rig as a table, under another name and on a free port; it records to `takes` beside it."""
-    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    text = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     rig: dict[str, Any] = tomllib.loads(text)
     rig["name"] = name
     rig["bus"]["endpoint"] = f"tcp/127.0.0.1:{free_port()}"

@@ -132,4 +132,6 @@ def test_the_rules_cover_every_usb_camera_that_there_is_a_driver_for(capsys):
     for number in ("045e", "02ae", "02bf", "02b0", "02ad", "03e7", "8086"):
         assert f'=="{number}"' in rules
     beside = Path(__file__).parents[3] / "docker" / "60-abs-service.rules"
-    assert beside.read_text() == rules == resources.files("abs_service").joinpath("60-abs-service.rules").read_text()
+    assert (
+        beside.read_text() == rules == resources.files("drivers.contract").joinpath("60-abs-service.rules").read_text()
+    )

@@ -9,8 +9,8 @@ import pytest
 
 from abs_service import cli, config
 from abs_service.commands.parts import harmless_devices
-from abs_service.display import preview_picture
-from abs_service.display.preview_picture import CLASS_COLORS, LEGEND, LINE, NO_RETURN, REGION, WARNING
+from abs_service.display.pictures import preview_picture
+from abs_service.display.pictures.preview_picture import CLASS_COLORS, LEGEND, LINE, NO_RETURN, REGION, WARNING
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.terms.depth.rim_classes import RimClass

@@ -10,7 +10,7 @@ from abs_service import config
 from abs_service.bus.session import BusError
 from abs_service.commands.parts import rig_process
 from abs_service.commands.parts.rig_process import SecurityError
-from abs_service.config.bus import BusTable, TlsTable
+from abs_service.config.tables.bus import BusTable, TlsTable
 from tests.conftest import encrypted
 
 

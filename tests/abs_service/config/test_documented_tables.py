@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from abs_service.config import plugins
-from abs_service.config.tables import TrackerTable
+from abs_service.config.tables.service import TrackerTable
 from abs_service.tracker.optimizers.base import Stop
 
 ROOT = Path(__file__).parents[3]

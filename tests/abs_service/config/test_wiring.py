@@ -26,7 +26,7 @@ def test_a_sensor_without_a_camera_is_named():
 
 
 def test_the_outlier_settings_of_a_sensor_are_published_with_its_noise_model():
-    text = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    text = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     own = text.replace("[sensors.tof]\n", "[sensors.tof]\noutlier_share = 0.2\nrange_m = 7.5\nno_return.grazing = 2\n")
     rig = wiring.rig(config.loads(own, "own.toml", Path()), "sheet", {"tof": TOF, "color": COLOR})
     tof, color = rig.sensors["tof"], rig.sensors["color"]
@@ -38,7 +38,7 @@ def test_the_outlier_settings_of_a_sensor_are_published_with_its_noise_model():
 def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_path):
     maps = {"sigma": np.full((1, 1, 240, 320), 0.005), "mu": np.zeros((1, 1, 240, 320))}
     np.savez(tmp_path / "maps.npz", **maps, distances=np.array([0.1, 5.0]), amplitudes=np.array([0.0, 1e4]))
-    demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    demo = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     noise = '[sensors.tof.noise]\ntype = "pixel_polynomial"\nfile = "maps.npz"\n'
     toml = re.sub(r"\[sensors\.tof\.noise\].*?(?=\[sensors\.color\])", noise, demo, flags=re.DOTALL)
     with pytest.raises(wiring.PlanError, match=r"sensors.tof.noise.file.* 320 × 240 .* 176 × 144"):
@@ -46,7 +46,7 @@ def test_noise_maps_of_another_image_size_are_refused_before_they_are_used(tmp_p
 
 
 def test_vertex_offsets_need_a_model_with_offsets():
-    demo = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+    demo = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
     own = demo.rstrip() + "\n\n[trackers.sheet.vertex_offsets]\nrandom_walk = 1e-4\n"
     assert wiring.plan(config.loads(own, "own.toml", Path()), "sheet").vertex_offsets.random_walk == 1e-4
     stiff = own.replace('type = "nurbs"\n', 'type = "rigid"\n')

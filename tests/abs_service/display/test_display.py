@@ -8,8 +8,8 @@ from absmsg.v1.health_pb2 import Health
 from rich.console import Console
 from rich.spinner import Spinner
 
-from abs_service.display.lines import JsonDisplay, PlainDisplay, line
-from abs_service.display.table import TableDisplay, draw
+from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay, line
+from abs_service.display.terminal.table import TableDisplay, draw
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView, size
 from abs_service.supervision.supervisor import Child, State
@@ -272,7 +272,7 @@ def test_json_is_one_object_per_estimate_and_nothing_else():
 
 
 def test_every_status_of_the_wire_has_a_colour():
-    from abs_service.display import table
+    from abs_service.display.terminal import table
 
     names = {name.removeprefix("STATUS_") for name in dict(DeformationState.Status.items())}
     assert names - {"UNSPECIFIED"} == table._STATUS.keys()

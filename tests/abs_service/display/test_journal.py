@@ -11,7 +11,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import Sample
 from abs_service.commands import run
-from abs_service.display import journal
+from abs_service.display.terminal import journal
 from abs_service.supervision import log_lines
 from abs_service.supervision.rig_state import RigState
 from abs_service.supervision.rig_view import RigView

@@ -11,7 +11,7 @@ from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings
 from abs_service.recording.recording_file import open_for_writing
-from abs_service.recording.trigger import ALWAYS, Trigger
+from abs_service.recording.triggers.trigger import ALWAYS, Trigger
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus, health_now

@@ -17,7 +17,7 @@ from abs_service.bus.contract import EVENTS
 from abs_service.bus.keys import KeyNameError
 from abs_service.bus.stamps import WallClock
 from abs_service.commands import run
-from abs_service.display.lines import PlainDisplay
+from abs_service.display.terminal.lines import PlainDisplay
 from abs_service.supervision.exit_codes import Exit
 from abs_service.supervision.run_session import RunSession
 from abs_service.supervision.supervisor import Child, Limits, State, Supervisor

@@ -23,8 +23,8 @@ from abs_service.bus.frames import FrameSubscriber
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.commands.processes import track
-from abs_service.display.lines import JsonDisplay, PlainDisplay
-from abs_service.display.table import draw
+from abs_service.display.terminal.lines import JsonDisplay, PlainDisplay
+from abs_service.display.terminal.table import draw
 from abs_service.pairing.synchroniser import FOREIGN, Synchroniser
 from abs_service.recording.recorder import Recorder
 from abs_service.recording.recorder_settings import RecorderSettings

@@ -35,7 +35,7 @@ from tests.abs_service.tracking.driving import default_plan, drive, mean_errors,
 MESH = sheet()
 SHAPE = nurbs.Settings((4, 4), 2).of_mesh(MESH)
 MODEL = Posed(SHAPE)
-RIG = resources.files("abs_service.rigs").joinpath("demo.toml").read_text(encoding="utf-8")
+RIG = resources.files("abs_service.config").joinpath("demo.toml").read_text(encoding="utf-8")
 T_RP = pose.from_rotation_vector([0, 0, 0], [0, 0, 1.0])
 seeds = st.integers(0, 2**32 - 1)
 

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from abs_service.recording.forecast import Growth
+from abs_service.recording.disk.forecast import Growth
 
 #: Beside a recording, `x.mcap.keep` for `x.mcap`: it is never deleted.
 KEEP = ".keep"

@@ -7,7 +7,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus.contract import EVENTS, IMAGES
 from abs_service.bus.stamps import HeaderFactory, WallClock
-from abs_service.view.feed import Feed, rate_hz
+from abs_service.display.page.feed import Feed, rate_hz
 from drivers.contract.frame import Frame, Kind
 from drivers.encoding import codec
 from tests.abs_service.bus.loopback import LoopbackBus

@@ -7,8 +7,8 @@ import viser
 from numpy.typing import NDArray
 from viser import transforms
 
-from abs_service.view.fields import MeshView
-from abs_service.view.gltf import glb
+from abs_service.display.page.fields import MeshView
+from abs_service.display.page.gltf import glb
 from calib.camera import Camera
 
 #: Colour of first pose, cameras and points, and size of a camera [m].

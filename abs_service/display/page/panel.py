@@ -7,10 +7,10 @@ import numpy as np
 import viser
 from viser import uplot
 
-from abs_service.view.feed import MINUTE_S, Numbers
-from abs_service.view.fields import FIELDS, PALETTES
-from abs_service.view.pictures import Picture
-from abs_service.view.words import STALE_COLOR, Words
+from abs_service.display.page.feed import MINUTE_S, Numbers
+from abs_service.display.page.fields import FIELDS, PALETTES
+from abs_service.display.page.pictures import Picture
+from abs_service.display.page.words import STALE_COLOR, Words
 
 _LINES = ("#3b82f6", "#f59e0b", "#10b981", "#ef4444", "#a78bfa")
 

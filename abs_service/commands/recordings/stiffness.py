@@ -14,9 +14,9 @@ import sys
 from pathlib import Path
 
 from abs_service import config, wiring
-from abs_service.commands import replay
 from abs_service.commands.parts import progress
-from abs_service.display.stiffness_plot import draw
+from abs_service.commands.recordings import replay
+from abs_service.display.pictures.stiffness_plot import draw
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracker.models import gravity
 from abs_service.tracking.bending_stiffness.hanging_strip import HangingStrip, track_strip

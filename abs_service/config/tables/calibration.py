@@ -4,9 +4,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
-from abs_service.config.camera import CameraTable
-from abs_service.config.table import Table
-from abs_service.config.values import Name, NoiseSettings, SettingsOf
+from abs_service.config.tables.camera import CameraTable
+from abs_service.config.tables.table import Table
+from abs_service.config.tables.values import Name, NoiseSettings, SettingsOf
 
 #: Keys of a sensor in a calibration file that are keys of the same sensor in a rig file.
 SHARED = ("camera", "noise", "texture", "outlier_share", "range_m", "no_return", "depth", "time_offset_ms")

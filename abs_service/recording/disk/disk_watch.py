@@ -6,8 +6,8 @@ from pathlib import Path
 
 from abs_service.bus.health import Health, Level
 from abs_service.bus.stamps import WallClock
-from abs_service.recording import forecast
-from abs_service.recording.retention import Retention
+from abs_service.recording.disk import forecast
+from abs_service.recording.disk.retention import Retention
 
 #: Time between two looks [ns].
 PERIOD_NS = 10_000_000_000

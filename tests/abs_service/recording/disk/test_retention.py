@@ -5,8 +5,8 @@ import os
 
 import pytest
 
+from abs_service.recording.disk.retention import Retention
 from abs_service.recording.recording_file import ESTIMATES
-from abs_service.recording.retention import Retention
 
 DAY_NS = 86_400_000_000_000
 NOW_NS = 1_800_000_000_000_000_000

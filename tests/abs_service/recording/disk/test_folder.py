@@ -3,8 +3,8 @@ import tempfile
 
 import pytest
 
-from abs_service.recording import folder
-from abs_service.recording.folder import FolderError
+from abs_service.recording.disk import folder
+from abs_service.recording.disk.folder import FolderError
 
 
 def test_a_folder_is_made_and_left_empty(tmp_path):

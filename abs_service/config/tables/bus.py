@@ -7,8 +7,8 @@ from pydantic import model_validator
 from abs_service.bus.security.mutual_tls import NO_SECURITY, MutualTls, NoSecurity
 from abs_service.bus.session import DEFAULT_ENDPOINT
 from abs_service.config.problems import Problem, ProblemsError
-from abs_service.config.table import Table
-from abs_service.config.values import Endpoint, RelativePath
+from abs_service.config.tables.table import Table
+from abs_service.config.tables.values import Endpoint, RelativePath
 
 
 class TlsTable(Table):

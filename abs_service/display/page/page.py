@@ -13,13 +13,13 @@ from absmsg.v1.health_pb2 import Health
 from numpy.typing import NDArray
 
 from abs_service.bus import keys
+from abs_service.display.page import pictures, words
+from abs_service.display.page.feed import Feed, rate_hz
+from abs_service.display.page.fields import FIELDS, ColorScale, MeshView
+from abs_service.display.page.panel import Panel
+from abs_service.display.page.reinitialization import Reinitialization, Send
+from abs_service.display.page.scene import Scene
 from abs_service.tracking.tracker_log import points
-from abs_service.view import pictures, words
-from abs_service.view.feed import Feed, rate_hz
-from abs_service.view.fields import FIELDS, ColorScale, MeshView
-from abs_service.view.panel import Panel
-from abs_service.view.reinitialization import Reinitialization, Send
-from abs_service.view.scene import Scene
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
 

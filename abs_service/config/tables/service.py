@@ -5,11 +5,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
-from abs_service.config.bus import BusTable
-from abs_service.config.calibration import CalibrationOrigin, DepthTable
-from abs_service.config.camera import CameraTable
-from abs_service.config.table import Table
-from abs_service.config.values import DeviceUri, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
+from abs_service.config.tables.bus import BusTable
+from abs_service.config.tables.calibration import CalibrationOrigin, DepthTable
+from abs_service.config.tables.camera import CameraTable
+from abs_service.config.tables.table import Table
+from abs_service.config.tables.values import DeviceUri, Name, NoiseSettings, Plugin, RelativePath, SettingsOf, Stream
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Rate = Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)]

@@ -7,7 +7,7 @@ from absmsg.v1.command_pb2 import CommandAnswer
 from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
-from abs_service.view.feed import Feed
+from abs_service.display.page.feed import Feed
 
 #: Time that a detection may take [s].
 ANSWER_S = 10.0

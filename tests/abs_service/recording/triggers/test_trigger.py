@@ -8,7 +8,7 @@ from absmsg.v1.health_pb2 import Health
 
 from abs_service.bus import keys
 from abs_service.bus.contract import Sample
-from abs_service.recording.trigger import ALWAYS, Asked
+from abs_service.recording.triggers.trigger import ALWAYS, Asked
 from abs_service.wire import commands
 from tests.abs_service.recording.recorder_rig import Rig, depth, metadata, read, recordings, sequences
 from tests.waiting import eventually

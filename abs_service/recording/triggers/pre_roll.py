@@ -7,7 +7,7 @@ from collections.abc import Callable
 from abs_service.bus.contract import Sample
 from abs_service.bus.health import Health, Level
 from abs_service.bus.queues import BoundedQueue
-from abs_service.recording.trigger import ALWAYS, Trigger
+from abs_service.recording.triggers.trigger import ALWAYS, Trigger
 
 
 class PreRoll:

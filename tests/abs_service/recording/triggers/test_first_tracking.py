@@ -5,7 +5,7 @@ from absmsg.v1.deformation_state_pb2 import DeformationState
 
 from abs_service.bus import keys
 from abs_service.bus.contract import STATE
-from abs_service.recording.first_tracking import FirstTracking
+from abs_service.recording.triggers.first_tracking import FirstTracking
 from tests.abs_service.bus.loopback import LoopbackBus
 
 

@@ -1,0 +1,1 @@
+"""The tables of a configuration and of a calibration file, and what their values may be."""

@@ -1,0 +1,1 @@
+"""Pictures in files: what a tracker would track, and the fit of a bending stiffness."""

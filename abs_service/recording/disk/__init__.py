@@ -1,0 +1,1 @@
+"""The disk under the recordings: its room, how long it lasts, what is deleted first."""

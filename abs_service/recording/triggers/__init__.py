@@ -1,0 +1,1 @@
+"""When recordings begin and end."""

@@ -1,1 +1,0 @@
-"""Rigs that come with the service, as TOML files."""
