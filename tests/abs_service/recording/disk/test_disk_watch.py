@@ -4,7 +4,6 @@ import math
 
 import pytest
 from absmsg.v1.health_pb2 import Health as HealthMessage
-from tests.abs_service.recording.disk.test_retention import DAY_NS, NOW_NS, put, take
 
 from abs_service.bus.health import Health
 from abs_service.bus.stamps import HeaderFactory, WallClock
@@ -14,6 +13,7 @@ from abs_service.recording.disk.forecast import Growth
 from abs_service.recording.disk.retention import Retention
 from abs_service.recording.recording_file import ESTIMATES
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
+from tests.abs_service.recording.disk.test_retention import DAY_NS, NOW_NS, put, take
 
 MB = 1_000_000
 
