@@ -97,7 +97,7 @@ def of_format(name: str) -> Target:
     )
 
 
-RIG = (Path(__file__).parents[2] / "abs_service" / "rigs" / "demo.toml").read_bytes()
+RIG = (Path(__file__).parents[2] / "abs_service" / "config" / "demo.toml").read_bytes()
 TABLE = b"width = 640\nheight = 480\nfx = 500.0\nfy = 500.0\ncx = 320.0\ncy = 240.0\n"
 CALIBRATION = b'version = 1\nname = "x"\n[provenance]\ncommand = "x"\ndate = "x"\nversion = "x"\n[sensors.tof.camera]\n'
 BOARD = b'kind = "charuco"\ncolumns = 5\nrows = 7\nsquare_mm = 30.0\nmarker_mm = 22.0\n'
