@@ -3,6 +3,7 @@
 import json
 import logging
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 
@@ -52,6 +53,7 @@ def open_session(
     shared_memory: bool = True,
     connect_timeout_ms: int = CONNECT_TIMEOUT_MS,
     security: NoSecurity | MutualTls = NO_SECURITY,
+    routers: Sequence[str] = (),
 ) -> zenoh.Session:
     """Opens a session. Close it before the interpreter exits, or zenoh hangs at exit.
 
@@ -61,18 +63,21 @@ def open_session(
         shared_memory: whether large messages pass through shared memory between processes of one host.
         connect_timeout_ms: timeout of a client's connection [ms].
         security: who may connect, and what they may do then.
+        routers: endpoints of other routers that a router connects to, whenever they are there.
 
     Raises:
         BusError: the endpoint is malformed or in use, or nothing listens there.
         TlsError: a file of `security` cannot be used.
     """
     check_endpoint(endpoint, security)
+    for other in routers:
+        check_endpoint(other, security, "bus.routers")
     own = security.check(endpoint, role is Role.ROUTER)
     if own and own.ends - datetime.now(UTC) < CERTIFICATE_ENDS:
         _log.warning('the certificate "%s" ends on %s; after that, nobody can connect', own.name, own.ends.date())
     zenoh.init_log_from_env_or(LOG_LEVELS)
     try:
-        settings = _settings(endpoint, role, shared_memory, connect_timeout_ms, security)
+        settings = _settings(endpoint, role, shared_memory, connect_timeout_ms, security, routers)
         return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
     except zenoh.ZError as error:
         reason = _explain(str(error), role, connect_timeout_ms)
@@ -81,8 +86,8 @@ def open_session(
         raise BusError(f'bus.endpoint = "{endpoint}": {reason}') from error
 
 
-def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY) -> str:
-    """Returns `endpoint` if it can be one.
+def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY, key: str = "bus.endpoint") -> str:
+    """Returns `endpoint`, which `key` names in messages, if it can be one.
 
     Raises:
         BusError: it cannot.
@@ -90,11 +95,11 @@ def check_endpoint(endpoint: str, security: NoSecurity | MutualTls = NO_SECURITY
     match = _ENDPOINT.fullmatch(endpoint)
     if match is None or not 1 <= int(match["port"]) <= 65535:
         raise BusError(
-            f'bus.endpoint = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
+            f'{key} = "{endpoint}": not an endpoint; write PROTOCOL/HOST:PORT with protocol tcp, tls, quic, udp '
             "or ws and a port from 1 to 65535, such as tcp/127.0.0.1:7447"
         )
     if security.link and match[1] != "tls":
-        raise BusError(f'bus.endpoint = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')
+        raise BusError(f'{key} = "{endpoint}": must begin with tls/, because there is a table [bus.tls]')
     return endpoint
 
 
@@ -108,16 +113,22 @@ def _explain(error: str, role: Role, connect_timeout_ms: int) -> str:
 
 
 def _settings(
-    endpoint: str, role: Role, shared_memory: bool, connect_timeout_ms: int, security: NoSecurity | MutualTls
+    endpoint: str,
+    role: Role,
+    shared_memory: bool,
+    connect_timeout_ms: int,
+    security: NoSecurity | MutualTls,
+    routers: Sequence[str],
 ) -> dict[str, object]:
     listens = role is Role.ROUTER
     return {
         "mode": role.value,
         "listen": {"endpoints": [endpoint] if listens else []},
         "connect": {
-            "endpoints": [] if listens else [endpoint],
-            "timeout_ms": connect_timeout_ms,
-            "exit_on_failure": True,
+            "endpoints": list(routers) if listens else [endpoint],
+            # A rig works without the other routers of a lab, and connects to them when they come back.
+            "timeout_ms": -1 if listens else connect_timeout_ms,
+            "exit_on_failure": not listens,
         },
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}, "delay": 0},
         "timestamping": {"enabled": True},  # what caches of late joiners are ordered by

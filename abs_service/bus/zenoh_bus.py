@@ -2,7 +2,7 @@
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
@@ -53,10 +53,11 @@ class ZenohBus:
         role: Role,
         shared_memory: bool = True,
         security: NoSecurity | MutualTls = NO_SECURITY,
+        routers: Sequence[str] = (),
     ) -> Self:
-        """Opens a session and a bus on it; errors as in `open_session`."""
+        """Opens a session and a bus on it; arguments and errors as in `open_session`."""
         keys.check_name(rig)  # before there is a session to be closed
-        bus = cls(open_session(endpoint, role, shared_memory, security=security), rig)
+        bus = cls(open_session(endpoint, role, shared_memory, security=security, routers=routers), rig)
         if role is Role.ROUTER and security.link:
             bus._keep(from_non_daemon_thread(lambda: link_log.declare(bus._session)))
         return bus

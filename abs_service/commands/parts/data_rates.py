@@ -24,16 +24,19 @@ def describe(streams: Mapping[str, Iterable[StreamInfo]], table: RecordTable) ->
         streams: by sensor; none of a sensor whose device is not open.
         table: settings of the recorder.
     """
-    sent, least, most, unknown = 0.0, 0.0, 0.0, []
+    sensors, least, most = {}, 0.0, 0.0
     for sensor, infos in streams.items():
         for info in infos:
             rate = _bytes_per_s(info)
             shares = LEFT[codec_of(info.encoding, ImageCodec(table.depth_codec), ImageCodec(table.color_codec))]
-            sent, least, most = sent + rate, least + shares[0] * rate, most + shares[1] * rate
-        if not infos:
-            unknown.append(sensor)
-    recorded = [round(1e-6 * least, 1), round(1e-6 * most, 1)] if table.enabled else [0.0, 0.0]
-    return {"sent_mb_s": round(1e-6 * sent, 1), "recorded_mb_s": recorded, "unknown": unknown}
+            sensors[sensor] = sensors.get(sensor, 0.0) + rate
+            least, most = least + shares[0] * rate, most + shares[1] * rate
+    return {
+        "sent_mb_s": _megabytes(sum(sensors.values())),
+        "sensors_mb_s": {sensor: _megabytes(rate) for sensor, rate in sensors.items()},
+        "recorded_mb_s": [_megabytes(least), _megabytes(most)] if table.enabled else [0.0, 0.0],
+        "unknown": [sensor for sensor in streams if sensor not in sensors],
+    }
 
 
 def text(rates: Mapping[str, Any]) -> str:
@@ -41,7 +44,13 @@ def text(rates: Mapping[str, Any]) -> str:
     least, most = rates["recorded_mb_s"]
     written = f"{most:g}" if least == most else f"{least:g} to {most:g}, by how noisy they are"
     without = f"; without {', '.join(rates['unknown'])}, known once open" if rates["unknown"] else ""
-    return f"images: {rates['sent_mb_s']:g} MB/s sent, recorded {written}{without}"
+    shares = ", ".join(f"{sensor} {rate:g}" for sensor, rate in rates["sensors_mb_s"].items())
+    each = f" ({shares})" if len(rates["sensors_mb_s"]) > 1 else ""
+    return f"images: {rates['sent_mb_s']:g} MB/s sent{each}, recorded {written}{without}"
+
+
+def _megabytes(rate: float) -> float:
+    return round(1e-6 * rate, 1)
 
 
 def _bytes_per_s(info: StreamInfo) -> float:

@@ -75,7 +75,8 @@ def open_bus_at(
     # Zenoh says on standard output which clients it refuses.
     with library_output.logged() if role is Role.ROUTER and rig.bus.tls else nullcontext():
         try:
-            bus = ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory, rig.bus.security(*names, roles.RIG))
+            security = rig.bus.security(*names, roles.RIG)
+            bus = ZenohBus.open(rig.name, endpoint, role, rig.bus.shared_memory, security, rig.bus.routers)
         except TlsError as error:
             raise SecurityError(f"{arguments.config or 'demo.toml'}: {error}") from None
         with CheckedBus(bus, time.monotonic_ns) as checked:

@@ -32,18 +32,23 @@ class BusTable(Table):
     Attributes:
         endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
         shared_memory: images travel through shared memory between processes of one host.
+        routers: zenoh endpoints of other routers, such as one for a whole lab, that the router of this rig connects
+            to whenever they are there; who is connected to them reads this rig as well.
         tls: mutual TLS; without it, whoever reaches the endpoint may do everything.
     """
 
     endpoint: Endpoint = DEFAULT_ENDPOINT
+    routers: tuple[Endpoint, ...] = ()
     shared_memory: bool = True
     tls: TlsTable | None = None
 
     @model_validator(mode="after")
     def _encrypted(self) -> Self:
-        if self.tls and not self.endpoint.startswith("tls/"):
-            problem = "must begin with tls/, because there is a table [bus.tls]"
-            raise ProblemsError([Problem(("endpoint",), problem, self.endpoint)])
+        places = {("endpoint",): self.endpoint} | {("routers", number): one for number, one in enumerate(self.routers)}
+        problem = "must begin with tls/, because there is a table [bus.tls]"
+        problems = [Problem(place, problem, one) for place, one in places.items() if not one.startswith("tls/")]
+        if self.tls and problems:
+            raise ProblemsError(problems)
         return self
 
     def security(self, *names: str) -> NoSecurity | MutualTls:

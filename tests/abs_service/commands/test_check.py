@@ -69,7 +69,8 @@ def test_bytes_per_second_of_the_images(checked, table, rates):
     rig = RIG.replace("sensors=tof", f"sensors={sensors}") + '[sensors.color]\ndevice = "sim"\n[sensors.bayer]\n'
     code, out, _ = checked(rig + f'device = "sim"\n[record]\n{table}\n', "--json")
     assert code == Exit.OK
-    assert json.loads(out)["images"] == {**rates, "unknown": []}
+    sensors = {"tof": 0.4, "color": 82.9, "bayer": 13.8}
+    assert json.loads(out)["images"] == {**rates, "sensors_mb_s": sensors, "unknown": []}
 
 
 def test_streams_that_are_known_once_a_device_is_open(checked):
