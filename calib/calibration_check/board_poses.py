@@ -31,7 +31,7 @@ def solve(stored: Stored, views: Views, moving: Collection[str]) -> Solution:
     try:
         return Solution(equations.task, adjust(equations, start, count, lambda _: None))
     except NotSolvedError as error:
-        raise NotSolvedError(f"{error}{unlike_the_rest(equations.task, start)}") from error
+        raise NotSolvedError(f"{error}{unlike_the_rest(equations.task, start)}", error.unfinished) from error
 
 
 def formulation(stored: Stored, views: Views, moving: Collection[str], depth: Collection[str] = ()) -> Formulation:

@@ -9,12 +9,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from calib import pose
-from calib.calibration_check.board_poses import solve
+from calib.calibration_check.board_poses import formulation, solve
 from calib.calibration_check.stored import Stored, Views
 from calib.camera import Camera
 from calib.pose import Pose
 from calib.solve.bundle import rotations
+from calib.solve.bundle.adjustment import NotSolvedError
 from calib.solve.bundle.parameters.layout import POSE
+from calib.solve.solution import Solution
 from calib.solve.validation.contradictions import Contradiction, contradictions
 
 #: Minimum number of common shots of two sensors.
@@ -62,11 +64,7 @@ def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
     present = [name for name in stored.sensors if name in shots]
     pairs = [(a, b) for a, b in combinations(present, 2) if {a, b} & seeing]
     common = {pair: shots[pair[0]] & shots[pair[1]] for pair in pairs}
-    return [
-        _change(stored, views.of(pair, both), pair, len(both))
-        for pair, both in common.items()
-        if len(both) >= MIN_SHOTS
-    ]
+    return [_change(stored, views.of(pair, both), pair) for pair, both in common.items() if len(both) >= MIN_SHOTS]
 
 
 def contradicting(changes: Sequence[PairChange]) -> list[Contradiction]:
@@ -75,14 +73,10 @@ def contradicting(changes: Sequence[PairChange]) -> list[Contradiction]:
     return [found[shot] for shot in sorted(found)]
 
 
-def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> PairChange:
+def _change(stored: Stored, views: Views, pair: tuple[str, str]) -> PairChange:
     second = pair[1]
-    solution = solve(stored, views, (second,))
-    contradicting = contradictions(solution)
-    rest = {*solution.task.shots} - {one.shot for one in contradicting}
-    if contradicting and len(rest) >= MIN_SHOTS:
-        views, shots = views.of(pair, rest), len(rest)
-        solution = solve(stored, views, (second,))
+    solution, contradicting = _consistent(stored, views, pair)
+    views = views.of(pair, {*solution.task.shots})
     adjusted = solution.adjustment
     before, after = stored.sensors[second].camera, adjusted.state.sensors[second].camera
     turn = rotations.logarithm((after.T_rs[:3, :3] @ before.T_rs[:3, :3].T)[None])[0]
@@ -94,7 +88,7 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> 
     spread = [_shift(before, points, column) for column in np.linalg.cholesky(covariance).T]
     return PairChange(
         *pair,
-        shots,
+        len(solution.task.shots),
         turn,
         move,
         _shift(before, points, change),
@@ -102,6 +96,24 @@ def _change(stored: Stored, views: Views, pair: tuple[str, str], shots: int) -> 
         float(change @ np.linalg.solve(covariance, change)),
         tuple(contradicting),
     )
+
+
+def _consistent(stored: Stored, views: Views, pair: tuple[str, str]) -> tuple[Solution, list[Contradiction]]:
+    """Solution of the shots that agree with each other, and the others; these may be what keeps all from a minimum."""
+    unsolved: NotSolvedError | None = None
+    try:
+        solution = solve(stored, views, pair[1:])
+    except NotSolvedError as error:
+        if error.unfinished is None:
+            raise
+        unsolved, solution = error, Solution(formulation(stored, views, pair[1:]).task, error.unfinished)
+    contradicting = contradictions(solution)
+    rest = {*solution.task.shots} - {one.shot for one in contradicting}
+    if contradicting and len(rest) >= MIN_SHOTS:
+        return solve(stored, views.of(pair, rest), pair[1:]), contradicting
+    if unsolved is not None:
+        raise unsolved
+    return solution, contradicting
 
 
 def _relative_covariance(stored: Stored, first: str, second: str) -> NDArray[np.float64]:

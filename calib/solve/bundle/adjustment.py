@@ -33,6 +33,10 @@ ROUNDS = 3
 STEPS = 25
 STAGES = 12
 
+NO_MINIMUM = (
+    f"no minimum after {STAGES * STEPS} steps: the views contradict each other, or the kind of lens does not fit"
+)
+
 #: Convergence: smallest decrease of the cost in a stage, a tenth of a deviation of the worst determined parameter.
 #: Deviations are as large as the residuals say: before the first estimate they may be many times too small.
 MIN_GAIN = 0.005
@@ -46,7 +50,16 @@ MIN_FACTOR = 0.01
 
 
 class NotSolvedError(ValueError):
-    """The optimisation did not converge."""
+    """The optimisation did not converge.
+
+    Args:
+        message: the reason, for people.
+        unfinished: where it ended, from which shots that contradict the rest can be told; None if it could not begin.
+    """
+
+    def __init__(self, message: str, unfinished: "Adjustment | None" = None) -> None:
+        self.unfinished = unfinished
+        super().__init__(message)
 
 
 @dataclass(frozen=True)
@@ -115,8 +128,12 @@ def adjust(formulate: Formulate, start: State, groups: int, note: Callable[[str]
 
 
 def _round(formulate: Formulate, start: State, factors: tuple[float, ...]) -> Adjustment:
-    equations = formulate(search(formulate(start, factors)), factors)
-    return Adjustment(equations, factors, *_covariance(equations))
+    state, converged = _search(formulate(start, factors))
+    equations = formulate(state, factors)
+    found = Adjustment(equations, factors, *_covariance(equations))
+    if not converged:
+        raise NotSolvedError(NO_MINIMUM, found)
+    return found
 
 
 def search(equations: Equations) -> State:
@@ -125,16 +142,23 @@ def search(equations: Equations) -> State:
     Raises:
         UndeterminedError, NotSolvedError: as in `adjust`.
     """
+    state, converged = _search(equations)
+    if not converged:
+        raise NotSolvedError(NO_MINIMUM)
+    return state
+
+
+def _search(equations: Equations) -> tuple[State, bool]:
+    """The best state after at most `STAGES` stages; True if it is a minimum."""
     if not np.all(np.isfinite(equations.residuals(np.zeros(equations.layout.size)))):
         raise NotSolvedError("the first guess puts a board behind a camera that saw it; check the given calibration")
+    converged = False
     for _ in range(STAGES):
-        increments, ended = _stage(equations)
+        increments, converged = _stage(equations)
         equations = replace(equations, base=equations.layout.move(equations.base, increments))
-        if ended:
-            return equations.base
-    raise NotSolvedError(
-        f"no minimum after {STAGES * STEPS} steps: the views contradict each other, or the kind of lens does not fit"
-    )
+        if converged:
+            break
+    return equations.base, converged
 
 
 def _stage(equations: Equations) -> tuple[NDArray[np.float64], bool]:
