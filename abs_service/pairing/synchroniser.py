@@ -242,7 +242,7 @@ class _Stream:
 
 
 def _received_ns(frame: Frame) -> int:
-    """When the frame came to this process, on this host's clock."""
+    """Time at which the frame reached this process, on this host's clock [ns]."""
     return frame.t_arrival_ns if frame.t_received_ns is None else frame.t_received_ns
 
 

@@ -91,7 +91,7 @@ class Recorder:
 
     @property
     def failed(self) -> str:
-        """Why nothing is recorded at present; "" if all is well. `failures` counts how often that happened."""
+        """Reason for which recording has failed; "" if all is well. `failures` counts the failures."""
         return self._failed
 
     def start(self) -> None:

@@ -71,7 +71,7 @@ class RecordingFile:
 
     @property
     def fate(self) -> str:
-        """What somebody did to the unfinished file, "deleted" or "moved"; "" if it is in its place."""
+        """Change of the unfinished file from outside, "deleted" or "moved"; "" if it is in its place."""
         mine = os.fstat(self._stream.fileno())
         if mine.st_nlink == 0:
             return "deleted"

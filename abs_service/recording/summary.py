@@ -1,4 +1,4 @@
-"""What a recording holds: rates, gaps and losses of its images, status of its estimates, bytes of its topics."""
+"""Summary of a recording: rates, gaps and losses of its images, status of its estimates, bytes of its topics."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""What Prometheus reads from a running rig, on loopback: rates, ages, losses by cause, status, restarts, disk."""
+"""Metrics of a running rig for Prometheus, on loopback: rates, ages, losses by cause, status, restarts, disk."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence

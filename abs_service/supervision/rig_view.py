@@ -99,7 +99,7 @@ class RigView:
 
     @property
     def recording_remark(self) -> str:
-        """What the recorder says as long as nothing is tracked, or of its trigger; "" if it records anyway."""
+        """The recorder's remark on missing tracking, or on its trigger; "" if it records anyway."""
         labels = self.live.health("record").labels
         return labels.get("tracking") or labels.get("trigger", "")
 
@@ -189,7 +189,7 @@ def size(number: float) -> str:
 
 
 def _on_disk(path: Path) -> str:
-    """What there is of a recording whose recorder has ended."""
+    """The file of a recording whose recorder has ended, and its state, as text."""
     active = path.with_name(path.name + ".active")
     if active.exists():
         return f"{active} (unfinished: `abs-service recover` completes it)"

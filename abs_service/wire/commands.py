@@ -138,7 +138,7 @@ def _answer(
 
 
 def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:
-    """Why a command is refused, "" if it is not, and who sent it."""
+    """Reason for which a command is refused, "" if it is accepted, and its sender."""
     sender = "an unknown process"
     try:
         if command.message != message:

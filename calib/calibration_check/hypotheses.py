@@ -1,4 +1,4 @@
-"""What may have happened to a rig since its calibration, as directions of change of its sensors."""
+"""Hypotheses of a rig's change since its calibration, as directions in its sensors' parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -42,7 +42,7 @@ GROWTH_MB_MIN, GROWTH_FILES_MIN, LEAST_MIN = 0.3, 0.3, 10.0
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How long.
+    """Duration and rate of faults.
 
     Attributes:
         minutes: duration [min].
@@ -58,7 +58,7 @@ QUICK = Settings(minutes=0.7, pause_s=3.0)
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a process held at a moment, CLOCK_MONOTONIC [ns]."""
+    """Memory and open files of a process at a time, CLOCK_MONOTONIC [ns]."""
 
     t_ns: int
     process: str

@@ -50,7 +50,7 @@ class NoSecurity:
         """Nothing can be wrong."""
 
     def refusal(self, endpoint: str) -> str:
-        """Why a router refuses this process, "" if it is not known."""
+        """Reason for which a router refuses this process; "" if unknown."""
         return ""
 
 
@@ -155,7 +155,7 @@ def _host(endpoint: str) -> str:
 
 
 def _handshake(client: ssl.SSLContext, server: ssl.SSLContext, host: str | None) -> Certificate:
-    """What a server learns from the certificate of a client, without a network."""
+    """Performs a TLS handshake in memory; returns the client's certificate as the server sees it."""
     to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
     one = client.wrap_bio(to_client, to_server, server_hostname=host)
     other = server.wrap_bio(to_server, to_client, server_side=True)

@@ -85,7 +85,7 @@ def _names(explanation: Explanation) -> str:
 
 
 def _said(explanation: Explanation) -> str:
-    """What happened to the sensor, as a clause without its name."""
+    """The change of the sensor, as a clause without its name."""
     kind, values = explanation.hypothesis.kind, explanation.values
     if kind in TERMS:
         pairs = zip(TERMS[kind], values.tolist(), explanation.sigmas.tolist(), strict=True)

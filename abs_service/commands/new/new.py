@@ -67,10 +67,10 @@ Ask = Callable[[str, str, Mapping[str, str]], str]
 
 
 def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: Ask) -> Answers:
-    """What is known of the rig, from the options and the answers.
+    """Description of the rig, from the options and the answers.
 
     Args:
-        arguments: the options; None for what is to be asked.
+        arguments: the options; an option that is None becomes a question.
         name: of the rig.
         found: attached cameras, which are named first.
         ask: asks a question.

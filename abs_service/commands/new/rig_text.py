@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Answers:
-    """What is known of a rig.
+    """Description of a rig, from which its file is written.
 
     Attributes:
         name: of the rig.

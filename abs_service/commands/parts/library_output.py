@@ -1,4 +1,4 @@
-"""What libraries write to standard output past Python, as lines of the log."""
+"""Redirects the output of native libraries, which bypasses `sys.stdout`, into the log."""
 
 import logging
 import os

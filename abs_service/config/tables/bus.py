@@ -52,7 +52,7 @@ class BusTable(Table):
         return self
 
     def security(self, *names: str) -> NoSecurity | MutualTls:
-        """Who may connect, for a process whose certificate has one of these names."""
+        """Authentication of a process whose certificate has one of these common names."""
         if self.tls is None:
             return NO_SECURITY
         return MutualTls(self.tls.authority, self.tls.certificate, self.tls.key, names)

@@ -101,7 +101,7 @@ class Page:
         self._scene.show_first(view, self._panel.shows[0])
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
-        """What is shown of a mesh; None as long as its faces are unknown."""
+        """View of a mesh to draw; None as long as its faces are unknown."""
         topology = self._feed.topology(mesh)
         if topology is None:
             return None

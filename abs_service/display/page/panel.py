@@ -85,7 +85,7 @@ class Panel:
 
     @property
     def shows(self) -> tuple[bool, bool, bool]:
-        """Whether first pose, points and cameras are to be shown."""
+        """Check boxes for first pose, points and cameras: True to draw them."""
         return self._first.value, self._points.value, self._cameras.value
 
     def offer(self, trackers: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""What the page asks of a tracker: to detect its object anew, where its rig file says or where the user clicked."""
+"""Requests of the page to a tracker: detect the object again, in the rig file's region or where the user clicked."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

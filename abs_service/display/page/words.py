@@ -1,4 +1,4 @@
-"""What a rig's state means, in plain words: status, reason, age, and what to do about it."""
+"""The state of a rig in plain words: status, reason, age, and the remedy."""
 
 import math
 from collections.abc import Sequence

@@ -22,7 +22,7 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class Retention:
-    """What is kept in a folder of recordings.
+    """Limits of age and size of the recordings in a folder.
 
     Only files with the names that a recorder of this rig gives them count, and those beside which there is a file
     `*.keep` do not: they are never deleted. An unfinished file is never deleted either, but its size counts.
@@ -60,7 +60,7 @@ class Retention:
         return sorted(found, key=lambda file: (file.mtime_ns, file.path))
 
     def growth(self, rate: float) -> Growth:
-        """How they grow when so much is recorded [bytes/s]."""
+        """Growth of the recordings at a recording rate [bytes/s]."""
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, wall_ns: int) -> list[Path]:

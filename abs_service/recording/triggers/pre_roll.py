@@ -44,7 +44,7 @@ class PreRoll:
 
     @property
     def is_open(self) -> bool:
-        """Whether it is recorded."""
+        """True while messages are recorded."""
         return bool(self._trigger.reason)
 
     def put(self, sample: Sample) -> None:

@@ -1,4 +1,4 @@
-"""When to record: always, or from a trigger on until a time after it."""
+"""Triggers of a recording: always, or from an event on until some time after it."""
 
 import threading
 from collections.abc import Callable
@@ -14,11 +14,11 @@ _DOUBTFUL = (DeformationState.STATUS_DEGRADED, DeformationState.STATUS_LOST)
 
 
 class Trigger(Protocol):
-    """Says whether to record; called from any thread."""
+    """Decides whether to record; called from any thread."""
 
     @property
     def reason(self) -> str:
-        """Why it is recorded, "" if it is not."""
+        """Reason for recording; "" while nothing is recorded."""
         ...
 
     def ask(self, recording: bool) -> str:

@@ -153,7 +153,7 @@ class SparseView:
         return image
 
     def _front(self, surface: Surface, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float32]:
-        """What `render` returns for a surface at pixels (k,); of an image that nobody needs, no more is rendered."""
+        """Radial distances (k,) [m] of `render` at single pixels; renders only those unless the image is cached."""
         last, image = self._rendered
         return image[rows, columns] if last is surface else self._raster.render_at(surface.vertices[0], rows, columns)
 

@@ -31,7 +31,7 @@ MAX_SHARE = 0.95
 
 @dataclass(frozen=True)
 class Pulls:
-    """What each distinct pose says of the sensors' k parameters, with all board poses eliminated.
+    """Information of each distinct pose on the sensors' k parameters, with all board poses eliminated.
 
     Attributes:
         information: by pose (poses, k, k).

@@ -1,4 +1,4 @@
-"""What zenoh writes to standard output becomes lines of the log."""
+"""Output of zenoh to standard output becomes lines of the log."""
 
 import os
 import subprocess

@@ -47,7 +47,7 @@ class Rig:
         return image, info
 
     def written(self, count):
-        """Whether so many messages have been recorded."""
+        """True once so many messages have been recorded."""
         return self.said.counters["recorded"] >= count
 
     @property

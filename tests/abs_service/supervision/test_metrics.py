@@ -1,4 +1,4 @@
-"""What Prometheus reads, through its own parser; and what stands in its way."""
+"""Metrics as Prometheus's own parser reads them; and errors that prevent them."""
 
 import socket
 import sys

@@ -1,4 +1,4 @@
-"""What systemd is told: over a real datagram socket, at times in the test's hand; and what the unit file promises."""
+"""Notifications to systemd, over a real datagram socket and with a clock of the test; and the unit file."""
 
 import os
 import re
@@ -50,7 +50,7 @@ class Manager:
         log.last = EstimateReport(tracker, 0, "", status, (), (), (), None, None, None, 1.0, 1.0, 1, 1, 0)
 
     def after(self, seconds):
-        """What is sent until then, texts apart."""
+        """Messages sent until then, without the status texts."""
         self.now_ns += int(seconds * S)
         self.notifier.update(RigView("demo", "", Path(), self.live, (), 0.0, self.now_ns, ""))
         return [message for message in self.received() if not message.startswith("STATUS=")]

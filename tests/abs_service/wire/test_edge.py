@@ -1,4 +1,4 @@
-"""What the processes of a rig send comes in; everything else is counted by its cause."""
+"""Messages of a rig's processes are accepted; everything else is counted by its cause."""
 
 import math
 from typing import Any

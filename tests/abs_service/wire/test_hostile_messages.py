@@ -192,7 +192,7 @@ class TestRecorder:
 
 
 class Tracking:
-    """What a tracker takes from the bus: frame sets of one depth stream."""
+    """Input of a tracker from the bus: frame sets of one depth stream."""
 
     def __init__(self):
         self.bus, self.headers = LoopbackBus(), HeaderFactory("demo", WallClock())

@@ -32,7 +32,7 @@ FITS = {"color": color.fit, "grey": grey.fit, "bayer": bayer.fit}
 
 
 def exposures(query: str, stream: str, number: int) -> np.ndarray:
-    """What a head of the simulator delivers (number, …) while nothing moves, in SI values."""
+    """Images (number, …) of a stream of the simulator at rest, in SI values."""
     simulation = parse(f"simulated://sheet?{query}").build()
     frames = [frame for k in range(number) for frame in simulation.expose(k)[0] if frame.stream == stream]
     return np.array([frame.si() if frame.data.ndim == 2 else frame.data for frame in frames], float)

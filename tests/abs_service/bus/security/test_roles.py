@@ -1,4 +1,4 @@
-"""What the name of a certificate allows, on real sessions with mutual TLS."""
+"""Access rights by the name of a certificate, on real sessions with mutual TLS."""
 
 import logging
 import time

@@ -98,7 +98,7 @@ def test_hidden_vertices_stay(random_walk):
 @pytest.mark.parametrize("random_walk", [0.0, 1.6e-3])
 @pytest.mark.parametrize(("beyond", "frames", "most"), [(0.005, 1, 1.8e-3), (0.03, 15, 1.2e-3), (0.1, 15, 1.2e-3)])
 def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, most):
-    """What is no outlier by the sensor's σ moves the vertex a little, and is forgotten."""
+    """A measurement that the sensor's σ does not reject moves the vertex a little, and its effect decays."""
     model = Flat(np.zeros(N), 0.5e-3)
     offsets = learnt(model, random_walk)
     wild = np.zeros(N)
