@@ -30,12 +30,12 @@ class Comparison:
 
     Attributes:
         bounds: costs of the outlier model.
-        misplacement: texture registration noise.
+        registration_noise: of the texture.
         outline_px: standard deviation of the outline in a depth image; 0 for no outline.
     """
 
     bounds: Bounds
-    misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE
+    registration_noise: TextureRegistrationNoise = NO_REGISTRATION_NOISE
     outline_px: float = 0.0
 
 

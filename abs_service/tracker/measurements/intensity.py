@@ -43,7 +43,7 @@ class Measurement:
         """The reflectivity of a vertex in this light."""
         light = Active(sensor.camera.center) if self.noise.illumination == "active" else Passive()
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.misplacement)
+        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.registration_noise)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """The sensor's own values, per unit of its own light if it has one."""

@@ -13,7 +13,7 @@ from abs_service.tracker.detection.shapes.sheet_mesh import Sheet, rectangle_of
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import bends
-from abs_service.tracker.models.parts.bends import bend, roll, slopes
+from abs_service.tracker.models.parts.bends import bend, bend_jacobian, roll
 from abs_service.tracker.models.parts.rigid_transform import place
 from abs_service.tracker.models.parts.tile_buffer import LANES, TILE, write
 from calib import pose
@@ -158,7 +158,7 @@ class FlexPad:
         turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
         result = np.empty((len(turned), 3, DIMENSION))
         sheet = self._points, np.matmul(turn, self._rotation), self._per_bend, self._half
-        slopes(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
+        bend_jacobian(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
         result[:, :, ROTATION] = pose.rotated_points_jacobian(theta[ROTATION], turned)
         result[:, :, TRANSLATION] = np.eye(3)
         return result

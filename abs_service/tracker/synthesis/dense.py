@@ -117,7 +117,7 @@ class DenseView:
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: gradients of the image are more accurate than those of the lattice."""
         samples, _ = self._render(surface)
         return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)

@@ -121,7 +121,7 @@ class SparseView:
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
         return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients for the predicted surface, see `look`."""
         return self._gradients.per_pixel(self._attributes)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.perspective import project_with_slopes
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -51,13 +51,13 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    places, projection = project_with_slopes(camera, vertices)
+    places, projection = project_with_jacobian(camera, vertices)
     rows = np.empty((len(places), image.shape[2], 3))
     _color_rows(image, places, _REGRESSION, projection, rows)
     return rows
 
 
-def channel_slopes(
+def channel_gradients(
     values: NDArray[np.float32],
     channels: NDArray[np.float32],
     camera: Camera,

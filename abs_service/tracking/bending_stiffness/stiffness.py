@@ -85,11 +85,11 @@ class Stiffness:
 def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> InclinationProfile:
     """Inclinations and their covariance, propagated from theta (dim,) and its covariance (dim, dim)."""
     offsets = STEP * np.eye(len(theta))
-    slopes = np.stack(
+    jacobian = np.stack(
         [(model.inclination(theta + step) - model.inclination(theta - step)) / (2 * STEP) for step in offsets], axis=1
     )
     least = LEAST_DEVIATION**2 * np.eye(model.segments + 1)
-    return InclinationProfile(model.inclination(theta), slopes @ covariance @ slopes.T + least)
+    return InclinationProfile(model.inclination(theta), jacobian @ covariance @ jacobian.T + least)
 
 
 def estimate_stiffness(

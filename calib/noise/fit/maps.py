@@ -30,7 +30,7 @@ def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
 
 
 def least_sigma(file: Path, found: dict[str, NDArray[np.float64]]) -> float:
-    """Lower bound of the deviation in the arrays of a file [m], or the usual one.
+    """Lower bound of the deviation in the arrays of a file [m], or the default one.
 
     Raises:
         NoiseError: it is not a number above 0.

@@ -177,15 +177,15 @@ def _offsets(
     k = groups.basis.shape[1]
     precision = weight / (factors[groups.of] * groups.deviation) ** 2
     information = np.empty((groups.number, k, k))
-    told = np.empty((groups.number, k))
+    moments = np.empty((groups.number, k))
     for i in range(k):
-        told[:, i] = groups.sum(precision * groups.basis[:, i] * groups.residual)
+        moments[:, i] = groups.sum(precision * groups.basis[:, i] * groups.residual)
         for j in range(i + 1):
             information[:, i, j] = information[:, j, i] = groups.sum(
                 precision * groups.basis[:, i] * groups.basis[:, j]
             )
     covariance = np.linalg.inv(information + np.linalg.inv(prior))
-    offsets = np.einsum("gij,gj->gi", covariance, told)
+    offsets = np.einsum("gij,gj->gi", covariance, moments)
     known = groups.sum(weight) > 0
     following = (np.einsum("gi,gj->ij", offsets[known], offsets[known]) + covariance[known].sum(axis=0)) / known.sum()
     return offsets, following + np.eye(k) * _EQUAL_M**2, np.einsum("gij,gji->g", information, covariance)
@@ -208,14 +208,14 @@ def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64])
 
     By the moments of the logarithm of a scaled F distribution.
     """
-    told = (freedom >= _FEW) & (squares > 0)
-    if not told.any():
+    usable = (freedom >= _FEW) & (squares > 0)
+    if not usable.any():
         return max(float(squares.sum() / max(freedom.sum(), 1.0)), 1e-6), 1.0
-    half = freedom[told] / 2
-    logarithm = np.log(squares[told] / freedom[told]) - scipy.special.digamma(half) + np.log(half)
+    half = freedom[usable] / 2
+    logarithm = np.log(squares[usable] / freedom[usable]) - scipy.special.digamma(half) + np.log(half)
     excess = float(np.var(logarithm) - scipy.special.polygamma(1, half).mean())
     if excess <= 1e-6:  # no more scatter than sampling alone explains
-        return float(squares[told].sum() / freedom[told].sum()), 1e6
+        return float(squares[usable].sum() / freedom[usable].sum()), 1e6
     confidence = 2 * scipy.optimize.brentq(lambda y: scipy.special.polygamma(1, y) - excess, 1e-3, 1e7)
     centre = logarithm.mean() + scipy.special.digamma(confidence / 2) - np.log(confidence / 2)
     return float(np.exp(centre)), float(confidence)

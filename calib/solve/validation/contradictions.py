@@ -39,7 +39,7 @@ class Contradiction:
         shot: its number.
         sensors: whose view misses most, and, if each of the two fits alone, the other one of the pair.
         miss: root mean square residual of the first one's view [px], or [m] for distances.
-        usual: median over its views.
+        median: over its views.
         of: "corners" or "distances".
         apart: distance of the boards that the two see [m]; 0 for a single sensor.
         exchanged_with: shots whose image of one sensor fits that of the other here.
@@ -48,7 +48,7 @@ class Contradiction:
     shot: int
     sensors: tuple[str, ...]
     miss: float
-    usual: float
+    median: float
     of: str
     apart: float = 0.0
     exchanged_with: tuple[int, ...] = ()
@@ -56,8 +56,8 @@ class Contradiction:
     def __str__(self) -> str:
         """One clause for people."""
         unit, scale = ("px", 1.0) if self.of == "corners" else ("mm", 1e3)
-        miss, usual = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.usual))
-        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {usual} are usual"
+        miss, median = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.median))
+        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {median} are usual"
         if self.apart:
             said += f"; {' and '.join(self.sensors)} see the board {self.apart * 1e3:.1f} mm apart, and each fits alone"
         if self.exchanged_with:
@@ -86,7 +86,7 @@ def contradictions(solution: Solution) -> list[Contradiction]:
     found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
     if len(found) > _MOST * len(solution.task.shots):
         return []
-    return sorted(found, key=lambda one: -one.miss / one.usual)
+    return sorted(found, key=lambda one: -one.miss / one.median)
 
 
 def scatter(solution: Solution) -> list[Scatter]:
@@ -127,14 +127,14 @@ def _of_shot(
         if view.shot != shot:
             continue
         others = [one.rms for one in solution.views if (one.sensor, one.of) == (view.sensor, view.of)]
-        usual = max(float(np.median(others)), 1e-12)
+        median = max(float(np.median(others)), 1e-12)
         if view.of == "corners":
             sizes = np.linalg.norm(view.residuals, axis=1) / solution.deviations[f"{view.sensor} corners"]
             is_bad = float(np.median(sizes)) > _DEVIATIONS and view.rms > _HARMLESS_PX
         else:
             is_bad = float(np.mean(view.outliers)) > _OUTLIERS
-        if is_bad and (worst is None or view.rms / usual > worst.miss / worst.usual):
-            worst = Contradiction(shot, (view.sensor,), view.rms, usual, view.of)
+        if is_bad and (worst is None or view.rms / median > worst.miss / worst.median):
+            worst = Contradiction(shot, (view.sensor,), view.rms, median, view.of)
     return None if worst is None else _with_partner(worst, boards)
 
 

@@ -158,7 +158,7 @@ def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, e
         f'version = 1\nname = "bench"\nbus.endpoint = "{endpoint}"\nrecord = {{ minimum_free_bytes = 0 }}\n'
         '[devices.sim]\nuri = "simulated://sheet?tof=32x24&sensors=tof"\n[sensors.tof]\ndevice = "sim"\n'
     )
-    told = []
+    received = []
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.settimeout(60)
@@ -166,13 +166,13 @@ def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, e
         monkeypatch.setenv("WATCHDOG_USEC", "4000000")
         monkeypatch.delenv("WATCHDOG_PID", raising=False)
         process = launch("run", tmp_path / "rig.toml")
-        while told.count("WATCHDOG=1") < 3:
-            told.append(manager.recv(4096).decode())
+        while received.count("WATCHDOG=1") < 3:
+            received.append(manager.recv(4096).decode())
         process.send_signal(signal.SIGTERM)
-        while "STOPPING=1" not in told:
-            told.append(manager.recv(4096).decode())
+        while "STOPPING=1" not in received:
+            received.append(manager.recv(4096).decode())
         assert process.wait(20) == 0
-    order = [message for message in told if message in ("READY=1", "WATCHDOG=1", "STOPPING=1")]
+    order = [message for message in received if message in ("READY=1", "WATCHDOG=1", "STOPPING=1")]
     assert order == ["READY=1", *["WATCHDOG=1"] * (len(order) - 2), "STOPPING=1"]
 
 

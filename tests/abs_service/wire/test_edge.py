@@ -15,7 +15,7 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from hypothesis import given
 
 from abs_service.bus.contract import Sample
-from abs_service.bus.health import Health as Told
+from abs_service.bus.health import Health as HealthPublisher
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.wire.checked_bus import CheckedBus
@@ -155,19 +155,19 @@ class TestABusThatIsChecked:
         bus, arrived = LoopbackBus(), []
         checked = CheckedBus(bus, lambda: 0)
         checked.subscribe("**", arrived.append)
-        told = LoopbackBus()
-        health = Told(told, "run", HeaderFactory("demo", WallClock()))
+        health_bus = LoopbackBus()
+        health = HealthPublisher(health_bus, "run", HeaderFactory("demo", WallClock()))
         bad, good = sample("tof/model", SensorModel()), sample("tof/model", MODEL)
         bus.deliver(bad)
         bus.deliver(good)
         assert arrived == [good]
         checked.report(health)
-        said = health_now(health, told)
+        said = health_now(health, health_bus)
         assert said.counters["refused.content"] == 1
         assert said.level == Health.LEVEL_WARNING
         assert said.message.startswith("refused 1 messages, the last: tof/model: ")
         checked.report(health)  # nothing new
-        assert health_now(health, told).level == Health.LEVEL_OK
+        assert health_now(health, health_bus).level == Health.LEVEL_OK
 
     def test_answers_are_checked_too(self):
         bus = LoopbackBus()

@@ -99,8 +99,8 @@ class Run:
 
     @property
     def said(self):
-        told = [one for one in self.bus.sent if one.topic == "health/run"]
-        return Message.FromString(told[-1].payload)
+        published = [one for one in self.bus.sent if one.topic == "health/run"]
+        return Message.FromString(published[-1].payload)
 
 
 @pytest.fixture(autouse=True)
@@ -150,9 +150,9 @@ class Recording:
     """A recorder of a rig, and its health."""
 
     def __init__(self, directory):
-        self.bus, self.told = LoopbackBus(), LoopbackBus()
+        self.bus, self.health_bus = LoopbackBus(), LoopbackBus()
         clock = WallClock()
-        self.health = Health(self.told, "record", HeaderFactory("demo", clock))
+        self.health = Health(self.health_bus, "record", HeaderFactory("demo", clock))
         encode = encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.RAW)
         rig = RecorderSettings(directory, "demo", "version = 1\n", encode, minimum_free_bytes=0)
         self.recorder = Recorder(CheckedBus(self.bus, clock.monotonic), rig, self.health, clock)
@@ -163,7 +163,7 @@ class Recording:
             self.bus.deliver(one)
         self.recorder.stop(10)
         self.recorder.report()
-        return health_now(self.health, self.told)
+        return health_now(self.health, self.health_bus)
 
 
 class TestRecorder:

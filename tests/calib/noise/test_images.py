@@ -204,9 +204,9 @@ def test_readings_of_a_barrier_err_as_often_as_it_says_and_tell_it_again(model, 
     sizes = np.array([crossing.sum(), (~crossing).sum()])
     rates = np.array([model.miss, model.false_alarm])
     allowed = 5 * np.sqrt(rates * (1 - rates) / sizes) + 1 / sizes
-    told = np.array([1 - readings[crossing].mean(), readings[~crossing].mean()])
-    assert np.all(np.abs(told - rates) < allowed)
-    if told.max() < 0.49:
+    estimated = np.array([1 - readings[crossing].mean(), readings[~crossing].mean()])
+    assert np.all(np.abs(estimated - rates) < allowed)
+    if estimated.max() < 0.49:
         found = binary.fit(readings, crossing, 0.8)
         assert np.all(np.abs(np.array([found.miss, found.false_alarm]) - rates) < allowed)
         assert found.length_m == 0.8

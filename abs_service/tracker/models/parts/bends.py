@@ -133,7 +133,7 @@ def roll(
 
 
 @kernel
-def slopes(
+def bend_jacobian(
     parameters: NDArray[np.float64],
     height: float,
     full_height: float,

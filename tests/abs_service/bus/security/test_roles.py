@@ -93,12 +93,12 @@ def test_all_but_capture_read_everything(name, rig, secured):
     sender.answer_queries("config", "m", lambda: b"toml")
     assert eventually(lambda: bool(rig.query("config", 1.0)))
 
-    def heard():
+    def complete():
         for publisher in publishers:
             publisher.put(b"")
         return {sample.topic for sample in (arrived if name in roles.READERS else control)} == set(PUBLISHERS)
 
-    assert eventually(heard)
+    assert eventually(complete)
     assert bool(arrived) == bool(client.query("config", 1.0)) == (name in roles.READERS)
 
 

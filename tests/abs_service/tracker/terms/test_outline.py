@@ -69,22 +69,22 @@ def test_look_up_is_bilinear_interpolation(seed: int):
     image = generator.normal(size=(7, 9)).astype(np.float32)
     image[generator.random(image.shape) < 0.05] = np.nan
     places = generator.uniform(-1, 10, (40, 2))
-    values, slopes = np.empty(40), np.empty((40, 2))
-    look_up(image, places, values, slopes)
+    values, gradients = np.empty(40), np.empty((40, 2))
+    look_up(image, places, values, gradients)
     inside = np.all((places >= 0) & (places < (8, 6)), axis=1)
     expected = map_coordinates(image.astype(float), places[:, ::-1].T, order=1, cval=np.nan)
     known = inside & np.isfinite(expected)
     np.testing.assert_allclose(values[known], expected[known], atol=1e-5)
     assert np.all(values[~inside] > 1e8)
-    assert not slopes[~inside].any()
-    # Within a cell, the value changes as the slopes say where the other coordinate stays.
+    assert not gradients[~inside].any()
+    # Within a cell, the value changes as the gradients say where the other coordinate stays.
     for axis in range(2):
         step = np.zeros(2)
         step[axis] = 1e-4
         there, ignored = np.empty(40), np.empty((40, 2))
         look_up(image, places + step, there, ignored)
         same = known & np.all(np.floor(places) == np.floor(places + step), axis=1)
-        np.testing.assert_allclose((there - values)[same] / 1e-4, slopes[same, axis], atol=1e-4)
+        np.testing.assert_allclose((there - values)[same] / 1e-4, gradients[same, axis], atol=1e-4)
 
 
 @pytest.mark.parametrize("lens", [Lens(), Lens(np.array([-0.2, 0.05])), KannalaBrandt(np.array([0.05, -0.01]))])
