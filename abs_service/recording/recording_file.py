@@ -17,7 +17,7 @@ ESTIMATES = "_estimates"
 
 
 def private(path: str, flags: int) -> int:
-    """Opener of a recording, which shows people: its owner and, to read, the group may open it, nobody else."""
+    """Opener of a recording, which shows people: its owner may write it, its group may read it, no others may."""
     return os.open(path, flags, 0o640)
 
 

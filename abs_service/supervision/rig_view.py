@@ -26,7 +26,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Recording:
-    """The recorder: file being written, its size, bytes written per second, what was recorded and what was lost.
+    """The recorder: file being written, its size, bytes written per second, recorded and dropped messages.
 
     `forecast` says how long the disk lasts; "" in the first seconds.
     """

@@ -64,7 +64,7 @@ class Child:
         state: its state.
         reason: of the state, in plain words.
         restarts: how often it was started again.
-        process: what runs it; `NO_PROCESS` while nothing does.
+        process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
     """
 

@@ -35,7 +35,7 @@ class Notifier:
         self._text = ""
 
     def update(self, view: RigView) -> None:
-        """Sends what has changed since the last call, and signs of life as often as systemd needs them."""
+        """Sends changes since the last call, and watchdog messages as often as systemd needs them."""
         self._tell(view)
         counts = _counts(view)
         if not self._ready and all(counts.values()):

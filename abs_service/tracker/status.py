@@ -54,7 +54,7 @@ def judge(
     Args:
         fits: agreement of every contributing sensor.
         missing: sensors without a frame.
-        shape: what the deformed mesh shows by itself.
+        shape: quality of the deformed mesh.
         surprise: see `MotionPrior`.
         limits: thresholds.
     """

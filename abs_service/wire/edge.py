@@ -108,7 +108,7 @@ def check_sample(sample: Sample) -> None:
     """Checks a message: its type, its content, and that it belongs to its topic.
 
     Raises:
-        MessageError: names what is wrong.
+        MessageError: names the field and the error.
     """
     if sample.message not in SCHEMAS:
         raise MessageError("type", f"{sample.message[:100]!r} is none of {sorted(SCHEMAS)}")

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Explanation:
-    """A hypothesis with what the shots say of it.
+    """A hypothesis with its evidence from the shots.
 
     Attributes:
         hypothesis: the hypothesis.
@@ -112,7 +112,7 @@ def compare(stored: Stored, views: Views) -> Comparison:
 
 
 def _stored_changes(stored: Stored, names: Sequence[str]) -> Array:
-    """Changes (n, k) by one deviation each of what the stored calibration leaves open."""
+    """Changes (n, k) by one deviation each of the stored calibration's undetermined directions."""
     known = [name for name in stored.names if name in names]
     if stored.covariance is None or not known:
         return np.zeros((len(names), 0))

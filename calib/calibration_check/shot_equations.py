@@ -1,4 +1,4 @@
-"""Linearised equations of single shots: what each says of changes of the sensors, whatever the board's pose was.
+"""Linearised equations of single shots for changes of the sensors, with the board's pose eliminated.
 
 The residuals of a shot are r + J x + E e: changes x of the sensors since the calibration, and e ~ N(0, 1), by which
 each view sees the board elsewhere than it is (exposures at different moments, errors that the distances of a view

@@ -1,4 +1,4 @@
-"""Quantisation of distances, told from the values themselves: a file may count in finer units than its sensor."""
+"""Quantisation of distances, estimated from the values themselves: a file may count in finer units than its sensor."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ _QUARTILES = 1.349
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Quantisation step at distance x: the largest of `digit`, `growth` · x² and what was observed.
+    """Quantisation step at distance x: the largest of `digit`, `growth` · x² and the observed step.
 
     Attributes:
         digit: resolution at any distance [m]; 0 if there is none.

@@ -10,7 +10,7 @@ MOST_PIXELS = 1 << 26
 
 
 class ImageSizeError(ValueError):
-    """An image that is too large, or whose size cannot be told."""
+    """An image that is too large, or whose size is unknown."""
 
 
 def check(content: bytes) -> None:
@@ -30,6 +30,6 @@ def check(content: bytes) -> None:
     except Image.DecompressionBombError:
         raise ImageSizeError(f"more than the {MOST_PIXELS} pixels that are allowed") from None
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, EOFError, ArithmeticError) as error:
-        raise ImageSizeError(f"no image whose size can be told: {type(error).__name__}") from error
+        raise ImageSizeError(f"no image with a known size: {type(error).__name__}") from error
     if width * height > MOST_PIXELS:
         raise ImageSizeError(f"{width} × {height} pixels, {MOST_PIXELS} are allowed")

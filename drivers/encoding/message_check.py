@@ -1,6 +1,6 @@
-"""Validation of messages from other programs, by schema and range: the only place that says what is allowed.
+"""Validation of messages from other programs, by schema and range: the only place that defines valid messages.
 
-Whoever may publish can send any bytes. What passes here can be shown, computed with and recorded without another look.
+A publisher can send any bytes. Messages that pass can be displayed, processed and recorded without another check.
 """
 
 import math
@@ -52,7 +52,7 @@ _RANGES: Mapping[str, tuple[int, int]] = {
     "foxglove.RawImage.height": (0, LARGEST_SIDE),
 }
 
-#: Lists of which only the length is checked: points and colours that nobody but a viewer reads.
+#: Lists of which only the length is checked: points and colours that only viewers read.
 _VIEWED = frozenset(f"foxglove.TriangleListPrimitive.{name}" for name in ("points", "colors"))
 
 #: Numbers that are used without a look: neither NaN nor infinite. Of others, NaN and infinity mean unknown.

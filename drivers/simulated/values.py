@@ -1,4 +1,4 @@
-"""Parsers of an address's values; they raise a ValueError that names what is allowed."""
+"""Parsers of an address's values; they raise a ValueError that names the allowed values."""
 
 import re
 from collections.abc import Callable, Iterable

@@ -1,4 +1,4 @@
-"""The page: reads the feed and updates scene and panel, a few times a second each, while somebody looks."""
+"""The page: reads the feed and updates scene and panel, a few times a second each, while a browser is connected."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +23,7 @@ from abs_service.tracking.tracker_log import points
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
 
-#: Periods of the page: mesh, points and images, words and plots [s]; with nobody looking [s].
+#: Periods of the page: mesh, points and images, words and plots [s]; without a browser [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
 #: A click means the first point that is so near to its ray, in distances between neighbouring points.

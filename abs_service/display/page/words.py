@@ -20,7 +20,7 @@ STALE_COLOR = "#6b7280"
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A line about a tracker or a rig: title, reasons and what to do, and its colour."""
+    """A line about a tracker or a rig: title, reasons and remedy, and its colour."""
 
     title: str
     text: str

@@ -65,7 +65,7 @@ def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
     """Draws a preview; the file's suffix says the format.
 
     Args:
-        preview: what is drawn.
+        preview: to draw.
         tracker, model: name of the tracker, type of its deformation model.
         path: file to write.
 
@@ -89,7 +89,7 @@ def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
 
 
 def title(preview: Preview, tracker: str, model: str) -> str:
-    """One line: what would be tracked, how large and how far away it is."""
+    """One line on the detected object: name, size and distance."""
     frame = f"frame {preview.number}"
     found = preview.found
     if found is None:

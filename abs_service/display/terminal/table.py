@@ -41,7 +41,7 @@ class TableDisplay:
         self._region.stop()
 
     def update(self, view: RigView) -> None:
-        """See `Display`; the region draws by itself what it was given last."""
+        """See `Display`; the region redraws its last content by itself."""
         self._region.update(draw(view, self._spinner))
 
     def estimate(self, report: EstimateReport) -> None:

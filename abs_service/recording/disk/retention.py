@@ -30,7 +30,7 @@ class Retention:
     Attributes:
         directory: the folder.
         name: name of the rig, with which its recordings begin.
-        kind: what their names have after the time: "", or that of the files of estimates.
+        kind: suffix of their names after the time: "", or that of the files of estimates.
         retain_s: age at which a recording is deleted [s]; infinite to keep all.
         retain_bytes: size of all recordings together beyond which the oldest are deleted; infinite to keep all.
     """
@@ -64,7 +64,7 @@ class Retention:
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, wall_ns: int) -> list[Path]:
-        """Deletes what is not to be kept, and returns it.
+        """Deletes the files beyond the limits, and returns them.
 
         Args:
             wall_ns: the present [ns since the epoch].

@@ -22,7 +22,7 @@ class Trigger(Protocol):
         ...
 
     def ask(self, recording: bool) -> str:
-        """Begins, or ends, as somebody asks; returns why that is refused, "" if it is not."""
+        """Begins or ends on a command; returns the reason for a refusal, "" if accepted."""
         ...
 
     def watch(self, sample: Sample) -> None:
@@ -81,7 +81,7 @@ class Asked:
         return ""
 
     def resume(self) -> None:
-        """Goes on with what a recorder that was killed did: until asked to end, or as after an event."""
+        """Resumes the recording of a killed recorder: until a command ends it, or as after an event."""
         with self._lock:
             self._asked = not self._watches_status
             self._event, self._until_ns = "the recorder was interrupted", self._clock() + self._post_roll_ns

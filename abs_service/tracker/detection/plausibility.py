@@ -1,4 +1,4 @@
-"""Doubts about a detected object: impossible sizes are refused, a region that looks like the scene is told."""
+"""Plausibility of a detected object: refuses impossible sizes, warns of a region that looks like the scene."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +34,7 @@ def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor:
 
     Args:
         points: the points; none is in order, because then the region has more to say.
-        what: their name in the message.
+        what: name in the message.
         largest: largest possible diagonal [m].
         sensor: name of the sensor that measured them.
 

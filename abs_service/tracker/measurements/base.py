@@ -1,4 +1,4 @@
-"""Interface of a kind of measurement, and what several kinds decode alike."""
+"""Interface of a kind of measurement, and decoding that several kinds share."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -74,7 +74,7 @@ class FirstImages:
 
 
 class PictureKind(MeasurementKind, Protocol):
-    """Measurements of what the surface looks like; their noise is an `ImageNoise`."""
+    """Measurements of the surface's appearance; their noise is an `ImageNoise`."""
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """Appearance (n, channels) of the vertices in one sensor, NaN where unknown.

@@ -34,7 +34,7 @@ class Measurement:
         return ColorTerm(sensor.name, synthesizer, looks, self.noise, bounds, comparison.registration_noise)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """The sensor's own values, because no two cameras agree on a colour; else what others saw."""
+        """The sensor's own values, because no two cameras agree on a colour; else those of other cameras."""
         return known(seen, first.colors)
 
     def colors(self, seen: Values) -> Values:

@@ -39,7 +39,7 @@ class Measurement:
         )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """The sensor's own values; else the luma of what others saw."""
+        """The sensor's own values; else the luma of other cameras' colours."""
         return known(seen, first.colors @ LUMA[:, None])
 
     def colors(self, seen: Values) -> Values:

@@ -1,4 +1,4 @@
-"""Heights of measured points above a mesh: what a depth image shows at every vertex beyond the estimated surface."""
+"""Heights of measured points above a mesh: residual of a depth image at every vertex, along the normal."""
 
 from dataclasses import dataclass
 

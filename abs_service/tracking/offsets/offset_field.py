@@ -1,4 +1,4 @@
-"""A field of vertex offsets over a mesh: what single vertices show of it, and how neighbours are expected to agree.
+"""Gaussian random field of vertex offsets over a mesh: evidence of each vertex, and a prior that couples neighbours.
 
 Every vertex has evidence, a mean m and a precision p, of its own offset. The prior holds an offset o at a rest r with a
 precision a, and neighbours' deviations from it together. The most probable offsets minimise

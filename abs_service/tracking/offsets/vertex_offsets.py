@@ -156,7 +156,7 @@ class LearntOffsets:
         self._precision = total
 
     def _infer(self) -> None:
-        """The most probable offsets, within what their vertices' edges allow."""
+        """The most probable offsets, bounded by the lengths of their vertices' edges."""
         offset = self._field.solve(self._mean, self._precision, self._prior, self._offset)
         most = LARGEST_CHANGE * self._around
         self._offset = np.clip(offset, self._first - most, self._first + most)

@@ -1,7 +1,7 @@
 """Depth terms that the shots hardly hold, in words: distances that are long look like a sensor that stands elsewhere.
 
-Parameters are expressed by what they move at the scene's distance [m]. The eigenvector of a sensor's depth terms with
-the largest variance, and what changes with it, is the change that leaves all residuals nearly as they are.
+Parameters are expressed by the displacement that they cause at the scene's distance [m]. The eigenvector of a sensor's
+depth terms with the largest variance, with the parameters that it changes, leaves all residuals nearly as they are.
 """
 
 import numpy as np

@@ -46,7 +46,7 @@ class Settings:
         return Restricted(self._above, restricted(self._selected, self.within).select)
 
     def _above(self, view: DepthView) -> DepthView:
-        """The view without the plane and what is beyond it; DetectionError if there is no plane."""
+        """The view without the plane and everything beyond it; DetectionError if there is no plane."""
         q = _dominant_plane(view, self.clearance_m)
         height = _height(view, q)
         with np.errstate(invalid="ignore"):

@@ -25,7 +25,7 @@ class Settings:
         pixel: column and row of a pixel of the object in the depth image [px]. One of `pixel`, `color` and `motion_s`
             is needed.
         color: red, green, blue of the object; the largest surface of about this colour is it.
-        motion_s: time within which the object moves [s]; what has moved in it is the object.
+        motion_s: time within which the object moves [s]; pixels that moved in it belong to the object.
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
         least_motion_m: least change towards the sensor of a surface that has moved [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].

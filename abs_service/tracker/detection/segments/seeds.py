@@ -1,4 +1,4 @@
-"""Seeds: what is known of the object beforehand, as pixels of a depth image and the surface that they lie on."""
+"""Seeds: prior knowledge of the object, as pixels of a depth image and the surface that they lie on."""
 
 from collections import deque
 from collections.abc import Callable
@@ -94,7 +94,7 @@ class ColorSeed:
 
 
 class MotionSeed:
-    """The surface that moved in front of what was there before; compares the last of images in order of time.
+    """The surface that moved in front of the previous scene; compares the last of images in order of time.
 
     Args:
         seconds: for how long images are compared [s].
@@ -129,7 +129,7 @@ class MotionSeed:
         while len(self._before) > 1 and view.t_ns - self._before[1][0] >= period_ns:
             self._before.popleft()
         if self._before and not 0 <= view.t_ns - self._before[-1][0] <= period_ns:
-            self._before.clear()  # nobody asked for a while
+            self._before.clear()  # no detection for a while
         if not self._before or view.t_ns - self._before[-1][0] >= period_ns / COMPARED:
             self._before.append((view.t_ns, view.distance))
         return (view.t_ns - self._before[0][0]) * 1e-9

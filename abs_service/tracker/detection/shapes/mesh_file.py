@@ -62,7 +62,7 @@ def load(path: Path, metres: float, vertices: int) -> KnownObject:
         vertices: see above.
 
     Raises:
-        DetectionError: the file is missing, or no mesh that can be tracked; names the key and what is allowed.
+        DetectionError: the file is missing, or no mesh that can be tracked; names the key and the allowed values.
     """
     content = _read(path)
     given = _checked(_mesh(content, metres), path)

@@ -3,7 +3,7 @@
 A robust iterative closest point method (ICP) from many starts. Every point of the object is drawn onto the tangential
 plane of the nearest sample of the surface that faces the camera (Chen and Medioni, 1992), or onto the sample itself if
 it lies beside the surface. And every sample that lies before the background is drawn onto the nearest point of the
-object: the camera would have seen it. What something else hides counts neither way, so the object may be partly hidden.
+object: the camera would have seen it. Occluded points are ignored, so the object may be partly occluded.
 """
 
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class Scene:
         points: some points (k, 3) of the object [m].
         tree: for the nearest of them.
         camera: the depth camera.
-        background: distance (height, width) [m] of what is around the object; infinite where nothing is seen and most
+        background: distance (height, width) [m] of the scene around the object; infinite where nothing is seen and most
             of the surroundings is empty, NaN where it is unknown, and on and next to the object.
         gap: see `LEAST_GAP_M` [m].
         scale: size of an error from which on it counts linearly instead of squared [m].
@@ -77,7 +77,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Linearised errors of one pose, and what they consist of.
+    """Linearised errors of one pose, and their parts.
 
     Attributes:
         residual: (m,) [m].

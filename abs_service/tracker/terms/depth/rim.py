@@ -26,7 +26,7 @@ class Rim:
 
     @classmethod
     def of(cls, mesh: Mesh) -> "Rim":
-        """The rim of a mesh: what is on an edge of one face only."""
+        """The rim of a mesh: vertices on an edge of one face only."""
         sides = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
         edges, count = np.unique(sides, axis=0, return_counts=True)
         outside = np.zeros(len(mesh.vertices), np.bool_)
