@@ -18,7 +18,7 @@ from calib.solve.start.board_poses import pose_candidates
 #: Increments for finite differences with respect to a pose [rad, m].
 _STEP = 1e-5
 #: Lower bound of the deviation of corners [px].
-_LEAST_PX = 0.02
+_MIN_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +63,7 @@ def locate(view: CornerView, observer: Camera, depth: Camera) -> StaticBoard:
     inside = _inside(depth, pose.transform(T_rb, view.points_b))
     if not inside.any():
         raise NoiseError(f"the depth sensor does not see the board that {view.sensor} sees")
-    sigma = max(float(np.sqrt(np.sum(np.square(misses)) / max(len(misses) - 6, 1))), _LEAST_PX)
+    sigma = max(float(np.sqrt(np.sum(np.square(misses)) / max(len(misses) - 6, 1))), _MIN_PX)
     covariance = sigma**2 * np.linalg.inv(jacobian.T @ jacobian)
     rays = depth.rays()[inside]
     distance_jacobian = np.stack([_slope(T_rb, number, depth, rays) for number in range(6)], axis=1)

@@ -11,7 +11,7 @@ from calib.noise.base import NoiseError
 from calib.noise.fit.fitting import MAD_TO_SIGMA
 
 #: Frames per segment, and minimum number of frames.
-SEGMENT, LEAST_FRAMES = 30, 8
+SEGMENT, MIN_FRAMES = 30, 8
 
 #: Minimum fraction of frames with a return, and of inliers among these, for a static pixel.
 _RETURNS, _INLIERS = 0.8, 0.9
@@ -63,8 +63,8 @@ def segments(n: int) -> list[slice]:
     Raises:
         NoiseError: too few frames.
     """
-    if n < LEAST_FRAMES:
-        raise NoiseError(f"{n} frames are too few to tell noise from motion; record at least {LEAST_FRAMES}")
+    if n < MIN_FRAMES:
+        raise NoiseError(f"{n} frames are too few to tell noise from motion; record at least {MIN_FRAMES}")
     edges = np.linspace(0, n, max(1, round(n / SEGMENT)) + 1).astype(int)
     return [slice(first, last) for first, last in pairwise(edges)]
 

@@ -23,10 +23,10 @@ from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.
-MOST_SHOTS = 40
+MAX_SHOTS = 40
 
 #: Maximum number of distances per view; errors of neighbours are correlated, so more add little.
-MOST_DISTANCES = 300
+MAX_DISTANCES = 300
 
 #: Expected reprojection error if the calibration does not contain its own [px].
 BASELINE_PX = 0.5
@@ -170,13 +170,13 @@ def _thinned(views: Views) -> Views:
     seen = Counter(view.shot for view in views.corners)
     best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}
     shots = sorted(best.values())
-    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
+    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MAX_SHOTS, len(shots))).round().astype(int)}
     fewer = views.of(views.shots, kept)
     return Views(fewer.corners, [_sparse(view) for view in fewer.planes])
 
 
 def _sparse(view: PlaneView) -> PlaneView:
-    every = max(1, len(view.pixels) // MOST_DISTANCES)
+    every = max(1, len(view.pixels) // MAX_DISTANCES)
     parts = {part: getattr(view, part)[::every] for part in ("pixels", "distances", "sigmas")}
     return replace(view, **parts)
 

@@ -38,7 +38,7 @@ class Settings:
 
 
 #: Lower bound of the share of the predicted mesh in the image by which its number of pixels is divided.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 
 #: Samples of an empty population.
 _NONE = Samples(
@@ -110,7 +110,7 @@ class DenseView:
     def look(self, predicted: Surface) -> None:
         """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
         samples, share = self._render(predicted)
-        self._expected = float(samples.count[0]) / max(float(share[0]), LEAST_SHARE)
+        self._expected = float(samples.count[0]) / max(float(share[0]), MIN_SHARE)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population; samples beyond a candidate's number of covered pixels have pixel −1."""

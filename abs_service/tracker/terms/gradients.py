@@ -16,7 +16,7 @@ _BELL = np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
 _REGRESSION = _BELL / np.sum(_BELL * _STEPS**2)
 
 #: Smallest cosine between line of sight and normal; at grazing views a row would grow without bound.
-LEAST_COSINE = 0.2
+MIN_COSINE = 0.2
 
 
 def depth_rows(
@@ -123,7 +123,7 @@ def _depth_rows(
         v = use[k]
         x, y, z = vertices[v, 0] - center[0], vertices[v, 1] - center[1], vertices[v, 2] - center[2]
         along = normals[v, 0] * x + normals[v, 1] * y + normals[v, 2] * z
-        cosine = min(along / np.sqrt(x * x + y * y + z * z), -LEAST_COSINE)
+        cosine = min(along / np.sqrt(x * x + y * y + z * z), -MIN_COSINE)
         for i in range(3):
             rows[k, i] = -normals[v, i] * weight[v] / cosine
 

@@ -38,10 +38,10 @@ TILT = 0.2
 LARGEST_CHANGE = 0.5
 
 #: A face is folded if the cosine of its angle to the surface is below this; its vertices are not measured.
-LEAST_FACING = 0.3
+MIN_FACING = 0.3
 
 #: The longest time step of the random walk [s], and the least σ of a first offset [m].
-LONGEST_INTERVAL_S, LEAST_DEVIATION_M = 0.5, 1e-5
+LONGEST_INTERVAL_S, MIN_DEVIATION_M = 0.5, 1e-5
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class LearntOffsets:
 
     def __init__(self, model: OffsetModel, sensor: Sensor, noise: DepthNoise, random_walk: float):
         mesh = model.mesh
-        deviation = np.maximum(np.broadcast_to(mesh.deviation, len(mesh.vertices)), LEAST_DEVIATION_M)
+        deviation = np.maximum(np.broadcast_to(mesh.deviation, len(mesh.vertices)), MIN_DEVIATION_M)
         self.variance = deviation**2
         self._model, self._random_walk = model, random_walk
         self._heights = HeightSensor(sensor.camera, noise, mesh)
@@ -189,7 +189,7 @@ def _mark_folded(
         facing = x * (normals[a, 0] + normals[b, 0] + normals[c, 0])
         facing += y * (normals[a, 1] + normals[b, 1] + normals[c, 1])
         facing += z * (normals[a, 2] + normals[b, 2] + normals[c, 2])
-        if facing / 3 < LEAST_FACING * np.sqrt(x * x + y * y + z * z):
+        if facing / 3 < MIN_FACING * np.sqrt(x * x + y * y + z * z):
             result[a] = result[b] = result[c] = True
 
 

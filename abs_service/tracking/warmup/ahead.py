@@ -17,7 +17,7 @@ from abs_service.tracking.warmup.pool import Pool
 from calib.jit import Kernel
 
 #: Processes beyond this number gain little: the longest kernel alone takes a tenth of the whole.
-MOST_WORKERS = 8
+MAX_WORKERS = 8
 #: Interval of the reports while the last kernels are waited for [s].
 PERIOD_S = 0.2
 
@@ -59,7 +59,7 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
         taken.append(kernel)
         return StandIn(kernel, pool)
 
-    workers = min(MOST_WORKERS, len(os.sched_getaffinity(0)))
+    workers = min(MAX_WORKERS, len(os.sched_getaffinity(0)))
     with Pool(workers) as pool:
         Kernel.stand_in = stand_in
         try:

@@ -28,7 +28,7 @@ _EQUAL_M = 1e-6
 _FEW = 4
 
 #: Lower bound of a factor on the deviation: a place that repeats itself is stuck or filtered, not ten times better.
-LEAST_FACTOR = 0.1
+MIN_FACTOR = 0.1
 
 
 class Repeats(NamedTuple):
@@ -102,13 +102,13 @@ def refine(
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
     basis = basis_of(samples.true, parent.distances, degree)
-    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.least_sigma)
+    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.minimum_sigma)
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
         raw = polypow([-middle / half, 1 / half], power)  # ((x − middle) / half)ᵖᵒʷᵉʳ as a polynomial in x
         mu[: power + 1, 0] += np.outer(raw, offsets[:, power])
-    least = parent.least_sigma * float(factors.min())
+    least = parent.minimum_sigma * float(factors.min())
     return Polynomials(parent.sigma[..., parent_of] * factors, mu, parent.distances, parent.amplitudes, least)
 
 
@@ -144,7 +144,7 @@ def shrink(
     """
     of = place.astype(np.int64)
     mean_square = np.bincount(of, np.square(least / deviation), places) / np.bincount(of, minlength=places).clip(1)
-    floor = np.maximum(np.sqrt(mean_square), LEAST_FACTOR)
+    floor = np.maximum(np.sqrt(mean_square), MIN_FACTOR)
     groups = _Groups(residual, deviation, basis, of, places, repeats, floor)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
     offsets[:, 0] = groups.medians(groups.residual)

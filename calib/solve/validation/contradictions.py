@@ -24,7 +24,7 @@ _HARMLESS_PX = 0.5
 #: Fraction of outliers among the distances of a view that contradicts.
 _OUTLIERS = 0.5
 #: Above this fraction of contradicting shots there is no rest that they contradict.
-_MOST = 1 / 3
+_MAX_SHARE = 1 / 3
 #: Images of a shot that fit this many times better alone, and miss by this much together, are of different moments.
 _BETTER, _SCATTERS_PX = 3.0, 0.5
 #: Exchanged images put the board in the same place again to this share of what they are apart.
@@ -84,7 +84,7 @@ def contradictions(solution: Solution) -> list[Contradiction]:
     """Shots that contradict the rest, the worst first; empty if they are too many to have a rest."""
     boards = _boards(solution)
     found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
-    if len(found) > _MOST * len(solution.task.shots):
+    if len(found) > _MAX_SHARE * len(solution.task.shots):
         return []
     return sorted(found, key=lambda one: -one.miss / one.median)
 

@@ -19,7 +19,7 @@ from abs_service.bus.health import Health as HealthPublisher
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.wire.checked_bus import CheckedBus
-from abs_service.wire.edge import MOST_PER_S, MOST_TOPICS, Edge
+from abs_service.wire.edge import MAX_PER_S, MAX_TOPICS, Edge
 from abs_service.wire.viewer_messages import point_cloud, scene_update
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.wire.golden.freeze import BINARY, published
@@ -129,7 +129,7 @@ def test_too_many_messages_of_a_topic_in_a_second_are_refused():
     now_ns = [0]
     edge = Edge(lambda: now_ns[0])
     health = sample("health/run", Health(component="run"))
-    assert sum(edge.admits(health) for _ in range(MOST_PER_S + 10)) == MOST_PER_S
+    assert sum(edge.admits(health) for _ in range(MAX_PER_S + 10)) == MAX_PER_S
     assert edge.refused == {"rate": 10}
     assert edge.admits(sample("health/record", Health(component="record")))
     now_ns[0] = S
@@ -138,8 +138,8 @@ def test_too_many_messages_of_a_topic_in_a_second_are_refused():
 
 def test_too_many_topics_are_refused_and_the_known_ones_go_on():
     edge = Edge(lambda: 0)
-    flood = [sample(f"health/{number}", Health(component=str(number))) for number in range(MOST_TOPICS + 5)]
-    assert sum(map(edge.admits, flood)) == MOST_TOPICS
+    flood = [sample(f"health/{number}", Health(component=str(number))) for number in range(MAX_TOPICS + 5)]
+    assert sum(map(edge.admits, flood)) == MAX_TOPICS
     assert edge.refused == {"topics": 5}
     assert edge.admits(flood[0])
 

@@ -116,7 +116,7 @@ def test_as_many_unseen_samples_as_promised_lie_within_one_and_two_deviations(se
 def test_a_model_that_is_wrong_by_a_factor_is_told_by_the_variance():
     right = tof_amplitude.fit(laws.time_of_flight(1))
     half = dataclasses.replace(
-        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, least_sigma=1e-4
+        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, minimum_sigma=1e-4
     )
     quality = goodness_of_fit(half, laws.time_of_flight(2))
     assert quality.variance == pytest.approx(4, rel=0.1)

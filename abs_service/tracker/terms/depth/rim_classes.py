@@ -14,7 +14,7 @@ LARGEST_GAP_STEPS = 2.0
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
-LEAST_COSINE = 0.25
+MIN_COSINE = 0.25
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
@@ -60,7 +60,7 @@ def classify_rim(
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
     classes[~(beyond <= LARGEST_GAP_STEPS)] = RimClass.CONTACT
-    classes[end_cosine < LEAST_COSINE] = RimClass.SILHOUETTE
+    classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER
