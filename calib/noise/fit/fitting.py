@@ -93,9 +93,9 @@ def maximize_likelihood(
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
     bound = np.maximum(least / unit, _MIN_SPREAD)
-    samples = _Samples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
+    samples = ResidualSamples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
     turned = Design(_solved(pseudo_samples.mean, r_mean), _solved(pseudo_samples.spread, r_spread))
-    regularization = _PseudoSamples(center / unit, turned, power)
+    regularization = PseudoSamples(center / unit, turned, power)
 
     def cost(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Negative log-likelihood per sample, and its gradient; ε is parametrised by its logit."""
@@ -115,7 +115,7 @@ def maximize_likelihood(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Samples:
+class ResidualSamples:
     """Log-likelihood of the samples, in units of their spread.
 
     Attributes:
@@ -148,7 +148,7 @@ class _Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _PseudoSamples:
+class PseudoSamples:
     """Expected log-likelihood of one pseudo-sample of mean `center` and spread 1 under each condition."""
 
     center: float
@@ -238,7 +238,7 @@ def _bounded(
     return np.maximum(v, least), v > least
 
 
-def _start(samples: _Samples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+def _start(samples: ResidualSamples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Initial parameters by least squares with clipped residuals; constant spread if a linear one would be negative."""
     r, (mean, spread), power = samples.residual, samples.columns, samples.power
     middle = np.median(r) if mean.shape[1] else 0.0

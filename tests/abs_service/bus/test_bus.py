@@ -8,7 +8,6 @@ import threading
 import time
 from typing import Any
 
-import numpy as np
 import pytest
 import zenoh
 
@@ -113,14 +112,10 @@ def test_a_slow_subscriber_neither_blocks_the_publisher_nor_others(buses, blocke
     publish_until_received(publisher, arrived, b"first")
     while begun.empty():
         publish_until_received(publisher, arrived, b"first")
-    durations = []
     for number in range(60):
-        before = time.perf_counter()
         publisher.put(bytes(100_000), str(number).encode())
-        durations.append(time.perf_counter() - before)
         publish_until_received(publisher, arrived, bytes(100_000), str(number).encode())
-    assert begun.qsize() == 1, "the slow subscriber still handles its first message"
-    assert np.median(durations) < 0.5  # a busy machine holds up single calls, a subscriber all of them
+    assert begun.qsize() == 1, "all others arrived while the slow subscriber still handles its first message"
 
 
 def test_a_stopped_subscriber_does_not_block_the_publisher(buses, endpoint):
@@ -225,7 +220,8 @@ def test_closing_twice_is_fine(endpoint):
     bus = ZenohBus.open("demo", endpoint, Role.ROUTER, shared_memory=False)
     bus.close()
     bus.close()
-    ZenohBus.open("demo", endpoint, Role.ROUTER).close()  # which it can only while nobody else listens there
+    with ZenohBus.open("demo", endpoint, Role.ROUTER) as again:  # which it can only once the endpoint is free
+        assert list(again.query("**", 0.1)) == []
 
 
 def test_a_callback_that_does_not_return_is_left_behind_with_a_warning(caplog):

@@ -148,7 +148,9 @@ def test_without_a_watchdog_none_is_fed(start, environment):
 
 @pytest.mark.parametrize("address", ["", "/nowhere/notify", "@nowhere"])
 def test_a_systemd_that_is_not_there_does_no_harm(address):
+    before = os.listdir("/proc/self/fd")
     systemd.notifier({"NOTIFY_SOCKET": address}).stopping()
+    assert os.listdir("/proc/self/fd") == before  # no socket is left
 
 
 @pytest.mark.slow

@@ -227,8 +227,8 @@ def test_samples_that_vary_too_little_for_a_model_are_no_reason_to_guess(name):
 def test_the_gradients_of_the_fit_are_those_of_its_cost(power):
     generator = np.random.default_rng(1)
     columns = fitting.Design(generator.normal(size=(50, 2)), generator.uniform(0.5, 2, (50, 3)))
-    samples = fitting._Samples(generator.normal(size=50), columns, power, 0.01)
-    imagined = fitting._PseudoSamples(0.3, columns, power)
+    samples = fitting.ResidualSamples(generator.normal(size=50), columns, power, 0.01)
+    imagined = fitting.PseudoSamples(0.3, columns, power)
     at, steps = np.array([0.2, -0.1, 0.5, 0.3, 0.4, -2.0]), 1e-6 * np.eye(6)
     for cost in (lambda p: samples.cost(p[:2], p[2:5], p[5]), lambda p: imagined.cost(p[:2], p[2:5])):
         differences = [(cost(at + step)[0] - cost(at - step)[0]) / 2e-6 for step in steps]

@@ -33,13 +33,18 @@ class Clock:
 class Waiting(Rig):
     """A rig whose recorder waits for a trigger and holds 2 s."""
 
-    def __init__(self, directory, monkeypatch, watches_status=False, post_roll_s=3.0, pre_roll_bytes=MANY, **settings):
+    def __init__(self, directory, watches_status=False, post_roll_s=3.0, pre_roll_bytes=MANY, **settings):
         self.time = Clock()
         trigger = Asked(watches_status, post_roll_s, self.time)
         super().__init__(
-            directory, trigger=trigger, pre_roll_s=2.0, pre_roll_bytes=pre_roll_bytes, flush_s=0.005, **settings
+            directory,
+            trigger=trigger,
+            monotonic=self.time,
+            pre_roll_s=2.0,
+            pre_roll_bytes=pre_roll_bytes,
+            flush_s=0.005,
+            **settings,
         )
-        monkeypatch.setattr(self.recorder._pre_roll, "_clock", self.time)
         commands.answer_record(self.bus, self.headers, self.health, self.recorder.ask)
         self.recorder.start()
 
@@ -63,11 +68,11 @@ class Waiting(Rig):
 
 
 @pytest.fixture
-def waiting(tmp_path, monkeypatch):
+def waiting(tmp_path):
     made = []
 
     def make(**settings):
-        rig = Waiting(tmp_path, monkeypatch, **settings)
+        rig = Waiting(tmp_path, **settings)
         made.append(rig)
         return rig
 
