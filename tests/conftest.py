@@ -104,13 +104,17 @@ def secured(keys, endpoint):
     opened = []
 
     def secured(name, role=Role.CLIENT):
-        security = MutualTls(keys / "authority.pem", keys / f"{name}.pem", keys / f"{name}.key")
-        opened.append(ZenohBus.open("demo", encrypted(endpoint), role, security=security))
+        opened.append(ZenohBus.open("demo", encrypted(endpoint), role, security=mutual_tls(keys, name)))
         return opened[-1]
 
     yield secured
     for bus in reversed(opened):
         bus.close()
+
+
+def mutual_tls(keys, name):
+    """Security of a process with the certificate of this name."""
+    return MutualTls(keys / "authority.pem", keys / f"{name}.pem", keys / f"{name}.key")
 
 
 def encrypted(endpoint: str) -> str:

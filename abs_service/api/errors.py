@@ -2,4 +2,4 @@
 
 
 class ArgumentError(ValueError):
-    """An argument that cannot be used; the message names it, its value and what is allowed."""
+    """An argument that cannot be used; the message names it, its value and the allowed values."""

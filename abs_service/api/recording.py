@@ -46,7 +46,7 @@ class Recording:
     Attributes:
         path: of the file.
         duration_s: from the first to the last message [s].
-        truncated: whether the file was never finished; what there is can be read.
+        truncated: True if the file was never finished; its complete part can be read.
         trackers: names of the trackers with estimates in it.
     """
 

@@ -74,6 +74,6 @@ def load_rig(path: str | Path) -> Rig:
     """Reads a rig file; no device is opened.
 
     Raises:
-        ConfigError: names file, key, value and what is allowed, for all that is wrong with it.
+        ConfigError: names file, key, value and the allowed values, for all that is wrong with it.
     """
     return Rig(config.load(Path(path)))

@@ -27,7 +27,7 @@ READINGS = 30
 
 @dataclass(frozen=True, slots=True)
 class Offset:
-    """What has to be added to a time of another clock to have it on this host's, and its largest error [ns]."""
+    """Term to add to a time of another clock to convert it to this host's, and its largest error [ns]."""
 
     ns: int
     error_ns: int

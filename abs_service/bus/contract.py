@@ -100,7 +100,7 @@ class Bus(Protocol):
         ...
 
     def command(self, topic: str, message: str, payload: bytes, timeout_s: float) -> list[Sample]:
-        """All answers to a command of type `message`; empty at once if nobody takes commands on `topic`."""
+        """All answers to a command of type `message`; empty at once if `topic` has no receiver."""
         ...
 
     def query(self, pattern: str, timeout_s: float) -> list[Sample]:

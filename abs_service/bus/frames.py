@@ -165,6 +165,6 @@ class FrameSubscriber:
         self._queue.close()
 
     def _receive(self, sample: Sample) -> None:
-        with suppress(DecodeError):  # told when it is decoded
+        with suppress(DecodeError):  # reported when it is decoded
             self._gaps.add(sample.topic, FrameInfo.FromString(sample.attachment).header)
         self._queue.put(sample.topic, (sample, self._clock()))

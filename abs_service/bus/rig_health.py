@@ -1,4 +1,4 @@
-"""Asks what runs at an endpoint: the health of every component of its rigs, and which component sends none."""
+"""Queries the rigs at an endpoint: the health of every component, and components that send none."""
 
 import time
 
@@ -60,7 +60,7 @@ def _take(sample: zenoh.Sample, health: RigHealth) -> None:
     try:
         health.setdefault(name, {})[component] = parse_valid(Health, sample.payload.to_bytes())
     except MessageError:
-        return  # from a stranger; the component's own will follow, or its silence be told
+        return  # from a stranger; the component's own follows, or its silence is reported
 
 
 def _rig_and_component(sample: zenoh.Sample) -> tuple[str, str]:

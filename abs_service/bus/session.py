@@ -37,7 +37,7 @@ LOG_LEVELS = "error,zenoh_link_tls=warn"
 
 
 class BusError(Exception):
-    """The bus cannot be opened; the message names the key, its value and what to do."""
+    """The bus cannot be opened; the message names the key, its value and the remedy."""
 
 
 class Role(StrEnum):
@@ -62,7 +62,7 @@ def open_session(
         role: whether to be the router or to connect to it.
         shared_memory: whether large messages pass through shared memory between processes of one host.
         connect_timeout_ms: timeout of a client's connection [ms].
-        security: who may connect, and what they may do then.
+        security: authentication and access rights.
         routers: endpoints of other routers that a router connects to, whenever they are there.
 
     Raises:

@@ -102,7 +102,7 @@ class ZenohBus:
 
         def on_query(query: zenoh.Query) -> None:
             if query.payload is None or str(query.key_expr) != key:
-                # Somebody asks what there is. Access control does not see a command in a query with wildcards.
+                # A query for all topics. Access control does not see a command in a query with wildcards.
                 return
             command = Sample(topic, _message(query.encoding), query.payload.to_bytes())
             query.reply(key, answer(command), encoding=f"{ENCODING};{message}")

@@ -1,4 +1,4 @@
-"""What an image shows of the state of its camera: images that repeat the one before, images in which nothing is."""
+"""Checks of a camera by its images: images that repeat the one before, images without a measurement."""
 
 import numpy as np
 from numpy.typing import NDArray

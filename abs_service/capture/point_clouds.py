@@ -71,7 +71,7 @@ class PointCloudPublisher:
         self._sink.on_warning(condition, message)
 
     def close(self) -> None:
-        """Publishes what is queued and ends the thread; may be called again."""
+        """Publishes the queued clouds and ends the thread; may be called again."""
         self._queue.close()
         self._thread.join()
 

@@ -1,1 +1,1 @@
-"""The commands of `abs-service`, one module each, and what they share; see `abs_service.cli` for what a command has."""
+"""The commands of `abs-service`, one module each, and shared parts; `abs_service.cli` describes a command's module."""

@@ -168,7 +168,7 @@ def text(found: dict[str, Any]) -> str:
 
 
 def _draw_previews(rig: config.ServiceConfig, arguments: argparse.Namespace) -> list[str]:
-    """Draws what each tracker would track; returns a line about each picture."""
+    """Draws a preview of each tracker; returns a line about each picture."""
     if arguments.replay:
         return replay.draw_previews(rig, Recording(arguments.replay), arguments.picture)
     written: list[str] = []

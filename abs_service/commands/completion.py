@@ -77,7 +77,7 @@ def found(words: str, commands: Mapping[str, str], modules: Mapping[str, str], p
 
 
 def bash(commands: Sequence[Command]) -> str:
-    """The script for bash. What has no fixed values is completed with the names of files."""
+    """The script for bash. Arguments without fixed values are completed with file names."""
     values, options, groups = [], [], []
     for command in commands:
         words = shlex.quote(command.words)

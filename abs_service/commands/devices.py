@@ -1,4 +1,4 @@
-"""Lists the cameras that are attached, and what to do about each that cannot be used.
+"""Lists the attached cameras, and the remedy for each that cannot be used.
 
   abs-service devices                        all, with model, serial number, firmware, link and state
   abs-service devices --watch                who comes and goes, until Ctrl-C

@@ -1,4 +1,4 @@
-"""Tracks live: starts the devices, the trackers and the recorder of a rig, looks after them and shows how they are.
+"""Tracks live: starts, supervises and displays the devices, the trackers and the recorder of a rig.
 
   abs-service run                            the simulated demo rig, nothing to connect or configure
   abs-service run rig.toml --out takes       your own sensors, recorded to takes/

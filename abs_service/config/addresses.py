@@ -1,4 +1,4 @@
-"""Checks of device addresses: what is wrong with them is known without a device."""
+"""Checks of device addresses that need no device."""
 
 from collections.abc import Iterator, Mapping
 

@@ -10,7 +10,7 @@ from abs_service.config.problems import Key, Problem
 
 
 class ConfigError(Exception):
-    """A configuration that cannot be used; the message names the file and each problem: key, value, what is allowed."""
+    """An invalid configuration; the message names the file and each problem: key, value, the allowed values."""
 
 
 def error_of(source: str, problems: Iterable[Problem], text: str) -> ConfigError:
@@ -18,7 +18,7 @@ def error_of(source: str, problems: Iterable[Problem], text: str) -> ConfigError
 
     Args:
         source: name of the file.
-        problems: what is wrong with it.
+        problems: its errors.
         text: its content, for the numbers of the lines; "" if there is none.
     """
     found = located(problems, text)

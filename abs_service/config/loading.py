@@ -71,7 +71,7 @@ def from_tables(file: dict[str, Any], source: str, base: Path, text: str = "") -
     try:
         merged = merge(file, source, base, text)
     except ConfigError as error:
-        # Only what does not depend on the calibration is told with its mistakes.
+        # Besides the calibration's errors, only those are reported that do not depend on it.
         try:
             _checked({**file, "calibration": None}, base, text)
         except ProblemsError as others:

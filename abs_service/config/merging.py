@@ -34,7 +34,7 @@ def merge(rig: dict[str, Any], source: str, base: Path, text: str) -> dict[str, 
     """A rig file merged with the calibration file that its key `calibration` names.
 
     Args:
-        rig: what the TOML file holds; returned as it is if it names no calibration file.
+        rig: content of the TOML file; returned as it is if it names no calibration file.
         source: where it came from, for messages.
         base: folder that the path of the calibration file starts from.
         text: the rig file's content, for the numbers of its lines.

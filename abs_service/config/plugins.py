@@ -28,7 +28,7 @@ def load(package: str, table: Any, base: Path, *others: str) -> Any:
 
     Args:
         package: dotted name of the package with the modules, such as `abs_service.tracker.models`.
-        table: what the TOML file holds.
+        table: content of the TOML file.
         base: folder that relative paths among the settings start from.
         others: packages that have such modules as well.
 

@@ -36,7 +36,7 @@ def key_lines(text: str) -> dict[Key, int]:
 
 
 def _outwards(key: Key) -> Iterable[Key]:
-    """A key and the tables around it: what is missing is looked for where it should be."""
+    """A key and the tables around it; a missing key has the position where it belongs."""
     return (key[:length] for length in range(len(key), 0, -1))
 
 

@@ -20,12 +20,12 @@ ABSENT: Any = object()
 
 @dataclass(frozen=True)
 class Problem:
-    """One problem: key, value and what is allowed.
+    """One problem: key, value and the allowed values.
 
     Attributes:
         key: path of the key from the root of the table.
-        message: what is allowed, without the key.
-        value: what was given; `ABSENT` if nothing was.
+        message: the allowed values, without the key.
+        value: the given one; `ABSENT` if there is none.
     """
 
     key: Key
@@ -71,7 +71,7 @@ def from_pydantic(error: ValidationError, allowed_at: Callable[[Key], Collection
     """All problems that pydantic found.
 
     Args:
-        error: what validation raised.
+        error: raised by validation.
         allowed_at: the keys that the table at a path may hold.
     """
     found: list[Problem] = []

@@ -1,1 +1,1 @@
-"""What people see of a rig: the terminal, a page in the browser, pictures."""
+"""Displays of a rig: terminal, page in the browser, pictures."""

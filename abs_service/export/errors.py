@@ -1,4 +1,4 @@
-"""What is wrong with an export."""
+"""Errors of exports."""
 
 
 class ExportError(Exception):

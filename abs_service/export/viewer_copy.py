@@ -1,4 +1,4 @@
-"""What becomes of each message in a copy for viewers."""
+"""Conversion of each message of a recording for its copy for viewers."""
 
 from collections.abc import Mapping
 from dataclasses import replace

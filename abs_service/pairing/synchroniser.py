@@ -38,7 +38,7 @@ class Synchroniser:
         members: all streams of a set; the reference may be among them.
         tolerance_ns: largest difference between a member's and the reference's `t_host_ns` [ns].
         deadline_ns: how long after its arrival in this process a reference frame waits for others, see `poll` [ns].
-        offsets_ns: what has to be added to `t_host_ns` of the frames of some sensors, as a calibration found [ns].
+        offsets_ns: time offsets to add to `t_host_ns` of the frames of some sensors, by a calibration [ns].
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Synchroniser:
         yield from self.flush()
 
     def poll(self, now_ns: int) -> list[FrameSet]:
-        """Returns the sets whose deadline is over at `now_ns`, with what there is.
+        """Returns the sets whose deadline is over at `now_ns`, with the frames received so far.
 
         The time is that of this host's CLOCK_MONOTONIC, to which the frames' host times need not belong.
         A stream that was missing in a set is not waited for until it delivers again.
@@ -106,7 +106,7 @@ class Synchroniser:
         return sets
 
     def flush(self) -> list[FrameSet]:
-        """Returns all sets that still wait, with what there is: the end of a recording."""
+        """Returns all sets that still wait, with the frames received so far: the end of a recording."""
         return [self._emit() for _ in range(len(self._reference.waiting))]
 
     def _follow_clock(self, frame: Frame) -> list[FrameSet]:
@@ -242,7 +242,7 @@ class _Stream:
 
 
 def _received_ns(frame: Frame) -> int:
-    """When the frame came to this process, on this host's clock."""
+    """Time at which the frame reached this process, on this host's clock [ns]."""
     return frame.t_arrival_ns if frame.t_received_ns is None else frame.t_received_ns
 
 

@@ -45,7 +45,7 @@ class Recorder:
         bus: the rig.
         settings: where and how.
         health: of this component.
-        clock: stamps what has no stamp and measures ages.
+        clock: stamps messages without a stamp and measures ages.
         open_file: creates a file; a test may give a slow or full one.
         free_bytes: free space of the file system of a folder.
         retry_s: time between two attempts after a failure [s].
@@ -91,7 +91,7 @@ class Recorder:
 
     @property
     def failed(self) -> str:
-        """Why nothing is recorded at present; "" if all is well. `failures` counts how often that happened."""
+        """Reason for which recording has failed; "" if all is well. `failures` counts the failures."""
         return self._failed
 
     def start(self) -> None:
@@ -102,11 +102,11 @@ class Recorder:
         self._thread.start()
 
     def ask(self, recording: bool) -> str:
-        """Begins with what was before, or ends, as somebody asks; returns why that is refused, "" if it is not."""
+        """Begins, with the pre-roll, or ends on a command; returns the reason for a refusal, "" if accepted."""
         return self._pre_roll.ask(recording)
 
     def stop(self, timeout_s: float) -> None:
-        """Writes what waits and finishes the file; gives up after `timeout_s`, which leaves it to be recovered."""
+        """Writes the queue and finishes the file; gives up after `timeout_s`, which leaves it to be recovered."""
         self._subscription.close()
         self._queue.close()
         self._stopping.set()

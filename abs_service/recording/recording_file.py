@@ -17,7 +17,7 @@ ESTIMATES = "_estimates"
 
 
 def private(path: str, flags: int) -> int:
-    """Opener of a recording, which shows people: its owner and, to read, the group may open it, nobody else."""
+    """Opener of a recording, which shows people: its owner may write it, its group may read it, no others may."""
     return os.open(path, flags, 0o640)
 
 
@@ -71,7 +71,7 @@ class RecordingFile:
 
     @property
     def fate(self) -> str:
-        """What somebody did to the unfinished file, "deleted" or "moved"; "" if it is in its place."""
+        """Change of the unfinished file from outside, "deleted" or "moved"; "" if it is in its place."""
         mine = os.fstat(self._stream.fileno())
         if mine.st_nlink == 0:
             return "deleted"

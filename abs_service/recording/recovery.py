@@ -99,7 +99,7 @@ def leftovers(directory: Path) -> list[Path]:
 
 
 def remove_interrupted(directory: Path) -> None:
-    """Removes what a killed recovery left; the next one begins with the original again."""
+    """Removes the output of a killed recovery; the next one begins with the original again."""
     for path in directory.glob(f"*{RECOVERING}"):
         with contextlib.suppress(OSError), path.open("rb") as stream:  # somebody else's, or locked by a living one
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)

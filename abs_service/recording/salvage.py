@@ -11,7 +11,7 @@ from drivers.encoding.mcap_file import CHANNEL_METADATA, McapFileError, file_des
 
 
 class Salvage:
-    """Copies messages, attachments and metadata unchanged, and counts what is left out.
+    """Copies messages, attachments and metadata unchanged, and counts omissions.
 
     Attributes:
         messages: messages copied.

@@ -29,7 +29,7 @@ class SampleWriter:
     Args:
         encode_image: makes the recorded message of an image.
         health: of the recorder; has the counters.
-        clock: stamps what has no stamp.
+        clock: stamps messages without a stamp.
     """
 
     def __init__(self, encode_image: ImageEncoder, health: Health, clock: WallClock) -> None:
@@ -50,7 +50,7 @@ class SampleWriter:
             self._latched |= {sample.topic: sample for sample in samples if sample.message in _LATCHED}
 
     def begin(self, take: Take) -> None:
-        """Begins a recording with what makes it self-contained. Raises as `write`."""
+        """Begins a recording with the metadata that makes it self-contained. Raises as `write`."""
         self._counts = Counter()
         self._attached = {}
         self.unsaved = 0
@@ -64,7 +64,7 @@ class SampleWriter:
         self.unsaved = 0
 
     def pause(self) -> None:
-        """Nothing is written for a while, on purpose: what comes afterwards tells no loss."""
+        """Marks a pause on purpose: the gap after it is no loss."""
         self._last_seq = {}
 
     def write(self, take: Take, sample: Sample, is_repeated: bool = False) -> None:
@@ -104,7 +104,7 @@ class SampleWriter:
         return {name: str(number) for name, number in sorted(self._counts.items())}
 
     def _attach_calibration(self, take: Take, sample: Sample, stamp_ns: int) -> None:
-        """Attaches what a sensor is, when the file does not hold it yet, to be had without reading messages."""
+        """Attaches the metadata of a sensor once, readable without reading messages."""
         model = SensorModel.FromString(sample.payload)
         keys.check_name(model.sensor)  # a program that saves attachments as files must not leave its folder
         if self._attached.get(model.sensor) != model.calib_id:

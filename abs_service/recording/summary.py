@@ -1,4 +1,4 @@
-"""What a recording holds: rates, gaps and losses of its images, status of its estimates, bytes of its topics."""
+"""Summary of a recording: rates, gaps and losses of its images, status of its estimates, bytes of its topics."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ from mcap.records import Message
 from drivers.encoding.parsing import CodecError, parse_message
 from drivers.replay.contents import DAMAGE, Contents, RecordingError, read_chunk, scan
 
-#: A gap is a break between two messages of at least so many of the topic's usual periods.
+#: A gap is a break between two messages of at least so many of the topic's median period.
 GAP_PERIODS = 2.5
 
 #: First words of the counters of health that tell of losses.
@@ -46,13 +46,13 @@ class Topic:
 
     @property
     def rate_hz(self) -> float:
-        """One over the usual time between messages [Hz]; NaN for fewer than two."""
+        """Reciprocal of the median time between two messages [Hz]; NaN for fewer than two messages."""
         period_s = self._period_s()
         return 1.0 / period_s if period_s > 0 else float("nan")
 
     @property
     def gaps_s(self) -> list[float]:
-        """Times between two messages that are longer than usual [s], see `GAP_PERIODS`."""
+        """Times between two messages that are much longer than the median [s], see `GAP_PERIODS`."""
         period_s = self._period_s()
         return [gap_s for gap_s in self._steps_s().tolist() if period_s > 0 and gap_s > GAP_PERIODS * period_s]
 

@@ -64,7 +64,7 @@ class Take:
 
     @property
     def fate(self) -> str:
-        """What somebody did to an unfinished file, "x.mcap was deleted" or "moved"; "" if all are in their places."""
+        """Change of an unfinished file from outside, "x.mcap was deleted" or "moved"; "" if all are in their places."""
         return next((f"{file.path.name} was {file.fate}" for file in (self._all, *self._estimates) if file.fate), "")
 
     def write(self, topic: str, message: str, payload: bytes, stamp_ns: int, seq: int) -> None:

@@ -39,7 +39,7 @@ class Provenance:
         command: command line that computed it; the home folder is written as `~`.
         date: when, ISO 8601 in UTC.
         version: of the program.
-        data: what it was computed from.
+        data: inputs of the computation.
     """
 
     command: str
@@ -55,7 +55,7 @@ def trace(
     home: Path | None = None,
     program: str = "abs-service",
 ) -> Provenance:
-    """The provenance of what a command is about to compute.
+    """The provenance of a command's result, before it computes.
 
     Args:
         arguments: command line after the program's name.

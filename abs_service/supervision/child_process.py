@@ -91,10 +91,10 @@ class ChildProcess:
     """`abs-service ARGUMENTS` as a child.
 
     Args:
-        component: what it is called.
+        component: its name.
         arguments: the command line after `abs-service`.
         on_line: called with the component and each line that the child writes, from a thread.
-        program: what runs the arguments.
+        program: runs the arguments.
         environment: added to the environment of this process.
     """
 

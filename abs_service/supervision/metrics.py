@@ -1,4 +1,4 @@
-"""What Prometheus reads from a running rig, on loopback: rates, ages, losses by cause, status, restarts, disk."""
+"""Metrics of a running rig for Prometheus, on loopback: rates, ages, losses by cause, status, restarts, disk."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -20,12 +20,12 @@ Row = tuple[str, str, dict[str, str], float]
 
 
 class MetricsError(Exception):
-    """The metrics cannot be served; the message names the key, its value and what to do."""
+    """The metrics cannot be served; the message names the key, its value and the remedy."""
 
 
 @contextmanager
 def served(port: int) -> Iterator[Callable[[RigView], None]]:
-    """Serves what the yielded function is given, at http://127.0.0.1:`port`/metrics; nothing if `port` is 0.
+    """Serves the views given to the yielded function, at http://127.0.0.1:`port`/metrics; nothing if `port` is 0.
 
     Raises:
         MetricsError: the extra `metrics` is not installed, or the port is in use.

@@ -26,7 +26,7 @@ class Stream:
 
 @dataclass(frozen=True)
 class Recording:
-    """The recorder: file being written, its size, bytes written per second, what was recorded and what was lost.
+    """The recorder: file being written, its size, bytes written per second, recorded and dropped messages.
 
     `forecast` says how long the disk lasts; "" in the first seconds.
     """
@@ -99,7 +99,7 @@ class RigView:
 
     @property
     def recording_remark(self) -> str:
-        """What the recorder says as long as nothing is tracked, or of its trigger; "" if it records anyway."""
+        """The recorder's remark on missing tracking, or on its trigger; "" if it records anyway."""
         labels = self.live.health("record").labels
         return labels.get("tracking") or labels.get("trigger", "")
 
@@ -189,7 +189,7 @@ def size(number: float) -> str:
 
 
 def _on_disk(path: Path) -> str:
-    """What there is of a recording whose recorder has ended."""
+    """The file of a recording whose recorder has ended, and its state, as text."""
     active = path.with_name(path.name + ".active")
     if active.exists():
         return f"{active} (unfinished: `abs-service recover` completes it)"

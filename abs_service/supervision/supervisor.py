@@ -19,7 +19,7 @@ _log = logging.getLogger(__name__)
 FIRST_BACKOFF_NS, LONGEST_BACKOFF_NS = 200_000_000, 3_000_000_000
 #: A process that has run for longer than this had worked: the next backoff is the first one again [ns].
 WORKED_NS = 10_000_000_000
-#: A longer time between two calls of `poll` was a stop of this process, in which it heard no child [ns].
+#: A longer time between two calls of `poll` was a stop of this process, without messages of the children [ns].
 PAUSE_NS = 1_000_000_000
 
 
@@ -64,7 +64,7 @@ class Child:
         state: its state.
         reason: of the state, in plain words.
         restarts: how often it was started again.
-        process: what runs it; `NO_PROCESS` while nothing does.
+        process: the running one; `NO_PROCESS` if there is none.
         exit_code: of its last end.
     """
 
@@ -162,7 +162,7 @@ class Supervisor:
                 self._finalize(child)
 
     def _excuse_pause(self, now_ns: int) -> None:
-        """Extends all deadlines by the time in which this process did not run, and heard nobody."""
+        """Extends all deadlines by the time in which this process was stopped and received nothing."""
         paused_ns, self._polled_ns = now_ns - self._polled_ns, now_ns
         if paused_ns > PAUSE_NS:
             for child in self.children.values():

@@ -35,7 +35,7 @@ class Notifier:
         self._text = ""
 
     def update(self, view: RigView) -> None:
-        """Sends what has changed since the last call, and signs of life as often as systemd needs them."""
+        """Sends changes since the last call, and watchdog messages as often as systemd needs them."""
         self._tell(view)
         counts = _counts(view)
         if not self._ready and all(counts.values()):
@@ -90,5 +90,5 @@ def _counts(view: RigView) -> dict[str, int]:
 def _words(view: RigView) -> str:
     trackers = [f"{name} {log.last.status}" for name, log in view.live.trackers.items() if log.last is not None]
     troubles = [f"{component}: {message}" for component, _, message in view.troubles]
-    told = [view.activity] if view.activity else [*trackers, view.recording.file.name if view.recording else ""]
-    return "; ".join(" ".join(part.split()) for part in [*told, *troubles] if part)
+    states = [view.activity] if view.activity else [*trackers, view.recording.file.name if view.recording else ""]
+    return "; ".join(" ".join(part.split()) for part in [*states, *troubles] if part)

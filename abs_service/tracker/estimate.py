@@ -45,7 +45,7 @@ class Estimate:
         budget: maximum number of evaluations.
         inlier_share: share of the vertices facing a depth sensor that agree with their measurement, 0…1.
         fits: agreement of every sensor.
-        shape: what the deformed mesh shows by itself.
+        shape: quality of the deformed mesh.
         sources: exposure of every sensor that contributed.
         missing: sensors that did not contribute.
         warnings: doubts about the object that was detected, in plain words; whatever the status.

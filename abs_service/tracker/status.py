@@ -12,7 +12,7 @@ from abs_service.tracker.shape_quality import ShapeQuality
 from abs_service.tracker.terms.base import RimFit, SensorFit, inlier_share, occluded_share
 
 #: With fewer visible vertices on the free edges, their shares say nothing.
-LEAST_RIM = 8
+MIN_RIM = 8
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def judge(
     Args:
         fits: agreement of every contributing sensor.
         missing: sensors without a frame.
-        shape: what the deformed mesh shows by itself.
+        shape: quality of the deformed mesh.
         surprise: see `MotionPrior`.
         limits: thresholds.
     """
@@ -104,4 +104,4 @@ def rim_distance(fits: Sequence[SensorFit]) -> float:
 
 
 def _rims(fits: Sequence[SensorFit]) -> list[RimFit]:
-    return [fit.rim for fit in fits if fit.rim.visible >= LEAST_RIM]
+    return [fit.rim for fit in fits if fit.rim.visible >= MIN_RIM]

@@ -1,4 +1,4 @@
-"""Publishes what a tracker finds: estimates, meshes, their topologies, and scenes for viewers."""
+"""Publishes the results of a tracker: estimates, meshes, their topologies, and scenes for viewers."""
 
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.deformed_mesh_pb2 import MeshTopology
@@ -19,7 +19,7 @@ class EstimatePublisher:
     """Publishes the estimates of one tracker, its meshes, and each new mesh's topology.
 
     Args:
-        bus, headers: where, and what writes the headers.
+        bus, headers: the bus, and the factory of headers.
         tracker: its name.
         model: type of its deformation model.
         calib_id: hash of its rig's calibration.
@@ -43,7 +43,7 @@ class EstimatePublisher:
         """Publishes an estimate, after the topology of its mesh if that is new.
 
         Args:
-            estimate, tracking, effort: what is published.
+            estimate, tracking, effort: to publish.
             host_clock: which clock the frames' times are of.
             offset: of that clock; stamps need it.
         """

@@ -177,7 +177,7 @@ class LiveTracker:
         self._health.report("estimates", Level.ERROR if silence else Level.OK, message)
 
     def _cause_of_silence(self) -> str:
-        """What has come since the last estimate, instead of a frame set."""
+        """The commonest losses of frames since the last estimate, as text."""
         since = Counter(self._losses())
         since.subtract(self._losses_before)
         causes = [f"{name} {number}" for name, number in since.most_common(3) if number > 0]

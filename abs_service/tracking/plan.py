@@ -92,7 +92,7 @@ class Plan:
         evaluations: maximum number of cost evaluations per frame.
         vertices: approximate number of vertices of the mesh.
         priors, status, reinitialization, vertex_offsets: settings of the fixed parts.
-        template: settings of what is known of the object's shape.
+        template: settings of the object's known shape.
         seed: seed of the search; equal seeds and frame sets result in equal estimates.
     """
 

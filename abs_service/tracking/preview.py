@@ -1,4 +1,4 @@
-"""Preview of a tracker: what it would track, before it does: selected pixels, mesh and classes of the mesh's rim."""
+"""Preview of a tracker: selected pixels, mesh and classes of the mesh's rim."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

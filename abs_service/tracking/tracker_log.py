@@ -31,7 +31,7 @@ class EstimateReport:
         vertex_sigma_mm: root mean square of the vertex errors that the tracker expects [mm]; needs no truth.
         solve_ms: from the frame set to theta [ms].
         age_ms: from the exposure to the publication [ms]; None offline.
-        generations, evaluations: what the search needed.
+        generations, evaluations: of the search.
         skipped: frame sets passed over before this one.
     """
 

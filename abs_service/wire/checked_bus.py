@@ -9,14 +9,14 @@ from abs_service.wire.edge import Edge
 
 
 class CheckedBus:
-    """Passes on what `Edge` admits, and everything that is sent; implements `contract.Bus`.
+    """Passes on received messages that `Edge` admits, and all sent ones; implements `contract.Bus`.
 
     Args:
         bus: the bus; closed with this one.
         clock: CLOCK_MONOTONIC [ns].
 
     Attributes:
-        trouble: what was refused between the last two calls of `report`; "" if nothing was.
+        trouble: refusals between the last two calls of `report`; "" if there were none.
     """
 
     def __init__(self, bus: Bus, clock: Callable[[], int]) -> None:
@@ -26,7 +26,7 @@ class CheckedBus:
         self.trouble = ""
 
     def report(self, health: Health) -> None:
-        """Puts what was refused into the health of the process; call it before `Health.tick`."""
+        """Adds the refusals to the health of the process; call it before `Health.tick`."""
         refused = self._edge.refused
         health.count_up_to(refused, "refused.")
         total = sum(refused.values())

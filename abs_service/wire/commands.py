@@ -1,4 +1,4 @@
-"""Commands to a tracker and to the recorder: what may be asked, the answer, and a line in health and log for each."""
+"""Commands to a tracker and to the recorder, their answers, and a line in health and log for each."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ def answer_reinitialize(
 ) -> Subscription:
     """Answers requests to detect the object of a tracker anew; calls `act` for those that are valid.
 
-    Each one is counted, and told in a line of the log and in a label of health, which recordings keep.
+    Each one is counted, and reported in a line of the log and in a label of health, which recordings keep.
 
     Args:
         bus: of the rig.
@@ -138,7 +138,7 @@ def _answer(
 
 
 def _refusal(command: Sample, message: str, rig: str) -> tuple[str, str]:
-    """Why a command is refused, "" if it is not, and who sent it."""
+    """Reason for which a command is refused, "" if it is accepted, and its sender."""
     sender = "an unknown process"
     try:
         if command.message != message:

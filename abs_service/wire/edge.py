@@ -32,11 +32,11 @@ from drivers.encoding import codec
 from drivers.encoding.message_check import MessageError, check_size, parse_valid
 
 #: Topics of which messages are taken. A rig of ten sensors and four trackers has about 70.
-MOST_TOPICS = 1000
+MAX_TOPICS = 1000
 #: Messages of one topic that are taken in a second; the fastest cameras deliver 300.
-MOST_PER_S = 1000
+MAX_PER_S = 1000
 #: Most parts of a topic: sensor, stream, image.
-_MOST_PARTS = 3
+_MAX_PARTS = 3
 
 _SECOND_NS = 1_000_000_000
 
@@ -84,13 +84,13 @@ class Edge:
     def _check_rate(self, topic: str) -> None:
         now_s = self._clock() // _SECOND_NS
         with self._lock:
-            if topic not in self._seconds and len(self._seconds) >= MOST_TOPICS:
-                raise MessageError("topics", f"one more than {MOST_TOPICS} topics")
+            if topic not in self._seconds and len(self._seconds) >= MAX_TOPICS:
+                raise MessageError("topics", f"one more than {MAX_TOPICS} topics")
             second, number = self._seconds.get(topic, (now_s, 0))
             number = number + 1 if second == now_s else 1
             self._seconds[topic] = now_s, number
-        if number > MOST_PER_S:
-            raise MessageError("rate", f"more than {MOST_PER_S} messages a second")
+        if number > MAX_PER_S:
+            raise MessageError("rate", f"more than {MAX_PER_S} messages a second")
 
 
 def check_topic(topic: str) -> None:
@@ -100,15 +100,15 @@ def check_topic(topic: str) -> None:
         MessageError: too many parts, or one that is no name.
     """
     parts = topic.split("/")
-    if len(parts) > _MOST_PARTS or not all(map(is_name, parts)):
-        raise MessageError("topic", f"topics are one to {_MOST_PARTS} names with / in between")
+    if len(parts) > _MAX_PARTS or not all(map(is_name, parts)):
+        raise MessageError("topic", f"topics are one to {_MAX_PARTS} names with / in between")
 
 
 def check_sample(sample: Sample) -> None:
     """Checks a message: its type, its content, and that it belongs to its topic.
 
     Raises:
-        MessageError: names what is wrong.
+        MessageError: names the field and the error.
     """
     if sample.message not in SCHEMAS:
         raise MessageError("type", f"{sample.message[:100]!r} is none of {sorted(SCHEMAS)}")

@@ -40,7 +40,7 @@ class ViewRate:
         self._period = -1
 
     def due(self, t_ns: int) -> bool:
-        """Whether the message of the moment `t_ns` is the first one of its period."""
+        """True if the message of time `t_ns` is the first of its period."""
         period = int(t_ns * self._hz * 1e-9) if self._hz else self._period
         is_due, self._period = period != self._period, period
         return is_due

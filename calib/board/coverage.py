@@ -56,7 +56,7 @@ def check(views: Iterable[CornerView]) -> None:
     """Checks a set of views for a minimum of number and variety.
 
     Raises:
-        TooFewViewsError, ViewsAlikeError, MirroredSensorError: names the sensor and what to do.
+        TooFewViewsError, ViewsAlikeError, MirroredSensorError: names the sensor and the remedy.
     """
     views = list(views)
     for sensor, seen in by_sensor(views).items():

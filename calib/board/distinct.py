@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from calib.board.board_pose_features import BoardPose, board_pose_features, extent, moved
 from calib.board.views import CornerView, PlaneView
 
-#: A tilt is told by the shape of the board in the image, because a board that faces the camera has two tilts that look
-#: nearly the same: root mean square change relative to the board's radius, 8° to 15°, and in deviations of a corner.
+#: A tilt is recognised by the shape of the board in the image, because a board that faces the camera has two tilts that
+#: look nearly the same: RMS change relative to the board's radius, 8° to 15°, and in deviations of a corner.
 _SHAPE, _DEVIATIONS = 0.015, 3.0
 
 #: Minimum number of corners in common; views of different parts of a board are not compared.

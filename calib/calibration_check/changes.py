@@ -60,9 +60,9 @@ class PairChange:
 def pair_changes(stored: Stored, views: Views) -> list[PairChange]:
     """Motion of all pairs with enough common shots, in which at least one sensor detects corners."""
     shots = views.shots
-    seeing = {view.sensor for view in views.corners}
+    observers = {view.sensor for view in views.corners}
     present = [name for name in stored.sensors if name in shots]
-    pairs = [(a, b) for a, b in combinations(present, 2) if {a, b} & seeing]
+    pairs = [(a, b) for a, b in combinations(present, 2) if {a, b} & observers]
     common = {pair: shots[pair[0]] & shots[pair[1]] for pair in pairs}
     return [_change(stored, views.of(pair, both), pair) for pair, both in common.items() if len(both) >= MIN_SHOTS]
 

@@ -21,7 +21,7 @@ from calib.calibration_check.stored import Stored, Views
 DECISIVE, STANDARD_ERRORS = 3.0, 2.0
 
 #: … where no shot counts for more than a factor of e¹⁰.
-MOST_NATS = 10.0
+MAX_NATS = 10.0
 
 #: Candidate scatter of the board's place from view to view [m].
 SCATTERS = (0.0, *np.geomspace(3e-5, 0.1, 15).tolist())
@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Explanation:
-    """A hypothesis with what the shots say of it.
+    """A hypothesis with its evidence from the shots.
 
     Attributes:
         hypothesis: the hypothesis.
@@ -49,7 +49,7 @@ class Explanation:
 
     def beats(self, other: "Explanation") -> bool:
         """True if it predicts the shots better than another one, beyond doubt."""
-        gains = np.clip(self.scores - other.scores, -MOST_NATS, MOST_NATS)
+        gains = np.clip(self.scores - other.scores, -MAX_NATS, MAX_NATS)
         doubt = float(np.std(gains, ddof=1)) * np.sqrt(len(gains))
         return float(np.sum(gains)) + self.stored - other.stored > max(DECISIVE, STANDARD_ERRORS * doubt)
 
@@ -112,7 +112,7 @@ def compare(stored: Stored, views: Views) -> Comparison:
 
 
 def _stored_changes(stored: Stored, names: Sequence[str]) -> Array:
-    """Changes (n, k) by one deviation each of what the stored calibration leaves open."""
+    """Changes (n, k) by one deviation each of the stored calibration's undetermined directions."""
     known = [name for name in stored.names if name in names]
     if stored.covariance is None or not known:
         return np.zeros((len(names), 0))

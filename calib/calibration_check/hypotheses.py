@@ -1,4 +1,4 @@
-"""What may have happened to a rig since its calibration, as directions of change of its sensors."""
+"""Hypotheses of a rig's change since its calibration, as directions in its sensors' parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Hypothesis:
     """One thing that may have happened.
 
     Attributes:
-        kind: what.
+        kind: of change.
         sensors: to which; several that move together, or none.
         columns: changes that it allows, by position in the names of all changes; those of sensors that move together
             are rows, otherwise there is one row.

@@ -1,4 +1,4 @@
-"""Linearised equations of single shots: what each says of changes of the sensors, whatever the board's pose was.
+"""Linearised equations of single shots for changes of the sensors, with the board's pose eliminated.
 
 The residuals of a shot are r + J x + E e: changes x of the sensors since the calibration, and e ~ N(0, 1), by which
 each view sees the board elsewhere than it is (exposures at different moments, errors that the distances of a view
@@ -172,14 +172,14 @@ def _fit(view: _View) -> Array:
 
 
 def _summary(view: _View) -> _View:
-    """What a view says of the board's pose: six rows of corners, three of distances, which only show its plane.
+    """Rows of a view that determine the board's pose: six for corners, three for distances, which only show its plane.
 
     The rest is shared by neighbouring pixels (bent distances, a lens that does not quite fit), and thousands of them
     would outweigh everything else.
     """
     directions, sizes, _ = np.linalg.svd(view.board / np.linalg.norm(view.board, axis=0).max(), full_matrices=False)
-    told = directions[:, sizes > RANK * sizes[0]].T
-    return _View(view.sees_corners, told @ view.residuals, told @ view.jacobian, told @ view.board)
+    basis = directions[:, sizes > RANK * sizes[0]].T
+    return _View(view.sees_corners, basis @ view.residuals, basis @ view.jacobian, basis @ view.board)
 
 
 def _eliminated(views: Sequence[_View], lever: Array, radius: float) -> ShotEquations:

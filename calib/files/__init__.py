@@ -1,1 +1,1 @@
-"""Files that somebody else wrote: limits that hold before anything is read or parsed."""
+"""Files from other sources: limits that hold before anything is read or parsed."""

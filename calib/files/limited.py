@@ -1,4 +1,4 @@
-"""Reads files up to a size. What is no regular file, such as a pipe or a device, has no size and is refused."""
+"""Reads files up to a size. Pipes, devices and other files without a size are refused."""
 
 import errno
 import io

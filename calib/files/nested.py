@@ -8,8 +8,8 @@ from typing import Any
 import yaml as yaml_library
 
 #: Most parts of a dotted key. The library takes memory for each with all before it: 10 GB for 100,000.
-MOST_PARTS = 32
-_DOTTED = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')[ \t]*+){{{MOST_PARTS}}}""")
+MAX_PARTS = 32
+_DOTTED = re.compile(rf"""(?:\.[ \t]*+(?:[\w-]++|"(?:\\.|[^"\\\n])*+"|'[^'\n]*+')[ \t]*+){{{MAX_PARTS}}}""")
 
 _TOO_DEEP = "its tables are nested too deeply"
 
@@ -21,7 +21,7 @@ def toml(text: str) -> dict[str, Any]:
         ValueError: `tomllib.TOMLDecodeError`, or tables that are nested too deeply.
     """
     if _DOTTED.search(text):
-        raise ValueError(f"a key of more than {MOST_PARTS} parts; {_TOO_DEEP}")
+        raise ValueError(f"a key of more than {MAX_PARTS} parts; {_TOO_DEEP}")
     try:
         return tomllib.loads(text)
     except RecursionError:

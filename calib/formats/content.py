@@ -38,7 +38,7 @@ class Hints:
 
 @dataclass(frozen=True)
 class Content:
-    """Cameras of a text by name, and descriptions of what was lost in reading."""
+    """Cameras of a text by name, and descriptions of the losses in reading."""
 
     cameras: Mapping[str, Camera]
     lost: tuple[str, ...] = ()
@@ -46,7 +46,7 @@ class Content:
 
 @dataclass(frozen=True)
 class Written:
-    """Written text, and descriptions of what was lost in writing."""
+    """Written text, and descriptions of the losses in writing."""
 
     text: str
     lost: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What OpenCV's FileStorage writes, as plain values; OpenCV's own parser crashes on some damaged files."""
+"""Parser of OpenCV's FileStorage files into plain values; OpenCV's own parser crashes on some damaged files."""
 
 import json
 import re

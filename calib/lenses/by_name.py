@@ -16,7 +16,7 @@ def lens_of(name: str, coefficients: ArrayLike) -> LensModel:
     """Lens of a model with its coefficients; missing trailing ones are zero.
 
     Raises:
-        LensError: unknown model or invalid coefficients; names what is allowed.
+        LensError: unknown model or invalid coefficients; names the allowed values.
     """
     numbers = np.asarray(coefficients, np.float64)
     match name:

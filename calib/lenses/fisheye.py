@@ -19,7 +19,7 @@ class KannalaBrandt:
     """r_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) at the angle θ from the axis; OpenCV's fisheye model.
 
     All coefficients zero is the equidistant projection. Missing trailing coefficients are zero. Ideal coordinates are
-    x/z and y/z as for every lens, so what lies 90° from the axis or more is not seen.
+    x/z and y/z as for every lens, so points 90° from the axis or more are not seen.
 
     J. Kannala, S. Brandt: A generic camera model and calibration method for conventional, wide-angle, and fish-eye
     lenses. IEEE PAMI 28(8), 2006, eq. 3, divided by its first coefficient, which is part of the focal length.

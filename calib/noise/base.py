@@ -28,7 +28,7 @@ Pixels = tuple[NDArray[np.integer], NDArray[np.integer]]
 
 
 class NoiseError(ValueError):
-    """Parameters that describe no noise model; names the key and what is allowed."""
+    """Parameters that describe no noise model; names the key and the allowed values."""
 
 
 def pixels_where(mask: NDArray[np.bool_]) -> Pixels:
@@ -61,7 +61,7 @@ class DepthNoise(Protocol):
 
 @runtime_checkable
 class ImageNoise(Protocol):
-    """Gaussian noise of what a pixel shows of a vertex: colour, grey, intensity, in the sensor's unit."""
+    """Gaussian noise of a pixel's colour, grey value or intensity, in the sensor's unit."""
 
     @property
     def uniform(self) -> float:

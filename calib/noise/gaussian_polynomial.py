@@ -17,8 +17,8 @@ from calib.noise.fit.samples import Samples
 class GaussianPolynomial:
     """μ(x, a) = Σ `mu[i][j]` xⁱ aʲ and σ(x, a) = Σ `sigma[i][j]` xⁱ aʲ, x in metres, a in the sensor's unit.
 
-    Arguments are clamped to the calibrated domain and σ is at least `least_sigma`, so that extrapolation stays positive
-    and bounded.
+    Arguments are clamped to the calibrated domain and σ is at least `minimum_sigma`, so that extrapolation stays
+    positive and bounded.
 
     Attributes:
         sigma: coefficients of the deviation [m]; row i for the distance's power i, column j for the amplitude's power
@@ -26,14 +26,14 @@ class GaussianPolynomial:
         mu: coefficients of the mean offset [m], likewise.
         distances: calibrated range of distances [m].
         amplitudes: calibrated range of amplitudes, in the sensor's unit.
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     sigma: Table
     mu: Table = ((0.0,),)
     distances: Span = (0.0, 100.0)
     amplitudes: Span = (0.0, 65535.0)
-    least_sigma: Annotated[float, Gt(0)] = 1e-4
+    minimum_sigma: Annotated[float, Gt(0)] = 1e-4
 
     def __post_init__(self) -> None:
         check_table("sigma", self.sigma)
@@ -61,7 +61,7 @@ class GaussianPolynomial:
     @property
     def _polynomials(self) -> Polynomials:
         sigma, mu = np.array(self.sigma)[..., None], np.array(self.mu)[..., None]
-        return Polynomials(sigma, mu, self.distances, self.amplitudes, self.least_sigma)
+        return Polynomials(sigma, mu, self.distances, self.amplitudes, self.minimum_sigma)
 
 
 Settings = GaussianPolynomial
@@ -80,4 +80,4 @@ def fit(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tuple[int,
     """
     law = fitting.polynomials(samples, sigma_degrees, mu_degrees)
     sigma, mu = fitting.table(law.sigma[..., 0]), fitting.table(law.mu[..., 0])
-    return GaussianPolynomial(sigma, mu, law.distances, law.amplitudes, law.least_sigma)
+    return GaussianPolynomial(sigma, mu, law.distances, law.amplitudes, law.minimum_sigma)

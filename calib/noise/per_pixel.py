@@ -30,14 +30,14 @@ class PerPixel:
             first and 1 at the second of `distances`, and clamped outside.
         factor: factor on the deviation (height, width).
         distances: calibrated domain, shape (2,).
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     law: DepthNoise
     offset: NDArray[np.floating]
     factor: NDArray[np.floating]
     distances: NDArray[np.floating]
-    least_sigma: float = maps.LEAST_SIGMA
+    minimum_sigma: float = maps.MIN_SIGMA
 
     @property
     def uses_amplitude(self) -> bool:
@@ -60,12 +60,12 @@ class PerPixel:
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ_p(x, a) [m]."""
-        return np.maximum(self.factor[p] * self.law.deviation(x, a, p), self.least_sigma)
+        return np.maximum(self.factor[p] * self.law.deviation(x, a, p), self.minimum_sigma)
 
     def save(self, file: Path) -> None:
         """Writes the .npz that `Settings` reads; the image's model is not part of it."""
         np.savez_compressed(
-            file, offset=self.offset, factor=self.factor, distances=self.distances, least_sigma=self.least_sigma
+            file, offset=self.offset, factor=self.factor, distances=self.distances, minimum_sigma=self.minimum_sigma
         )
 
 
@@ -75,7 +75,7 @@ class Settings:
 
     Attributes:
         file: an .npz with the arrays offset (k, height, width) [m], factor (height, width), distances (2,) [m] and
-            optionally least_sigma (), by default 1e-4.
+            optionally minimum_sigma (), by default 1e-4.
         law: noise model of the image, a table with its `type` and keys.
     """
 
@@ -100,7 +100,7 @@ class Settings:
         if not (np.all(factor > 0) and np.all(np.isfinite(factor)) and np.all(np.isfinite(offset))):
             raise NoiseError(f"offset and factor in {str(self.file)!r} must be finite, and factor above 0")
         maps.check_domain(self.file, arrays, "distances")
-        return PerPixel(law, offset, factor, distances, maps.least_sigma(self.file, arrays))
+        return PerPixel(law, offset, factor, distances, maps.minimum_sigma(self.file, arrays))
 
 
 def fit(
@@ -126,14 +126,14 @@ def fit(
     residual, deviation = _from(regions, samples)
     basis = shrinkage.basis_of(samples.true, tuple(regions.distances), own_degree)
     place = samples.row * labels.shape[1] + samples.column
-    offsets, factors = shrinkage.shrink(residual, deviation, basis, place, labels.size, repeats, samples.least_sigma)
+    offsets, factors = shrinkage.shrink(residual, deviation, basis, place, labels.size, repeats, samples.minimum_sigma)
     factors[np.bincount(place, minlength=labels.size) == 0] = 1.0  # pixels without samples equal their region
     return PerPixel(
         law,
         regions.offset + offsets.T.reshape(-1, *labels.shape),
         regions.factor * factors.reshape(labels.shape),
         regions.distances,
-        fitting.least_sigma(factors[place] * deviation),
+        fitting.minimum_sigma(factors[place] * deviation),
     )
 
 
@@ -152,8 +152,8 @@ def fit_regions(
     basis = shrinkage.basis_of(samples.true, distances, own_degree)
     places = int(labels.max()) + 1
     of = labels[samples.pixels]
-    offsets, factors = shrinkage.shrink(residual, deviation, basis, of, places, repeats, samples.least_sigma)
-    least = fitting.least_sigma(factors[of] * deviation)
+    offsets, factors = shrinkage.shrink(residual, deviation, basis, of, places, repeats, samples.minimum_sigma)
+    least = fitting.minimum_sigma(factors[of] * deviation)
     return PerPixel(law, np.moveaxis(offsets[labels], -1, 0), factors[labels], np.array(distances), least)
 
 

@@ -19,14 +19,14 @@ class PixelPolynomial:
     Attributes:
         sigma, mu: coefficients (i, j, height, width) [m].
         distances, amplitudes: calibrated domain, shape (2,); arguments are clamped to it.
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     sigma: NDArray[np.floating]
     mu: NDArray[np.floating]
     distances: NDArray[np.floating]
     amplitudes: NDArray[np.floating]
-    least_sigma: float = 1e-4
+    minimum_sigma: float = 1e-4
 
     @property
     def uses_amplitude(self) -> bool:
@@ -55,13 +55,13 @@ class PixelPolynomial:
             mu=self.mu,
             distances=self.distances,
             amplitudes=self.amplitudes,
-            least_sigma=self.least_sigma,
+            minimum_sigma=self.minimum_sigma,
         )
 
     @property
     def _polynomials(self) -> Polynomials:
         sigma, mu = (part.reshape(*part.shape[:2], -1) for part in (self.sigma, self.mu))
-        return Polynomials(sigma, mu, tuple(self.distances), tuple(self.amplitudes), self.least_sigma)
+        return Polynomials(sigma, mu, tuple(self.distances), tuple(self.amplitudes), self.minimum_sigma)
 
     def _place(self, p: Pixels) -> NDArray[np.integer]:
         return p[0] * self.sigma.shape[3] + p[1]
@@ -73,7 +73,7 @@ class Settings:
 
     Attributes:
         file: an .npz with the arrays sigma, mu (i, j, height, width), distances (2,), amplitudes (2,) and optionally
-            least_sigma (), by default 1e-4.
+            minimum_sigma (), by default 1e-4.
     """
 
     file: Path
@@ -88,7 +88,7 @@ class Settings:
         sigma, mu = arrays["sigma"], arrays["mu"]
         if sigma.ndim != 4 or mu.ndim != 4 or sigma.shape[2:] != mu.shape[2:]:
             raise NoiseError(f"sigma and mu in {str(self.file)!r} must be (i, j, height, width) of one image size")
-        return PixelPolynomial(sigma, mu, arrays["distances"], arrays["amplitudes"], float(arrays["least_sigma"]))
+        return PixelPolynomial(sigma, mu, arrays["distances"], arrays["amplitudes"], float(arrays["minimum_sigma"]))
 
 
 def fit(
@@ -120,4 +120,4 @@ def fit(
     place = samples.row * labels.shape[1] + samples.column
     law = shrinkage.refine(regions, labels.ravel(), samples, place, own_degree)
     sigma, mu = (part.reshape(*part.shape[:2], *labels.shape) for part in (law.sigma, law.mu))
-    return PixelPolynomial(sigma, mu, np.array(law.distances), np.array(law.amplitudes), law.least_sigma)
+    return PixelPolynomial(sigma, mu, np.array(law.distances), np.array(law.amplitudes), law.minimum_sigma)

@@ -20,7 +20,7 @@ class RegionPolynomial:
         labels: region (height, width) of every pixel, 0 to regions − 1.
         sigma, mu: coefficients (i, j, regions) [m].
         distances, amplitudes: calibrated domain, shape (2,); arguments are clamped to it.
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     labels: NDArray[np.integer]
@@ -28,7 +28,7 @@ class RegionPolynomial:
     mu: NDArray[np.floating]
     distances: NDArray[np.floating]
     amplitudes: NDArray[np.floating]
-    least_sigma: float = 1e-4
+    minimum_sigma: float = 1e-4
 
     @property
     def uses_amplitude(self) -> bool:
@@ -58,12 +58,12 @@ class RegionPolynomial:
             mu=self.mu,
             distances=self.distances,
             amplitudes=self.amplitudes,
-            least_sigma=self.least_sigma,
+            minimum_sigma=self.minimum_sigma,
         )
 
     @property
     def _polynomials(self) -> Polynomials:
-        return Polynomials(self.sigma, self.mu, tuple(self.distances), tuple(self.amplitudes), self.least_sigma)
+        return Polynomials(self.sigma, self.mu, tuple(self.distances), tuple(self.amplitudes), self.minimum_sigma)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Settings:
 
     Attributes:
         file: an .npz with the arrays labels (height, width), sigma, mu (i, j, regions), distances (2,), amplitudes (2,)
-            and optionally least_sigma (), by default 1e-4.
+            and optionally minimum_sigma (), by default 1e-4.
     """
 
     file: Path
@@ -94,7 +94,7 @@ class Settings:
                 f"labels in {str(self.file)!r} must be 0 to {sigma.shape[2] - 1}, the regions that sigma and mu have, "
                 f"not {labels.min()} to {labels.max()}"
             )
-        least = float(arrays["least_sigma"])
+        least = float(arrays["minimum_sigma"])
         return RegionPolynomial(labels.astype(np.int64), sigma, mu, arrays["distances"], arrays["amplitudes"], least)
 
 
@@ -128,4 +128,4 @@ def fit(
     parents = np.zeros(int(labels.max()) + 1, np.int64)
     law = shrinkage.refine(image, parents, samples, labels[samples.pixels], own_degree)
     domain = np.array(law.distances), np.array(law.amplitudes)
-    return RegionPolynomial(labels, law.sigma, law.mu, *domain, law.least_sigma)
+    return RegionPolynomial(labels, law.sigma, law.mu, *domain, law.minimum_sigma)

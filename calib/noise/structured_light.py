@@ -68,7 +68,7 @@ def fit(samples: Samples, step: float) -> StructuredLight:
     """
     samples = fitting.subsampled(samples.returns(with_amplitude=False))
     spread = np.column_stack([samples.true**4, np.ones(len(samples))])
-    least = samples.least_sigma
+    least = samples.minimum_sigma
     law = fitting.maximize_likelihood(samples.residual, fitting.Design(spread[:, :0], spread), power=2, least=least)
     if law.spread[1] <= 0:  # no floor above the other errors
         columns = fitting.Design(spread[:, :0], spread[:, :1])

@@ -22,7 +22,7 @@ class TofAmplitude:
     over the amplitude. Errors that do not depend on it (jitter of the light source, rounding) are the polynomial in the
     distance. In `mu` the polynomial covers the slow part of the periodic ("wiggling") error, and mu_amplitude / a the
     offset of dark surfaces. This has fewer parameters than a polynomial in the amplitude and extrapolates correctly.
-    Arguments are clamped to the calibrated domain, and σ is at least `least_sigma`.
+    Arguments are clamped to the calibrated domain, and σ is at least `minimum_sigma`.
 
     Attributes:
         sigma: deviation of a bright return, coefficients of the powers of the distance [m].
@@ -31,7 +31,7 @@ class TofAmplitude:
         mu_amplitude: mean offset times amplitude [m times the sensor's amplitude unit].
         distances: calibrated range of distances [m].
         amplitudes: calibrated range of amplitudes, above 0, in the sensor's unit.
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     sigma: tuple[float, ...]
@@ -40,7 +40,7 @@ class TofAmplitude:
     mu_amplitude: float = 0.0
     distances: Span = (0.0, 100.0)
     amplitudes: Span = (1.0, 65535.0)
-    least_sigma: Annotated[float, Gt(0)] = 1e-4
+    minimum_sigma: Annotated[float, Gt(0)] = 1e-4
 
     def __post_init__(self) -> None:
         for key, powers in (("sigma", self.sigma), ("mu", self.mu)):
@@ -66,7 +66,7 @@ class TofAmplitude:
 
     def deviation(self, x: NDArray[np.float64], a: NDArray[np.float64], p: Pixels) -> NDArray[np.float64]:
         """Standard deviation σ(x, a) [m], the same for every pixel."""
-        return np.maximum(self._law(self.sigma, self.sigma_amplitude, x, a), self.least_sigma)
+        return np.maximum(self._law(self.sigma, self.sigma_amplitude, x, a), self.minimum_sigma)
 
     def _law(
         self, powers: tuple[float, ...], per_amplitude: float, x: NDArray[np.float64], a: NDArray[np.float64]
@@ -97,7 +97,7 @@ def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmpli
     distances, amplitudes = domain(samples.true), domain(samples.amplitude)
     x, inverse = np.clip(samples.true, *distances), 1 / np.clip(samples.amplitude, *amplitudes)
     mean, spread = (np.column_stack([polyvander(x, degree), inverse]) for degree in (mu_degree, sigma_degree))
-    least = samples.least_sigma
+    least = samples.minimum_sigma
     law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread), least=least)
     if law.spread[-1] < 0:  # errors that grow with amplitude contradict the model; use the distance only
         law = fitting.maximize_likelihood(samples.residual, fitting.Design(mean, spread[:, :-1]), least=least)
@@ -109,5 +109,5 @@ def fit(samples: Samples, sigma_degree: int = 1, mu_degree: int = 1) -> TofAmpli
         mu_amplitude=float(law.mean[-1]),
         distances=distances,
         amplitudes=amplitudes,
-        least_sigma=fitting.least_sigma(np.maximum(spread[:, : len(law.spread)] @ law.spread, least)),
+        minimum_sigma=fitting.minimum_sigma(np.maximum(spread[:, : len(law.spread)] @ law.spread, least)),
     )

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 #: Half width of the window for plane fits; minimum number of returns in it.
-_REACH, _LEAST = 2, 20
+_REACH, _MIN_KNOWN = 2, 20
 
 #: Largest relative range of distances in a window that is treated as a plane.
 _RIM = 0.03
@@ -30,7 +30,7 @@ def normalized(
     middle = near[..., side * side // 2]
     with np.errstate(invalid="ignore"):
         known &= np.abs(near - middle[..., None]) < _RIM * middle[..., None]
-        flat = (known.sum(axis=-1) >= _LEAST) & np.isfinite(middle)
+        flat = (known.sum(axis=-1) >= _MIN_KNOWN) & np.isfinite(middle)
     weight, columns = known[flat].astype(np.float64), along[flat]
     normal = np.einsum("nik,njk,nk->nij", columns, columns, weight)
     right = np.einsum("nik,nk,nk->ni", columns, np.where(known, inverse, 0)[flat], weight)

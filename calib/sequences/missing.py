@@ -61,7 +61,7 @@ def learn(
 
     Args:
         statics: the sequences.
-        references: their true distances; without planes, nothing is told.
+        references: their true distances; without planes, nothing is reported.
         targets: the board of each, if it is one.
         region: pixels (height, width) that may show a target.
     """

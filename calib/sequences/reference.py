@@ -30,7 +30,7 @@ class Kind(StrEnum):
 
     @property
     def has_target(self) -> bool:
-        """True if a pixel's own error can be told from what the pixel looks at."""
+        """True if a pixel's own error can be separated from the scene."""
         return self is not Kind.MEAN
 
 

@@ -117,8 +117,8 @@ def _agreeing(found: list[Segment]) -> NDArray[np.bool_]:
     """Mask (n, height, width) of static segments that show each pixel the same surface."""
     still = np.array([part.still for part in found])
     means = np.where(still, [part.mean for part in found], np.nan)
-    usual = stillness.median(means)
+    median = stillness.median(means)
     deviation = np.sqrt(stillness.median(np.where(still, [part.variance for part in found], np.nan)))
     with np.errstate(invalid="ignore"):
-        off = np.abs(means - usual) - np.maximum(_ELSEWHERE * deviation, 1e-4)
+        off = np.abs(means - median) - np.maximum(_ELSEWHERE * deviation, 1e-4)
     return still & ((off <= 0) | (len(found) == 1))

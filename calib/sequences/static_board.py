@@ -18,7 +18,7 @@ from calib.solve.start.board_poses import pose_candidates
 #: Increments for finite differences with respect to a pose [rad, m].
 _STEP = 1e-5
 #: Lower bound of the deviation of corners [px].
-_LEAST_PX = 0.02
+_MIN_PX = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,29 +45,29 @@ class StaticBoard:
     uncertainty: float
 
 
-def locate(view: CornerView, seeing: Camera, depth: Camera) -> StaticBoard:
+def locate(view: CornerView, observer: Camera, depth: Camera) -> StaticBoard:
     """Estimates the pose of a board seen by one sensor relative to a depth sensor, which may be the same.
 
     Args:
         view: view of the board.
-        seeing: camera of the view's sensor, with its pose in the rig.
+        observer: camera of the view's sensor, with its pose in the rig.
         depth: camera of the depth sensor, likewise.
 
     Raises:
         NoiseError: no valid board pose, or the board is outside the depth sensor's view.
     """
-    found = [_refined(seeing.T_rs @ each.T_sb, view, seeing) for each in pose_candidates(seeing, view)]
+    found = [_refined(observer.T_rs @ each.T_sb, view, observer) for each in pose_candidates(observer, view)]
     if not found:
         raise NoiseError(f"{view.sensor}: no pose of the board explains where its corners are seen")
     T_rb, misses, jacobian = min(found, key=lambda each: float(np.sum(np.square(each[1]))))
     inside = _inside(depth, pose.transform(T_rb, view.points_b))
     if not inside.any():
         raise NoiseError(f"the depth sensor does not see the board that {view.sensor} sees")
-    sigma = max(float(np.sqrt(np.sum(np.square(misses)) / max(len(misses) - 6, 1))), _LEAST_PX)
+    sigma = max(float(np.sqrt(np.sum(np.square(misses)) / max(len(misses) - 6, 1))), _MIN_PX)
     covariance = sigma**2 * np.linalg.inv(jacobian.T @ jacobian)
     rays = depth.rays()[inside]
-    slopes = np.stack([_slope(T_rb, number, depth, rays) for number in range(6)], axis=1)
-    variance = np.einsum("ni,ij,nj->n", slopes, covariance, slopes)
+    distance_jacobian = np.stack([_slope(T_rb, number, depth, rays) for number in range(6)], axis=1)
+    variance = np.einsum("ni,ij,nj->n", distance_jacobian, covariance, distance_jacobian)
     rms_px = float(np.sqrt(2 * np.mean(np.square(misses))))
     uncertainty = float(np.sqrt(np.mean(variance)))
     return StaticBoard(view.sensor, len(view.points_b), rms_px, T_rb, _plane(T_rb, depth), inside, uncertainty)

@@ -1,4 +1,4 @@
-"""Quantisation of distances, told from the values themselves: a file may count in finer units than its sensor."""
+"""Quantisation of distances, estimated from the values themselves: a file may count in finer units than its sensor."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ _QUARTILES = 1.349
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """Quantisation step at distance x: the largest of `digit`, `growth` · x² and what was observed.
+    """Quantisation step at distance x: the largest of `digit`, `growth` · x² and the observed step.
 
     Attributes:
         digit: resolution at any distance [m]; 0 if there is none.
@@ -106,12 +106,12 @@ def _gaps(lengths: NDArray[np.floating]) -> tuple[NDArray[np.float64], ...]:
     difference = np.diff(ordered, axis=0)
     smallest = np.where(difference > _NOTHING_M, difference, np.inf).min(axis=0, initial=np.inf)
     n = np.isfinite(ordered).sum(axis=0)
-    first, usual, third = (_at(ordered, n * k // 4) for k in (1, 2, 3))
+    first, median, third = (_at(ordered, n * k // 4) for k in (1, 2, 3))
     with np.errstate(invalid="ignore"):
-        seen = usual > 0
+        seen = median > 0
     pairs = (n * (n - 1)).clip(1)
     chance = 2 * np.sqrt(np.pi) * (third - first) / _QUARTILES / pairs
-    return usual[seen].astype(np.float64), smallest[seen].astype(np.float64), chance[seen].astype(np.float64)
+    return median[seen].astype(np.float64), smallest[seen].astype(np.float64), chance[seen].astype(np.float64)
 
 
 def _at(ordered: NDArray[np.floating], index: NDArray[np.integer]) -> NDArray[np.floating]:

@@ -11,7 +11,7 @@ from calib.noise.base import NoiseError
 from calib.noise.fit.fitting import MAD_TO_SIGMA
 
 #: Frames per segment, and minimum number of frames.
-SEGMENT, LEAST_FRAMES = 30, 8
+SEGMENT, MIN_FRAMES = 30, 8
 
 #: Minimum fraction of frames with a return, and of inliers among these, for a static pixel.
 _RETURNS, _INLIERS = 0.8, 0.9
@@ -63,8 +63,8 @@ def segments(n: int) -> list[slice]:
     Raises:
         NoiseError: too few frames.
     """
-    if n < LEAST_FRAMES:
-        raise NoiseError(f"{n} frames are too few to tell noise from motion; record at least {LEAST_FRAMES}")
+    if n < MIN_FRAMES:
+        raise NoiseError(f"{n} frames are too few to tell noise from motion; record at least {MIN_FRAMES}")
     edges = np.linspace(0, n, max(1, round(n / SEGMENT)) + 1).astype(int)
     return [slice(first, last) for first, last in pairwise(edges)]
 
@@ -82,8 +82,8 @@ def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: 
         step: quantisation of the distances (height, width) [m].
     """
     centre = median(distance)
-    usual_change = median(np.abs(np.diff(distance, axis=0)))  # robust to outliers
-    kept = _near(distance, centre, np.square(_PER_CHANGE * usual_change), step)
+    median_change = median(np.abs(np.diff(distance, axis=0)))  # robust to outliers
+    kept = _near(distance, centre, np.square(_PER_CHANGE * median_change), step)
     fast = _fast(np.where(kept, distance, np.nan))
     kept = _near(distance, centre, fast, step)
     mean, variance, count = _moments(distance, kept)
@@ -91,8 +91,8 @@ def look(distance: NDArray[np.floating], amplitude: NDArray[np.floating], step: 
     enough = seen >= _RETURNS * len(distance)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(variance > step**2, variance / fast, 1.0)
-    usual = max(1.0, float(np.quantile(ratio[enough], 0.25))) if enough.any() else 1.0
-    steady = np.less(ratio, usual * (1 + _RATIO / np.sqrt(len(distance))))
+    baseline = max(1.0, float(np.quantile(ratio[enough], 0.25))) if enough.any() else 1.0
+    steady = np.less(ratio, baseline * (1 + _RATIO / np.sqrt(len(distance))))
     changes = enough & (np.logical_not(steady) | (count < _INLIERS * seen))
     moving = ndimage.binary_opening(changes, np.ones((2, 2))) | (changes & (variance > (2 * step) ** 2))
     near_moving = np.asarray(ndimage.binary_dilation(moving, iterations=_AROUND), np.bool_)
@@ -147,6 +147,6 @@ def _rims(centre: NDArray[np.float64], variance: NDArray[np.float64]) -> NDArray
 
 def _flickers(deviation: NDArray[np.float64], seen: NDArray[np.bool_], step: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Pixels whose deviation is far above that of their surroundings, unlike those of a dark surface."""
-    usual = float(np.median(deviation[seen])) if seen.any() else 0.0
-    around = ndimage.median_filter(np.where(seen, deviation, usual), _NEIGHBOURHOOD)
+    overall = float(np.median(deviation[seen])) if seen.any() else 0.0
+    around = ndimage.median_filter(np.where(seen, deviation, overall), _NEIGHBOURHOOD)
     return deviation > _FLICKER * np.maximum(around, np.nan_to_num(step) / 2)

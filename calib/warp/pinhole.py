@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from calib.camera import Camera
 
 #: Largest size of the undistorted image relative to the original.
-MOST_GROWTH = 2.0
+MAX_GROWTH = 2.0
 
 
 def pinhole_of(camera: Camera) -> Camera:
@@ -19,7 +19,7 @@ def pinhole_of(camera: Camera) -> Camera:
     if camera.lens.is_pinhole:
         return camera
     ideal = camera.lookup.ideal.reshape(-1, 2) * (camera.fx, camera.fy)
-    half = np.array([camera.width, camera.height]) * MOST_GROWTH / 2
+    half = np.array([camera.width, camera.height]) * MAX_GROWTH / 2
     low, high = np.maximum(ideal.min(axis=0), -half), np.minimum(ideal.max(axis=0), half)
     center = np.array([camera.cx, camera.cy])
     axis = center + np.ceil(-low - center - 1e-6)

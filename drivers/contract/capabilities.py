@@ -42,7 +42,7 @@ class StreamInfo:
         sensor, stream: its sensor (optical head) and name.
         kind, encoding, width, height: of its images [px].
         rate_hz: images per second.
-        clock: what timestamps them.
+        clock: of their timestamps.
         noisy: True if no two of its images are equal, because of the sensor's noise; False if they may be, as in a
             simulation without noise.
     """

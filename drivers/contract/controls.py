@@ -58,7 +58,7 @@ class ControlInfo:
         """Validated value, converted to the control's type: an int for a NUMBER becomes a float.
 
         Raises:
-            ControlError: wrong type, not finite, or out of range; names what is allowed.
+            ControlError: wrong type, not finite, or out of range; names the allowed values.
         """
         match self.kind, value:
             case (ControlKind.SWITCH, bool()):
@@ -118,7 +118,7 @@ class Controls:
         """Sets the control.
 
         Raises:
-            ControlError: no such control, or a value that is not allowed; names what is allowed.
+            ControlError: no such control, or a value that is not allowed; names the allowed values.
             DeviceError: the device does not answer.
         """
         control = self._find(name)

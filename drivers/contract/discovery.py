@@ -30,7 +30,7 @@ class Found:
     """An attached device, or a driver whose discovery failed.
 
     Attributes:
-        info: its identity. `uri` opens this device and no other, on any port; what is unknown before opening is "".
+        info: its identity. `uri` opens this device and no other, on any port; fields unknown before opening are "".
         availability: READY, or the kind of obstacle.
         reason: the obstacle in plain words; "" if READY.
         remedy: how to remove the obstacle, if possible as a command; "" if there is none.

@@ -6,11 +6,11 @@ import warnings
 from PIL import Image, UnidentifiedImageError
 
 #: Most pixels of an image: 8192 × 8192. Decoded, they are up to 512 MiB.
-MOST_PIXELS = 1 << 26
+MAX_PIXELS = 1 << 26
 
 
 class ImageSizeError(ValueError):
-    """An image that is too large, or whose size cannot be told."""
+    """An image that is too large, or whose size is unknown."""
 
 
 def check(content: bytes) -> None:
@@ -20,7 +20,7 @@ def check(content: bytes) -> None:
         content: PNG, TIFF, PGM, PPM, JPEG, WebP or BMP.
 
     Raises:
-        ImageSizeError: more than `MOST_PIXELS`, or no image.
+        ImageSizeError: more than `MAX_PIXELS`, or no image.
     """
     try:
         with warnings.catch_warnings():
@@ -28,8 +28,8 @@ def check(content: bytes) -> None:
             with Image.open(io.BytesIO(content)) as image:
                 width, height = image.size
     except Image.DecompressionBombError:
-        raise ImageSizeError(f"more than the {MOST_PIXELS} pixels that are allowed") from None
+        raise ImageSizeError(f"more than the {MAX_PIXELS} pixels that are allowed") from None
     except (UnidentifiedImageError, OSError, ValueError, SyntaxError, EOFError, ArithmeticError) as error:
-        raise ImageSizeError(f"no image whose size can be told: {type(error).__name__}") from error
-    if width * height > MOST_PIXELS:
-        raise ImageSizeError(f"{width} × {height} pixels, {MOST_PIXELS} are allowed")
+        raise ImageSizeError(f"no image with a known size: {type(error).__name__}") from error
+    if width * height > MAX_PIXELS:
+        raise ImageSizeError(f"{width} × {height} pixels, {MAX_PIXELS} are allowed")

@@ -1,6 +1,6 @@
-"""Validation of messages from other programs, by schema and range: the only place that says what is allowed.
+"""Validation of messages from other programs, by schema and range: the only place that defines valid messages.
 
-Whoever may publish can send any bytes. What passes here can be shown, computed with and recorded without another look.
+A publisher can send any bytes. Messages that pass can be displayed, processed and recorded without another check.
 """
 
 import math
@@ -23,9 +23,9 @@ LARGEST, LARGEST_IMAGE = 1 << 24, 1 << 28
 #: Longest text of a configuration [characters].
 LONGEST_FILE = 1 << 20
 #: Most entries of a map, and most texts or messages in a list.
-MOST_ENTRIES = 2000
+MAX_ENTRIES = 2000
 #: Most points of a truth, whose surfaces are searched for the vertices of every estimate, or of a mesh for viewers.
-MOST_POINTS = 1 << 18
+MAX_POINTS = 1 << 18
 #: Largest image [pixels along a side].
 LARGEST_SIDE = 1 << 14
 #: A larger gap in sequence numbers is no loss: the numbers are not those of one publisher.
@@ -52,7 +52,7 @@ _RANGES: Mapping[str, tuple[int, int]] = {
     "foxglove.RawImage.height": (0, LARGEST_SIDE),
 }
 
-#: Lists of which only the length is checked: points and colours that nobody but a viewer reads.
+#: Lists of which only the length is checked: points and colours that only viewers read.
 _VIEWED = frozenset(f"foxglove.TriangleListPrimitive.{name}" for name in ("points", "colors"))
 
 #: Numbers that are used without a look: neither NaN nor infinite. Of others, NaN and infinity mean unknown.
@@ -128,7 +128,7 @@ def _check_fields(message: Message) -> None:
             _check_values(entry["key"], value)
             _check_values(entry["value"], value.values())
         elif name in _VIEWED:
-            _check_count(name, len(value), MOST_POINTS)
+            _check_count(name, len(value), MAX_POINTS)
         elif field.is_repeated:
             if field.cpp_type in (FieldDescriptor.CPPTYPE_MESSAGE, FieldDescriptor.CPPTYPE_STRING):
                 _check_count(name, len(value))
@@ -164,7 +164,7 @@ def _require_all(name: str, values: Iterable[Any], holds: Callable[[Any], bool],
         raise MessageError(cause, f"{name} = {odd} {rule}")
 
 
-def _check_count(name: str, number: int, most: int = MOST_ENTRIES) -> None:
+def _check_count(name: str, number: int, most: int = MAX_ENTRIES) -> None:
     if number > most:
         raise MessageError("size", f"{name} has {number} entries, {most} are allowed")
 
@@ -192,7 +192,7 @@ def _check_model(model: SensorModel) -> None:
 def _check_truth(truth: SurfaceTruth) -> None:
     points = truth.rows * truth.columns
     size = f"SurfaceTruth of {truth.rows} × {truth.columns} points"
-    _require(0 < points <= MOST_POINTS, f"{size}: 1 to {MOST_POINTS} are allowed")
+    _require(0 < points <= MAX_POINTS, f"{size}: 1 to {MAX_POINTS} are allowed")
     _require(len(truth.points_f32) == 12 * points, f"{size} has {len(truth.points_f32)} bytes")
 
 

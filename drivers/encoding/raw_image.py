@@ -20,7 +20,7 @@ _VARINT, _BYTES = 0, 2
 _FIXED = {1: 8, 5: 4}
 
 #: Most fields of a message; there are seven.
-_MOST_FIELDS = 100
+_MAX_FIELDS = 100
 
 #: Largest number of bytes of a varint: 64 bits, seven in each.
 _LONGEST = 10
@@ -42,8 +42,8 @@ def parse(payload: bytes) -> tuple[RawImage, memoryview]:
     whole, pixels, rest, position, kept, fields = memoryview(payload), memoryview(b""), [], 0, 0, 0
     while position < len(whole):
         begin, fields = position, fields + 1
-        if fields > _MOST_FIELDS:
-            raise DecodeError(f"more than {_MOST_FIELDS} fields")
+        if fields > _MAX_FIELDS:
+            raise DecodeError(f"more than {_MAX_FIELDS} fields")
         key, position = _varint(whole, position)
         size, position = _size(whole, position, key & 7)
         if position + size > len(whole):

@@ -30,7 +30,7 @@ def parse(uri: str) -> Address:
     """Parses an address such as `kinect1://`, `kinect1://A00363A01234040A` or `kinect1://?streams=depth,ir`.
 
     Raises:
-        AddressError: unknown key or invalid value; names what is allowed.
+        AddressError: unknown key or invalid value; names the allowed values.
     """
     try:
         parts = urlsplit(uri)

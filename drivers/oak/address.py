@@ -73,7 +73,7 @@ def parse(uri: str) -> Address:
     """Parses an address.
 
     Raises:
-        AddressError: unknown key or invalid value; names both and what is allowed.
+        AddressError: unknown key or invalid value; names both and the allowed values.
     """
     parts = urlsplit(uri)
     values = dict(_DEFAULTS)

@@ -53,7 +53,7 @@ def parse(uri: str) -> Address:
     """Parses an address such as `remote://192.168.1.7:7447/bench`.
 
     Raises:
-        AddressError: invalid host, port, rig or key; names it and what is allowed.
+        AddressError: invalid host, port, rig or key; names it and the allowed values.
     """
     parts = urlsplit(uri)
     rig = parts.path.strip("/")

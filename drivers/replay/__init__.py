@@ -48,7 +48,7 @@ def check_address(uri: str) -> Address:
     """Parses an address; whether there is such a file is not looked at.
 
     Raises:
-        AddressError: unknown key or invalid value; names both and what is allowed.
+        AddressError: unknown key or invalid value; names both and the allowed values.
     """
     parts = urlsplit(uri)
     values = {"speed": "1", "loop": "0", "delay": "0"}

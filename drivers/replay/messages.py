@@ -9,7 +9,7 @@ from mcap.records import Message
 
 from drivers.replay.contents import DAMAGE, Contents, RecordingError, Topic, read_chunk
 
-#: Latest time that is told from others [ns].
+#: Largest time [ns].
 LAST_NS = (1 << 63) - 1
 
 

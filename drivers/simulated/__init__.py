@@ -17,7 +17,7 @@ def open_device(uri: str, clock: Callable[[], int]) -> Device:
     """Opens an address such as `simulated://sheet?seed=1&sensors=tof,color`; the keys are the fields of `Address`.
 
     Raises:
-        AddressError: invalid address; names key, value and what is allowed.
+        AddressError: invalid address; names key, value and the allowed values.
     """
     address = parse(uri)
     return SimulatedDevice(uri, address.build(), clock, fault_schedule=address.fault)

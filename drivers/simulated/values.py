@@ -1,4 +1,4 @@
-"""Parsers of an address's values; they raise a ValueError that names what is allowed."""
+"""Parsers of an address's values; they raise a ValueError that names the allowed values."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -7,7 +7,7 @@ from typing import TypeVar
 Number = TypeVar("Number", int, float)
 
 #: Minimum and maximum width and height of images [px].
-_LEAST, _GREATEST = 16, 2048
+_MIN_SIZE, _MAX_SIZE = 16, 2048
 
 
 def number(kind: type[Number], low: float, high: float) -> Callable[[str], Number]:
@@ -86,6 +86,6 @@ def size(text: str) -> tuple[int, int]:
     """Parses width and height of an image [px], such as 640x480."""
     match = re.fullmatch(r"(\d{1,4})x(\d{1,4})", text)
     width, height = (int(number) for number in match.groups()) if match else (0, 0)
-    if not (_LEAST <= width <= _GREATEST and _LEAST <= height <= _GREATEST):
-        raise ValueError(f"WIDTHxHEIGHT, each from {_LEAST} to {_GREATEST}")
+    if not (_MIN_SIZE <= width <= _MAX_SIZE and _MIN_SIZE <= height <= _MAX_SIZE):
+        raise ValueError(f"WIDTHxHEIGHT, each from {_MIN_SIZE} to {_MAX_SIZE}")
     return width, height

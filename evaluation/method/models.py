@@ -53,12 +53,12 @@ class Case:
     optimizer: OptimizerSettings = field(default_factory=cma.Settings)
 
     @property
-    def misplacement_px(self) -> float | None:
+    def texture_registration_px(self) -> float | None:
         """That of the likelihood [px]."""
-        return self.objective.misplacement_px if isinstance(self.objective, likelihood.Settings) else None
+        return self.objective.texture_registration_px if isinstance(self.objective, likelihood.Settings) else None
 
 
-PRINT, SQUARES, HYBRID = likelihood.Settings(misplacement_px=0.2), euclidean.Settings(), hybrid.Settings()
+PRINT, SQUARES, HYBRID = likelihood.Settings(texture_registration_px=0.2), euclidean.Settings(), hybrid.Settings()
 
 CASES = (
     Case("nurbs by default, hybrid", "sheet", nurbs.Settings(), optimizer=HYBRID),
@@ -102,7 +102,9 @@ def run(settings: Settings, context: Context) -> Findings:
     rows: list[tuple[Cell, ...]] = []
     values, tracked = {}, []
     for case in CASES:
-        name = f"{case.scene}, {case.name}" + (f", {case.misplacement_px:g} px" if case.misplacement_px else "")
+        name = f"{case.scene}, {case.name}" + (
+            f", {case.texture_registration_px:g} px" if case.texture_registration_px else ""
+        )
         context.progress(name)
         results = [measure(case, context.seed + seed, settings.frames) for seed in settings.seeds]
         rows.append(_row(case, results))
@@ -131,7 +133,7 @@ def _strain(mesh: Mesh, vertices: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 _COLUMNS = (
-    Column("scene"), Column("model"), Column("misplacement", "px", ".1f"), Column("vertex error", "mm", ".2f"),
+    Column("scene"), Column("model"), Column("registration σ", "px", ".1f"), Column("vertex error", "mm", ".2f"),
     Column("SD", "mm", ".2f"), Column("surface error", "mm", ".2f"), Column("SD", "mm", ".2f"),
     Column("worst frame", "mm", ".2f"), Column("change of edges", "", ".2%"), Column("TRACKING", "", ".0%"),
 )  # fmt: skip
@@ -145,6 +147,6 @@ def _row(case: Case, results: Sequence[Result]) -> tuple[Cell, ...]:
     means = {key: float(np.mean([getattr(one, key) for one in results])) for key in Result.__dataclass_fields__}
     worst = max(one.worst_mm for one in results)
     return (
-        case.scene, case.name, case.misplacement_px, means["vertex_mm"], spread[0], means["surface_mm"], spread[1],
-        worst, means["stretch"], means["tracked"],
+        case.scene, case.name, case.texture_registration_px, means["vertex_mm"], spread[0], means["surface_mm"],
+        spread[1], worst, means["stretch"], means["tracked"],
     )  # fmt: skip

@@ -76,14 +76,14 @@ def swing(t: float) -> SheetState:
 
 @dataclass(frozen=True)
 class SheetScene:
-    """What is rendered.
+    """A swinging sheet before a wall, and the camera's noise and dropouts.
 
     Attributes:
-        name: what it is called in tables.
+        name: in tables.
         motion: of the sheet.
         sigma: standard deviation of the ray lengths [m].
         hole: columns and rows of a window in the middle of the image without returns [px]; zero: none.
-        wall: what is behind the sheet.
+        wall: behind the sheet.
         dropouts: share of the pixels without a return, in all frames but the first, each independently.
     """
 

@@ -50,7 +50,7 @@ class TimeOfFlight:
         mu_offset: mean offset [m].
         mu_amplitude: mean offset times amplitude [m]: what is dark looks farther away, or nearer if negative.
         amplitude_deviation: deviation of the amplitude.
-        least_amplitude: a weaker return is reported as none.
+        minimum_amplitude: a weaker return is reported as none.
         illumination: share of the lamp's light that goes where each pixel looks (height, width), or one for all ().
     """
 
@@ -62,7 +62,7 @@ class TimeOfFlight:
     mu_offset: float = 0.0
     mu_amplitude: float = 0.0
     amplitude_deviation: float = 25.0
-    least_amplitude: float = 100.0
+    minimum_amplitude: float = 100.0
     illumination: NDArray[np.float64] = field(default_factory=lambda: np.ones(()))
 
     def amplitude(self, view: View) -> NDArray[np.float64]:
@@ -87,7 +87,7 @@ class TimeOfFlight:
             distance = view.distance + self.mean(view.distance, amplitude)
             distance = distance + self.deviation(view.distance, amplitude) * normal[0]
             bright = amplitude + self.amplitude_deviation * normal[1]
-            good = (bright >= self.least_amplitude) & (distance > 0) & (distance < RANGE_M)
+            good = (bright >= self.minimum_amplitude) & (distance > 0) & (distance < RANGE_M)
         step = RANGE_M / LEVELS
         steps = np.rint(np.where(good, distance, np.nan) / step)
         return Measurement((steps * step).astype(np.float32), np.clip(np.rint(bright), 0, 65535).astype(np.float32))

@@ -37,12 +37,12 @@ LOST_S = 1.0
 #: Data rate of the recordings [bytes/s].
 RECORDED_BYTES_S = 11_000_000
 #: Bounds of the slopes: memory [MB/min] and open files [1/min]; shortest run in which they can be told [min].
-GROWTH_MB_MIN, GROWTH_FILES_MIN, LEAST_MIN = 0.3, 0.3, 10.0
+GROWTH_MB_MIN, GROWTH_FILES_MIN, MIN_DURATION_MIN = 0.3, 0.3, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How long.
+    """Duration and rate of faults.
 
     Attributes:
         minutes: duration [min].
@@ -58,7 +58,7 @@ QUICK = Settings(minutes=0.7, pause_s=3.0)
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a process held at a moment, CLOCK_MONOTONIC [ns]."""
+    """Memory and open files of a process at a time, CLOCK_MONOTONIC [ns]."""
 
     t_ns: int
     process: str
@@ -103,7 +103,7 @@ def findings(settings: Settings, tries: Sequence[tuple[Fault, Try]], lost: int, 
     """Goals, and a table with a row for each fault in its order."""
     late = [one for one, seen in tries if np.isfinite(one.noticed_s) and not seen.noticed_s <= fault.NOTICED_S]
     ill = [one for one, seen in tries if np.isnan(seen.recovered_s)]
-    slopes = growth(usages) if settings.minutes >= LEAST_MIN else {}
+    slopes = growth(usages) if settings.minutes >= MIN_DURATION_MIN else {}
     goals = (
         at_most(f"Images older than {LOST_S:g} s that are lost", lost, 0),
         at_most(f"Of {len(tries)} faults, those not in health within {fault.NOTICED_S:g} s", len(late), 0),

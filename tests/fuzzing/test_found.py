@@ -1,4 +1,4 @@
-"""What `test_files` found, as the shortest file that shows it."""
+"""Findings of `test_files`, each as the shortest file that shows it."""
 
 import struct
 from pathlib import Path

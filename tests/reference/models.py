@@ -87,13 +87,13 @@ def gravity(flat: np.ndarray, angles: np.ndarray, total: float) -> np.ndarray:
     return points
 
 
-def flexpad(theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, least_radius: float) -> np.ndarray:
+def flexpad(theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, minimum_radius: float) -> np.ndarray:
     """A sheet's point at `place` = (x, y): bends of eight sides add up, height map z + g z²/half, then the pose."""
     flat, height = np.array(place, float), 0.0
     for k in range(8):
         angle = np.deg2rad(45.0 * (k // 2))
         side = np.array([np.cos(angle), np.sin(angle)]) * (1 if k % 2 == 0 else -1)
-        q, kappa = max(side @ place, 0.0), min(max(theta[k], -2.0), 2.0) / (2 * least_radius)
+        q, kappa = max(side @ place, 0.0), min(max(theta[k], -2.0), 2.0) / (2 * minimum_radius)
         if kappa != 0:
             flat += (np.sin(kappa * q) / kappa - q) * side
             height += (1 - np.cos(kappa * q)) / kappa
@@ -103,12 +103,12 @@ def flexpad(theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float,
 
 
 def flexpad_normal(
-    theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, least_radius: float
+    theta: np.ndarray, place: np.ndarray, T_rp: np.ndarray, half: float, minimum_radius: float
 ) -> np.ndarray:
     """Unit normal towards the sensor, from numerical tangents."""
     step = 1e-6 * np.eye(2)
     ahead, behind = (
-        [flexpad(theta, place + sign * along, T_rp, half, least_radius) for along in step] for sign in (1, -1)
+        [flexpad(theta, place + sign * along, T_rp, half, minimum_radius) for along in step] for sign in (1, -1)
     )
     normal = np.cross(ahead[1] - behind[1], ahead[0] - behind[0])
     return normal / np.linalg.norm(normal)

@@ -67,8 +67,8 @@ def _choices(key: Key, places: dict[str, str]) -> Iterator[str]:
     packages = (key.table.package, *key.table.others)
     # Parts of other distributions are not on the page, whatever is installed where it is written.
     modules = {name: f"{at}.{name}" for at in packages for name in plugins.available(at) if find_spec(f"{at}.{name}")}
-    usual = key.default["type"] if isinstance(key.default, dict) else None
-    names = sorted(modules, key=lambda name: (name != usual, name))
+    default = key.default["type"] if isinstance(key.default, dict) else None
+    names = sorted(modules, key=lambda name: (name != default, name))
     yield f"`type` is required in this table and decides on its other keys: {', '.join(f'`{name}`' for name in names)}."
     for name in names:
         yield f'### `[{key.path}]` `type = "{name}"`'

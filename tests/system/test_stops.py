@@ -82,7 +82,7 @@ def test_a_starved_tracker_is_not_restarted(run):
             os.sched_setaffinity(thread, {first})
             os.sched_setscheduler(thread, os.SCHED_IDLE, os.sched_param(0))
         time.sleep(4 * STALL_S)
-        told = [health.message for health in listener.health("run")]
+        messages = [health.message for health in listener.health("run")]
     finally:
         for one in busy:
             one.kill()
@@ -91,4 +91,4 @@ def test_a_starved_tracker_is_not_restarted(run):
     wait_until(listener.tracks_since(now_ns), 60, "TRACKING again")
     assert children(process.pid)["track"] == tracker
     assert set(restarts(listener).values()) == {0}
-    assert any("waits for a processor" in message or "no estimate" in message for message in told)
+    assert any("waits for a processor" in message or "no estimate" in message for message in messages)

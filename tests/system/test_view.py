@@ -102,8 +102,8 @@ def test_the_page_shows_a_mesh_that_moves_acts_and_connects_again(run, rig_file,
     _says(page, "New mesh, version")
     version = _chosen_by_a_click(page, listener)
     column, row = re.findall(r"\d+", page.inner_text("body").partition("pixel = ")[2])[:2]
-    told = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
-    assert f'type = "seed"\npixel = [{column}, {row}]\n' in told.stdout
+    done = abs_service("reinitialize", rig_file, "sheet", "--seed", column, row)
+    assert f'type = "seed"\npixel = [{column}, {row}]\n' in done.stdout
     wait_until(lambda: listener.states()[-1][1].mesh_version > version, 20, "a new mesh from the command line")
 
     assert not page.get_by_text("lost its connection").first.is_visible()

@@ -1,1 +1,1 @@
-"""Who may connect to the bus, and what they may do then: mutual TLS, roles, and the log of both."""
+"""Authentication and access control of the bus: mutual TLS, roles, and the log of both."""

@@ -12,7 +12,7 @@ _log = logging.getLogger(__name__)
 
 
 def declare(session: zenoh.Session) -> Any:
-    """Logs the links of a router from now on, until what it returns is undeclared."""
+    """Logs the links of a router until the returned handle is undeclared."""
     return session.info.declare_link_events_listener(_on_event)
 
 

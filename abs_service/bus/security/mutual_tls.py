@@ -1,4 +1,4 @@
-"""Mutual TLS of the bus: whether its files can be used, told before zenoh, which only says that nothing answers."""
+"""Mutual TLS of the bus. Its files are checked before zenoh opens, which only reports that nothing answers."""
 
 import json
 import socket
@@ -21,8 +21,8 @@ class TlsError(Exception):
 
     Args:
         key: of `[bus.tls]`.
-        value: what it is.
-        problem: what is wrong with it.
+        value: its value.
+        problem: the error.
     """
 
     def __init__(self, key: str, value: str, problem: str) -> None:
@@ -50,7 +50,7 @@ class NoSecurity:
         """Nothing can be wrong."""
 
     def refusal(self, endpoint: str) -> str:
-        """Why a router refuses this process, "" if it is not known."""
+        """Reason for which a router refuses this process; "" if unknown."""
         return ""
 
 
@@ -59,7 +59,7 @@ NO_SECURITY = NoSecurity()
 
 @dataclass(frozen=True, slots=True)
 class MutualTls:
-    """Everybody proves who they are, and the router admits only what their names allow (`roles`).
+    """Every process authenticates by a certificate; the router grants the rights of its common name (`roles`).
 
     Attributes:
         authority: certificate of the authority that signed all the others; PEM, like the others.
@@ -134,7 +134,7 @@ class MutualTls:
         context = ssl.SSLContext(protocol)
         for key in ("authority", "certificate"):
             try:
-                # That of our own is only tried, by a context that nobody uses.
+                # That of our own is only tried, by a context of its own.
                 (context if key == "authority" else ssl.SSLContext(protocol)).load_verify_locations(getattr(self, key))
             except ssl.SSLError:
                 raise self._error(key, "holds no certificate in PEM format") from None
@@ -155,7 +155,7 @@ def _host(endpoint: str) -> str:
 
 
 def _handshake(client: ssl.SSLContext, server: ssl.SSLContext, host: str | None) -> Certificate:
-    """What a server learns from the certificate of a client, without a network."""
+    """Performs a TLS handshake in memory; returns the client's certificate as the server sees it."""
     to_client, to_server = ssl.MemoryBIO(), ssl.MemoryBIO()
     one = client.wrap_bio(to_client, to_server, server_hostname=host)
     other = server.wrap_bio(to_server, to_client, server_side=True)

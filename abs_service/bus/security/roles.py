@@ -1,6 +1,6 @@
-"""Who may publish and ask what: rules for zenoh's access control, by the common name of a client's certificate.
+"""Rules of zenoh's access control: topics that a client may publish and query, by its certificate's common name.
 
-The router enforces them (https://zenoh.io/docs/manual/access-control). What no rule allows is denied.
+The router enforces them (https://zenoh.io/docs/manual/access-control). Everything else is denied.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Verdict on what has changed since a calibration, in words."""
+"""Verdict on the changes since a calibration, in words."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -67,7 +67,7 @@ def of_contradictions(found: Sequence[Contradiction]) -> list[Verdict]:
 
 
 def _level(explanation: Explanation, motion: Level, reaches: Mapping[str, Reach]) -> Level:
-    """Level of a change by what it does to images, or to distances in the middle of the boards."""
+    """Level of a change by its effect on images, or on distances in the middle of the boards."""
     kind = explanation.hypothesis.kind
     if kind == Kind.UNCHANGED:
         return Level.GOOD
@@ -85,7 +85,7 @@ def _names(explanation: Explanation) -> str:
 
 
 def _said(explanation: Explanation) -> str:
-    """What happened to the sensor, as a clause without its name."""
+    """The change of the sensor, as a clause without its name."""
     kind, values = explanation.hypothesis.kind, explanation.values
     if kind in TERMS:
         pairs = zip(TERMS[kind], values.tolist(), explanation.sigmas.tolist(), strict=True)

@@ -33,7 +33,7 @@ def uncertainty_map(field: UncertaintyMap, label: str) -> "Figure":
     return figure
 
 
-def halves(agreement: Agreement) -> "Figure":
+def cross_validation(agreement: Agreement) -> "Figure":
     """Difference between the projections of the two halves, as arrows over the image."""
     figure = plots.figure(7.5, 5.4)
     axes = figure.add_subplot()

@@ -111,7 +111,11 @@ def _cross_validation(found: Assessment) -> Section:
                 known,
             ),
             *(
-                drawing(solve_figures.halves(each), f"Halves, {each.of}", f"Differences of the halves of {each.of}")
+                drawing(
+                    solve_figures.cross_validation(each),
+                    f"Halves, {each.of}",
+                    f"Differences of the halves of {each.of}",
+                )
                 for each in found.agreements
             ),
         ),

@@ -23,13 +23,13 @@ from calib.calibration_check.stored import Stored, Views, usable
 from calib.solve.bundle.parameters.state import SensorState
 
 #: Maximum number of shots, each of another pose of the board.
-MOST_SHOTS = 40
+MAX_SHOTS = 40
 
 #: Maximum number of distances per view; errors of neighbours are correlated, so more add little.
-MOST_DISTANCES = 300
+MAX_DISTANCES = 300
 
 #: Expected reprojection error if the calibration does not contain its own [px].
-USUAL_PX = 0.5
+BASELINE_PX = 0.5
 
 #: Ratios to the expected reprojection error that are doubtful and bad.
 DOUBTFUL_RATIO, BAD_RATIO = 1.5, 3.0
@@ -122,14 +122,14 @@ def _found(known: RigCalibration, seen: BoardObservations) -> Verification:
     covariance = known.covariance
     stored = Stored(sensors, covariance.names, covariance.matrix if covariance.names else None)
     views = _thinned(usable(stored, _ours(seen, sensors)))
-    seeing = dict.fromkeys(view.sensor for view in views.corners)
-    biases = {name: distance_bias(stored, views, name) for name in seeing}
+    observers = dict.fromkeys(view.sensor for view in views.corners)
+    biases = {name: distance_bias(stored, views, name) for name in observers}
     changes = tuple(pair_changes(stored, views))
-    usual = {name: known.sensors[name].residuals.corners_px for name in seeing}
+    baseline = {name: known.sensors[name].residuals.corners_px for name in observers}
     return Verification(
-        {name: corner_fit(stored, views, name) for name in seeing},
-        {name: sensors[name].camera.fx for name in seeing},
-        {name: USUAL_PX if px is None else px for name, px in usual.items()},
+        {name: corner_fit(stored, views, name) for name in observers},
+        {name: sensors[name].camera.fx for name in observers},
+        {name: BASELINE_PX if px is None else px for name, px in baseline.items()},
         {name: bias for name, bias in biases.items() if bias is not None},
         changes,
         _compared(stored, views, changes),
@@ -170,22 +170,22 @@ def _thinned(views: Views) -> Views:
     seen = Counter(view.shot for view in views.corners)
     best = {poses[shot]: shot for shot in sorted(seen, key=lambda shot: seen[shot])}
     shots = sorted(best.values())
-    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MOST_SHOTS, len(shots))).round().astype(int)}
+    kept = {shots[index] for index in np.linspace(0, len(shots) - 1, min(MAX_SHOTS, len(shots))).round().astype(int)}
     fewer = views.of(views.shots, kept)
     return Views(fewer.corners, [_sparse(view) for view in fewer.planes])
 
 
 def _sparse(view: PlaneView) -> PlaneView:
-    every = max(1, len(view.pixels) // MOST_DISTANCES)
+    every = max(1, len(view.pixels) // MAX_DISTANCES)
     parts = {part: getattr(view, part)[::every] for part in ("pixels", "distances", "sigmas")}
     return replace(view, **parts)
 
 
-def _of_fit(name: str, fit: CornerFit, usual: float) -> Verdict:
-    said = f"corners miss by {fit.rms:.2f} px; {usual:.2f} px are usual for it."
-    if fit.rms <= DOUBTFUL_RATIO * usual or fit.rms < UNNOTICED_PX:
+def _of_fit(name: str, fit: CornerFit, baseline: float) -> Verdict:
+    said = f"corners miss by {fit.rms:.2f} px; {baseline:.2f} px are usual for it."
+    if fit.rms <= DOUBTFUL_RATIO * baseline or fit.rms < UNNOTICED_PX:
         return Verdict(Level.GOOD, f"still projects as it was calibrated: {said}", about=name)
-    level = Level.BAD if fit.rms > BAD_RATIO * usual else Level.DOUBTFUL
+    level = Level.BAD if fit.rms > BAD_RATIO * baseline else Level.DOUBTFUL
     advice = "Was it refocused, zoomed or set to another mode? If so, calibrate its intrinsics again."
     return Verdict(level, f"no longer projects as it was calibrated: {said}", advice, name)
 
@@ -231,13 +231,13 @@ def _is_explained(change: PairChange, found: Verification) -> bool:
 
 def _of_scatter(found: Verification, worst_fit: Level) -> list[Verdict]:
     """Verdict on images that fit alone and, from shot to shot, not together; at most one."""
-    seeing = [name for name in found.fits if any(name in {one.first, one.second} for one in found.changes)]
+    observers = [name for name in found.fits if any(name in {one.first, one.second} for one in found.changes)]
     scatter_m = np.sqrt(2) * found.comparison.corners_m
-    shift_px = max((found.focal_px[name] for name in seeing), default=0.0) * scatter_m / found.comparison.distance_m
-    if len(seeing) < 2 or worst_fit > Level.GOOD or shift_px < SCATTERS_PX:
+    shift_px = max((found.focal_px[name] for name in observers), default=0.0) * scatter_m / found.comparison.distance_m
+    if len(observers) < 2 or worst_fit > Level.GOOD or shift_px < SCATTERS_PX:
         return []
     text = (
-        f"{', '.join(seeing)}: each fits its own corners, but they see the board {scatter_m * 1e3:.1f} mm apart "
+        f"{', '.join(observers)}: each fits its own corners, but they see the board {scatter_m * 1e3:.1f} mm apart "
         f"({shift_px:.1f} px), elsewhere in each shot: the images of a shot were not taken at the same moment."
     )
     level = Level.BAD if shift_px > SPOILS_PX else Level.DOUBTFUL

@@ -1,4 +1,4 @@
-"""Saved detections: what sensors saw of a board, so that it can be solved again without images."""
+"""Saved detections of a board, from which a calibration is solved again without images."""
 
 import zipfile
 from collections.abc import Mapping, Sequence

@@ -27,7 +27,7 @@ _LENGTHS = ("square", "marker", "spacing", "diameter", "tag", "gap")
 
 
 class TargetFileError(ValueError):
-    """Invalid board description; the message names file, key, value and what is allowed."""
+    """Invalid board description; the message names file, key, value and the allowed values."""
 
 
 def read(path: Path) -> Target:

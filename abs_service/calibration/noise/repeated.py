@@ -76,7 +76,7 @@ def _summary(one: recorded.Sequence) -> _Summary:
 
 
 def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Mean over the frames (height, width) of what is measured, NaN without any."""
+    """Mean over the frames (height, width) of the measurements, NaN without any."""
     known = np.isfinite(values)
     count = known.sum(axis=0)
     return np.where(count, np.where(known, values, 0).sum(axis=0) / np.maximum(count, 1), np.nan)

@@ -96,7 +96,7 @@ def _boards(found: NoiseCalibration) -> tuple[Section, ...]:
 
 
 def _missing(found: NoiseCalibration) -> tuple[Section, ...]:
-    """Missing returns of every target, and what the law says."""
+    """Missing returns of every target, measured and by the law."""
     if not found.missing.targets:
         return ()
     columns = (
@@ -154,7 +154,7 @@ def _over(found: NoiseCalibration) -> Picture:
 
 def _maps(found: NoiseCalibration) -> list[str | Picture]:
     if found.kind is Kind.MEAN:
-        return ["Without a flat target, what a pixel errs by for ever cannot be told from what it looks at."]
+        return ["Without a flat target, constant errors of a pixel cannot be separated from the scene."]
     shown: list[str | Picture] = []
     pattern, deviation = found.pattern
     size = f"deviation {_pattern_deviation(found) * 1e3:.2g} mm, known to {np.nanmedian(deviation) * 1e3:.2g} mm."

@@ -18,7 +18,7 @@ class Collector:
         sizes: width and height of the images of every sensor that has any [px], by sensor name.
 
     Attributes:
-        seen: what the kept shots show.
+        seen: observations of the kept shots.
         kept: number of shots.
         latest: rejection of the last shot by sensor; "" for a sensor whose view was kept.
     """

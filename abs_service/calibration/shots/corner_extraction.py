@@ -103,10 +103,10 @@ def _plane(view: CornerView, look: SensorShot) -> list[PlaneView]:
 def _hidden_plane(
     target: Target, sensor: str, shot: Shot, corners: list[CornerView], cameras: Mapping[str, Camera]
 ) -> list[PlaneView]:
-    seeing = [view for view in corners if view.sensor in cameras]
-    if sensor not in cameras or not seeing:
+    candidates = [view for view in corners if view.sensor in cameras]
+    if sensor not in cameras or not candidates:
         return []
-    best = max(seeing, key=lambda view: len(view.points_b))
+    best = max(candidates, key=lambda view: len(view.points_b))
     T_rb = plane.board_pose(best, cameras[best.sensor])
     if T_rb is None:
         return []

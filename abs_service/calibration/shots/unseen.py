@@ -1,4 +1,4 @@
-"""What images without a board show, in one sentence: how many there were, and why none of them could be used."""
+"""One sentence on images of which none shows the board: their number, and the reasons by frequency."""
 
 from collections import Counter
 from dataclasses import replace
@@ -26,11 +26,11 @@ STILLS = "If these are single photographs, give them times of their own: abs-ser
 
 
 def reason(target: Target, seen: BoardObservations, last: Shot) -> str:
-    """Why no image shows the board.
+    """Reasons for which the board was found in no image, as a sentence.
 
     Args:
         target: the board.
-        seen: what was seen, without any corners.
+        seen: observations without any corners.
         last: one of the shots, in which boards of similar sizes are looked for.
     """
     count = len(seen.rejected)

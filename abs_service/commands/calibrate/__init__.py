@@ -6,7 +6,7 @@ COMMANDS = {
     "capture": "show a board to the sensors: what they have seen, and what is missing",
     "intrinsics": "cameras one by one, from images of a board",
     "rig": "a whole rig in one solve: cameras, poses, distances",
-    "noise": "how a depth sensor errs, from recordings of things at rest",
+    "noise": "noise model of a depth sensor, from recordings of static scenes",
     "convert": "calibrations from and to the formats of other programs",
     "verify": "whether a stored calibration still holds, and which sensor has moved if not",
 }

@@ -23,7 +23,7 @@ from calib.files import limited, nested
 
 
 class StoredCalibrationError(Exception):
-    """A file that lacks what is needed of a calibration."""
+    """A file that lacks a part of a calibration."""
 
 
 def load(path: Path) -> RigCalibration:

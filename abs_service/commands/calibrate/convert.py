@@ -181,7 +181,7 @@ def _chosen(contents: list[Content], options: Options) -> Content:
 
 
 def _write(out: Path, target: str, cameras: Mapping[str, Camera], arguments: argparse.Namespace) -> tuple[str, ...]:
-    """Writes the file; returns what was lost."""
+    """Writes the file; returns descriptions of what the format cannot hold."""
     if target == exchange.OWN:
         origin = provenance.trace(_command_line(arguments), arguments.inputs)
         sensors = {name: rig_file.SensorCalibration(camera) for name, camera in cameras.items()}

@@ -24,7 +24,7 @@ def write(path: Path, rig: str, recording: ForeignRecording, rig_toml: bytes) ->
     Args:
         path: file to write; one that exists is replaced.
         rig: name of the rig.
-        recording: what it holds.
+        recording: its content.
         rig_toml: configuration to attach, empty for none.
 
     Returns:

@@ -83,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Imports; what is wrong with the images or options is raised as an error of this package or of `drivers`."""
+    """Imports; errors of the images or options are raised as errors of this package or of `drivers`."""
     rig_toml = _rig(arguments.rig)
     foreign_recording = _foreign_recording(arguments)
     if arguments.out.exists():

@@ -1,4 +1,4 @@
-"""Writes the rig file for what you have: asks what is attached and what the object is.
+"""Writes a rig file: asks for the attached camera and the kind of object.
 
   abs-service new rig.toml                       asks
   abs-service new rig.toml --device kinect1 --object sheet --no-color --behind plane       asks nothing
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Asks for what the options do not say, and writes the file."""
+    """Asks for missing options, and writes the file."""
     file: Path = arguments.file
     if file.exists() and not arguments.force:
         raise NewFileError(f"{file}: exists already; choose another name, or replace it with --force")
@@ -67,10 +67,10 @@ Ask = Callable[[str, str, Mapping[str, str]], str]
 
 
 def answered(arguments: argparse.Namespace, name: str, found: list[Found], ask: Ask) -> Answers:
-    """What is known of the rig, from the options and the answers.
+    """Description of the rig, from the options and the answers.
 
     Args:
-        arguments: the options; None for what is to be asked.
+        arguments: the options; an option that is None becomes a question.
         name: of the rig.
         found: attached cameras, which are named first.
         ask: asks a question.

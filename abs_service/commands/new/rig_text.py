@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Answers:
-    """What is known of a rig.
+    """Description of a rig, from which its file is written.
 
     Attributes:
         name: of the rig.
@@ -30,7 +30,7 @@ class Answers:
 
 @dataclass(frozen=True)
 class Device:
-    """A kind of device: what it is, its address without a serial number, and what is said of its sensors.
+    """A kind of device: description, address without a serial number, and tables of its sensors.
 
     Attributes:
         text: for people.
@@ -52,8 +52,8 @@ class Device:
 
 
 _STEREO = """\
-# A starting point, that of a PrimeSense camera: random error and step, both in inverse distance [1/m]. Yours is told by
-# `abs-service calibrate noise`.
+# A starting point, that of a PrimeSense camera: random error and step, both in inverse distance [1/m]. Measure yours
+# with `abs-service calibrate noise`.
 noise = { type = "structured_light", noise = 1.425e-3, step = 2.85e-3 }
 """
 
@@ -83,7 +83,7 @@ DEVICES: Mapping[str, Device] = {
         "OAK with a time-of-flight camera",
         "oak://?mode=tof",
         "tof",
-        "# A starting point: 1 cm. Yours is told by `abs-service calibrate noise`.\n"
+        "# A starting point: 1 cm. Measure yours with `abs-service calibrate noise`.\n"
         'noise = { type = "constant", sigma = 0.01 }\n',
     ),
 }
@@ -175,7 +175,7 @@ name = "{answers.name}" # on the wire: keys are abs/{answers.name}/…
 [devices.camera]
 uri = {uri}
 {controls}
-# The depth camera. `noise` says how it errs; the tracker weighs every measurement with it.
+# The depth camera. `noise` is its noise model, which weighs every measurement.
 [sensors.{device.head}]
 device = "camera"
 {device.noise}{color}
@@ -199,7 +199,7 @@ def write(answers: Answers, file: str) -> str:
     """The rig file, TOML with comments.
 
     Args:
-        answers: what is known of the rig.
+        answers: description of the rig.
         file: how the file will be called, for its comments.
     """
     device = DEVICES[answers.device]

@@ -20,7 +20,7 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
         rig: its sensors.
         plan: as its rig file has it.
         tracker: its name.
-        pixel: of the object in the depth image of its reference; None: what the rig file says.
+        pixel: of the object in the depth image of its reference; None: the rig file's region.
 
     Raises:
         RefusedError: the pixel is outside the image, or the region's mask is gone.
@@ -43,7 +43,7 @@ def reinitialize(tracking: TrackingSession, rig: Rig, plan: Plan, tracker: str, 
 def at_pixel(region: RegionSettings, pixel: Pixel) -> RegionSettings:
     """The region of a rig file, with a pixel of the object.
 
-    What the rig file says of surfaces is kept: the plane that the object lies on, steps, edges of colours, a mask.
+    The rig file's settings of surfaces are kept: the plane that the object lies on, steps, edges of colours, a mask.
 
     Args:
         region: of the rig file.

@@ -1,4 +1,4 @@
-"""Checks of a rig against what its devices, or a recording in their place, deliver."""
+"""Checks of a rig against the streams of its devices or of a recording."""
 
 import time
 from collections.abc import Mapping
@@ -71,7 +71,7 @@ def check_controls(rig: config.ServiceConfig, name: str) -> None:
 
 
 def check_noises(noises: Mapping[str, Noise], streams: Mapping[str, list[StreamInfo]]) -> None:
-    """Refuses noise models of what a device is known not to deliver.
+    """Refuses noise models of measurements that a device is known not to deliver.
 
     Raises:
         CheckError: one of them.

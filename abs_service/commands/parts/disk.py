@@ -10,20 +10,20 @@ from abs_service.recording.recording_file import ESTIMATES
 
 
 def recordings(rig: config.ServiceConfig) -> Retention:
-    """What is kept of the recordings."""
+    """Limits of age and size of the recordings."""
     table = rig.record
     return Retention(table.directory, rig.name, "", table.retain_s or math.inf, table.retain_bytes or math.inf)
 
 
 def estimates(rig: config.ServiceConfig) -> Retention:
-    """What is kept of the files that have the estimates alone."""
+    """Limits of age and size of the files that hold estimates only."""
     table = rig.record
     limits = table.retain_estimates_s or math.inf, table.retain_estimates_bytes or math.inf
     return Retention(table.directory, rig.name, ESTIMATES, *limits)
 
 
 def lasts(rig: config.ServiceConfig, rate: float) -> str:
-    """How long the disk lasts at a rate of recording [bytes/s], without estimates, see `forecast.text`."""
+    """Time until the disk is full at a recording rate [bytes/s], without estimates, in words; see `forecast.text`."""
     directory = rig.record.directory
     folder = next(path for path in (directory, *directory.parents) if path.is_dir())
     room = shutil.disk_usage(folder).free - rig.record.minimum_free_bytes

@@ -1,4 +1,4 @@
-"""What libraries write to standard output past Python, as lines of the log."""
+"""Redirects the output of native libraries, which bypasses `sys.stdout`, into the log."""
 
 import logging
 import os
@@ -43,10 +43,10 @@ def logged() -> Iterator[None]:
 
 
 def _read(reads: int) -> None:
-    told = Repetitions(time.monotonic)
+    repetitions = Repetitions(time.monotonic)
     with os.fdopen(reads, encoding="utf-8", errors="replace") as stream:
         for line in stream:
-            if text := told.line(plain(line)):
+            if text := repetitions.line(plain(line)):
                 _log.warning("%s", text)
 
 

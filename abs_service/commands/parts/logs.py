@@ -1,4 +1,4 @@
-"""The log of every command: its options, where it goes, and what the processes of `run` inherit."""
+"""The log of every command: its options, its destination, and the part that the processes of `run` inherit."""
 
 import argparse
 import logging
@@ -41,12 +41,12 @@ def options(arguments: argparse.Namespace) -> list[str]:
 
 
 def on_stderr(arguments: argparse.Namespace) -> bool:
-    """True if what is written to standard error should be JSON."""
+    """True if the log on standard error should be JSON."""
     return arguments.log_format == "json" and not arguments.log_file
 
 
 def set_up(arguments: argparse.Namespace, command: str, given: Sequence[str]) -> None:
-    """Opens the log of this process, and notes in it what was started.
+    """Opens the log of this process, and logs its command line.
 
     Args:
         arguments: with the options of the log.

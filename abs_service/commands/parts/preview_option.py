@@ -1,4 +1,4 @@
-"""The option --picture: one picture per tracker of what it would track."""
+"""The option --picture: one preview picture per tracker."""
 
 import argparse
 import sys
@@ -43,16 +43,16 @@ def check(path: Path) -> None:
 
 
 def draw(settings: config.ServiceConfig, name: str, path: Path, source: Source) -> str:
-    """Draws what one tracker would track; doubts about it, or why it would track nothing, go to standard error.
+    """Draws the preview of one tracker; warnings, or the reason why it finds no object, go to standard error.
 
     Args:
         settings: the configuration.
         name: of the tracker.
         path: that was asked for.
-        source: what the tracker would get.
+        source: observations for the tracker.
 
     Returns:
-        A line that says what was written.
+        A line about the written file.
 
     Raises:
         PictureOptionError: there is no depth image, or the file cannot be written.

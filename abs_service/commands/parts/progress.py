@@ -1,4 +1,4 @@
-"""Progress bars on standard error, which count what is done of how much."""
+"""Progress bars on standard error."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

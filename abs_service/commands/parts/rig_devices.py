@@ -15,7 +15,7 @@ class HeadError(Exception):
 
 
 class SettingError(Exception):
-    """A configuration that sets a control which its device does not have, or to what it does not take."""
+    """A configuration that sets a control which its device lacks, or to a value out of its range."""
 
 
 def check_addresses(rig: config.ServiceConfig, source: str) -> None:
@@ -38,7 +38,7 @@ def set_controls(device: Device, controls: Mapping[str, Value], where: str) -> N
         where: file and table that they stand in, for messages.
 
     Raises:
-        SettingError: an unknown control or a value that it does not take; names file, key, value and what is allowed.
+        SettingError: an unknown control or an invalid value; names file, key, value and the allowed values.
         DeviceError: the device does not answer.
     """
     for name, value in controls.items():

@@ -21,7 +21,7 @@ from abs_service.wire.checked_bus import CheckedBus
 
 
 class SecurityError(Exception):
-    """A file of `[bus.tls]` that cannot be used; the message names the rig file, key, value and what is wrong."""
+    """A file of `[bus.tls]` that cannot be used; the message names the rig file, key, value and error."""
 
 
 def add_config(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""Publishes what the devices of a rig deliver, until SIGTERM or Ctrl-C or until all of them are at their end.
+"""Publishes the images of a rig's devices, until SIGTERM or Ctrl-C or until all devices have ended.
 
   abs-service capture rig.toml                                 for the rig that `abs-service run` hosts elsewhere
   abs-service capture rig.toml --listen tcp/0.0.0.0:7447       alone; the others connect to this process

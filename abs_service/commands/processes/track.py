@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         rigs: SimpleQueue[Rig] = SimpleQueue()
         preparing = threading.Thread(target=_prepare, args=(rigs, plan, health), daemon=True)
         preparing.start()
-        cameras = _cameras(bus, settings.trackers[name].sensors, health, stop)
+        cameras = await_cameras(bus, settings.trackers[name].sensors, health, stop)
         if stop.is_set():
             return Exit.OK
         rigs.put(rig := wiring.rig(settings, name, cameras))
@@ -125,7 +125,7 @@ def _live(
     )
 
 
-def _cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading.Event) -> dict[str, Camera]:
+def await_cameras(bus: Bus, sensors: tuple[str, ...], health: Health, stop: threading.Event) -> dict[str, Camera]:
     """Queries until every sensor's camera is known, or until stopped."""
     cameras: dict[str, Camera] = {}
     while not stop.is_set():

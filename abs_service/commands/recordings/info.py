@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Prints what each file holds; one that cannot be read does not keep the others from it."""
+    """Prints a summary of each file, also after one that cannot be read."""
     exit_code = Exit.OK
     for path in arguments.files:
         try:

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Recovers each file independently and prints what was recovered and what was lost."""
+    """Recovers each file independently and prints numbers of recovered and lost messages."""
     exit_code = Exit.OK
     for path in arguments.files:
         try:

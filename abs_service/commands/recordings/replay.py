@@ -109,7 +109,7 @@ def configuration(recording: Recording, path: Path | None) -> config.ServiceConf
 
 
 def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording) -> tuple[Rig, Synchroniser]:
-    """The rig of one tracker with the cameras of the recording, and what makes frame sets for it.
+    """The rig of one tracker with the cameras of the recording, and its synchroniser of frame sets.
 
     Raises:
         ReplayOptionError: the recording lacks images that the tracker needs.
@@ -130,7 +130,7 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
 
 
 def draw_previews(settings: config.ServiceConfig, recording: Recording, path: Path) -> list[str]:
-    """Draws what each tracker will track; returns a line about each picture."""
+    """Draws a preview of each tracker; returns a line about each picture."""
     lines: list[str] = []
     for name in settings.trackers:
         rig, synchroniser = recorded_rig(settings, name, recording)

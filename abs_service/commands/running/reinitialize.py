@@ -1,4 +1,4 @@
-"""Makes a running tracker detect its object again, with a new mesh of what its region shows now.
+"""Makes a running tracker detect its object again, with a new mesh from its region's current image.
 
   abs-service reinitialize                  the tracker of the demo rig that `abs-service run` shows elsewhere
   abs-service reinitialize rig.toml sheet   one tracker of that rig

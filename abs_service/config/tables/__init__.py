@@ -1,1 +1,1 @@
-"""The tables of a configuration and of a calibration file, and what their values may be."""
+"""The tables of a configuration and of a calibration file, and the allowed values."""

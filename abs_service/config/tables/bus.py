@@ -12,7 +12,7 @@ from abs_service.config.tables.values import Endpoint, RelativePath
 
 
 class TlsTable(Table):
-    """`[bus.tls]`: encryption, and who may publish and ask what; the endpoint begins with `tls/` then.
+    """`[bus.tls]`: encryption and access rights; the endpoint begins with `tls/` then.
 
     Attributes:
         authority: certificate of the authority that signed those of all hosts, like the others in PEM format.
@@ -30,7 +30,7 @@ class BusTable(Table):
     """`[bus]`: transport between the processes of a rig.
 
     Attributes:
-        endpoint: zenoh endpoint that `run` listens on and everybody else connects to.
+        endpoint: zenoh endpoint that `run` listens on and all others connect to.
         shared_memory: images travel through shared memory between processes of one host.
         routers: zenoh endpoints of other routers, such as one for a whole lab, that the router of this rig connects
             to whenever they are there; who is connected to them reads this rig as well.
@@ -52,7 +52,7 @@ class BusTable(Table):
         return self
 
     def security(self, *names: str) -> NoSecurity | MutualTls:
-        """Who may connect, for a process whose certificate has one of these names."""
+        """Authentication of a process whose certificate has one of these common names."""
         if self.tls is None:
             return NO_SECURITY
         return MutualTls(self.tls.authority, self.tls.certificate, self.tls.key, names)

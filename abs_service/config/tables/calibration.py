@@ -51,7 +51,7 @@ class CovarianceTable(Table):
 
 
 class ResidualsTable(Table):
-    """`residuals`: root mean squares of what the calibration does not explain, and from how many views.
+    """`residuals`: root mean squares of the residuals, and their number of views.
 
     Attributes:
         corners_px: of corners [px].
@@ -72,7 +72,7 @@ class SensorEvidence(Table):
     Attributes:
         factory: the device's own calibration, which the file's takes the place of.
         sigma: standard deviation of every determined parameter; names as in `calib.solve.bundle.parameters.layout`.
-        residuals: what is left.
+        residuals: root mean squares.
     """
 
     factory: CameraTable | None = None
@@ -94,7 +94,7 @@ class CalibratedSensor(SensorEvidence):
 
 
 class CalibrationFile(Table):
-    """A calibration file: what was found out about the sensors of a rig, and where that comes from."""
+    """A calibration file: calibrations of the sensors of a rig, and their provenance."""
 
     version: Literal[1]
     name: Name

@@ -121,7 +121,7 @@ class TrackerTable(Table):
 
 
 class RecordTable(Table):
-    """`[record]`: what is kept on disk.
+    """`[record]`: recordings on disk.
 
     Attributes:
         enabled: `abs-service run` writes recordings.
@@ -175,7 +175,7 @@ class RecordTable(Table):
 
 
 class RunTable(Table):
-    """`[run]`: limits and timeouts of the supervisor, and what it tells others.
+    """`[run]`: limits and timeouts of the supervisor, and its notifications.
 
     Attributes:
         max_restarts: number of restarts within `restart_window_s` that a process may need; with more, it is given up.

@@ -1,4 +1,4 @@
-"""Single values of a configuration: what each may be, in words a person can act on."""
+"""Types of single values of a configuration, with messages that name the allowed values."""
 
 import re
 from collections.abc import Callable

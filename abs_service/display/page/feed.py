@@ -1,4 +1,4 @@
-"""The newest messages of a rig, and numbers of the last minute. Images are received only while somebody looks."""
+"""Newest messages of a rig, and figures of the last minute. Images are received only while a browser is connected."""
 
 import threading
 from collections import deque
@@ -43,7 +43,7 @@ class Numbers:
 
 
 class Feed:
-    """Collects what a rig publishes. Its methods may be called from one thread; messages arrive in another.
+    """Collects the messages of a rig. Its methods may be called from one thread; messages arrive in another.
 
     Args:
         bus: of the rig.

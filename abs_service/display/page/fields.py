@@ -21,7 +21,7 @@ LARGEST_RESIDUAL_M = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshView:
-    """One estimate's mesh and what colours need to know of it.
+    """One estimate's mesh and the data that its colours show.
 
     Attributes:
         vertices, first: deformed and undeformed positions (n, 3) [m] in rig coordinates.
@@ -120,7 +120,7 @@ class ColorScale:
     """Colours of values; the end of the scale follows them and falls slowly, so that colours do not flicker.
 
     Args:
-        field: what is shown.
+        field: the quantity to show.
     """
 
     def __init__(self, field: Field) -> None:

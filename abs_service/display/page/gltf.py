@@ -39,7 +39,7 @@ class Buffer:
         return len(self._accessors) - 1
 
     def file(self, document: dict[str, Any]) -> bytes:
-        """The file with what it says of nodes, meshes and animations."""
+        """The file with its tables of nodes, meshes and animations."""
         described = {
             "asset": {"version": "2.0"},
             "scene": 0,

@@ -1,4 +1,4 @@
-"""The page: reads the feed and updates scene and panel, a few times a second each, while somebody looks."""
+"""The page: reads the feed and updates scene and panel, a few times a second each, while a browser is connected."""
 
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -23,7 +23,7 @@ from abs_service.tracking.tracker_log import points
 from calib.camera import Camera
 from drivers.contract.frame import Frame, Kind
 
-#: Periods of the page: mesh, points and images, words and plots [s]; with nobody looking [s].
+#: Periods of the page: mesh, points and images, words and plots [s]; without a browser [s].
 MESH_S, IMAGES_S, WORDS_S, IDLE_S = 1 / 30, 0.25, 1.0, 0.5
 
 #: A click means the first point that is so near to its ray, in distances between neighbouring points.
@@ -101,7 +101,7 @@ class Page:
         self._scene.show_first(view, self._panel.shows[0])
 
     def _mesh_view(self, mesh: DeformedMesh, with_image: bool) -> MeshView | None:
-        """What is shown of a mesh; None as long as its faces are unknown."""
+        """View of a mesh to draw; None as long as its faces are unknown."""
         topology = self._feed.topology(mesh)
         if topology is None:
             return None

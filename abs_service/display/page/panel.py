@@ -85,7 +85,7 @@ class Panel:
 
     @property
     def shows(self) -> tuple[bool, bool, bool]:
-        """Whether first pose, points and cameras are to be shown."""
+        """Check boxes for first pose, points and cameras: True to draw them."""
         return self._first.value, self._points.value, self._cameras.value
 
     def offer(self, trackers: Sequence[str]) -> None:
@@ -124,7 +124,7 @@ class Panel:
         _set(self._table, f"<table style='font-size:.85em;margin:4px 12px'>{cells}</table>")
 
     def answer(self, text: str) -> None:
-        """Says what came of an action."""
+        """Shows the result of an action."""
         self._answer.content, self._answer.visible = text, bool(text)
 
     def show_image(self, name: str, label: str, picture: Picture) -> None:

@@ -1,4 +1,4 @@
-"""What the page asks of a tracker: to detect its object anew, where its rig file says or where the user clicked."""
+"""Requests of the page to a tracker: detect the object again, in the rig file's region or where the user clicked."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class _Asked:
 
 
 class Reinitialization:
-    """Asks for one detection at a time, and says in words what comes of it.
+    """Requests one detection at a time, and words its result.
 
     Args:
         feed: of the rig.
@@ -54,7 +54,7 @@ class Reinitialization:
             self._asked = _Asked(tracker, self._feed.now_s, version, answer.region)
 
     def look(self) -> None:
-        """Says what came of the last request, once that is known."""
+        """Returns the result of the last request in words, once it is known."""
         asked = self._asked
         if asked is None:
             return

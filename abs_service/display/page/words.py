@@ -1,4 +1,4 @@
-"""What a rig's state means, in plain words: status, reason, age, and what to do about it."""
+"""The state of a rig in plain words: status, reason, age, and the remedy."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ STALE_COLOR = "#6b7280"
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """A line about a tracker or a rig: title, reasons and what to do, and its colour."""
+    """A line about a tracker or a rig: title, reasons and remedy, and its colour."""
 
     title: str
     text: str

@@ -1,1 +1,1 @@
-"""Pictures in files: what a tracker would track, and the fit of a bending stiffness."""
+"""Pictures in files: the preview of a tracker, and the fit of a bending stiffness."""

@@ -39,10 +39,10 @@ CLASS_WORDS: Mapping[RimClass, str] = {
 }
 
 #: Depth images are enlarged by a whole factor to at least this width [px].
-LEAST_WIDTH = 900
+MIN_WIDTH = 900
 
 #: Height of the line of text, width of the legend, and least height beside it [px].
-LINE, LEGEND, LEAST_HEIGHT = 40, 390, 480
+LINE, LEGEND, MIN_HEIGHT = 40, 390, 480
 
 #: Pixels per inch, the unit of sizes of text.
 DPI = 100
@@ -65,7 +65,7 @@ def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
     """Draws a preview; the file's suffix says the format.
 
     Args:
-        preview: what is drawn.
+        preview: to draw.
         tracker, model: name of the tracker, type of its deformation model.
         path: file to write.
 
@@ -74,7 +74,7 @@ def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
         OSError: the file cannot be written.
     """
     height, width = preview.distance.shape
-    enlarged = -(-LEAST_WIDTH // width)
+    enlarged = -(-MIN_WIDTH // width)
     page = _Page(enlarged * width, enlarged * height)
     axes = page.image_axes(width, height)
     _draw_depth(page, axes, preview)
@@ -89,7 +89,7 @@ def draw(preview: Preview, tracker: str, model: str, path: Path) -> None:
 
 
 def title(preview: Preview, tracker: str, model: str) -> str:
-    """One line: what would be tracked, how large and how far away it is."""
+    """One line on the detected object: name, size and distance."""
     frame = f"frame {preview.number}"
     found = preview.found
     if found is None:
@@ -117,7 +117,7 @@ class _Page:
 
     def __init__(self, width: int, height: int) -> None:
         self._image = width, height
-        self._width, self._height = width + LEGEND, max(height, LEAST_HEIGHT) + LINE
+        self._width, self._height = width + LEGEND, max(height, MIN_HEIGHT) + LINE
         self.figure = plots.figure(self._width / DPI, self._height / DPI)
         self.figure.set_layout_engine("none")
         self.figure.set_facecolor(PAGE)

@@ -1,4 +1,4 @@
-"""A strip from its side: what was measured, what was tracked, and what the beam model predicts."""
+"""A strip from its side: measured points, tracked shape, and the beam model's prediction."""
 
 from pathlib import Path
 

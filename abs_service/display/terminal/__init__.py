@@ -1,1 +1,1 @@
-"""The terminal: a live table, plain lines, JSON, the journal, and what a device or a recording is."""
+"""The terminal: a live table, plain lines, JSON, the journal, and descriptions of devices and recordings."""

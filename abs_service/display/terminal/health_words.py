@@ -6,7 +6,7 @@ from abs_service.supervision.rig_view import size
 
 
 def words(component: str, health: Health) -> str:
-    """What a component does, for people; "" if its health says nothing of it."""
+    """Activity of a component as text; "" if its health holds none."""
     kind = component.partition("/")[0]
     parts = {"capture": _capture, "track": _track, "record": _record}.get(kind, _run)(health)
     return ", ".join(part for part in parts if part)

@@ -1,4 +1,4 @@
-"""A display for a service of systemd: what changes, as entries of the journal with fields to search by.
+"""A display for a service of systemd: changes of state, as entries of the journal with fields to search by.
 
   journalctl ABS_RIG=lab ABS_COMPONENT=track/sheet -p warning
 

@@ -1,4 +1,4 @@
-"""What a recording holds, as tables for people and as values for scripts."""
+"""Summary of a recording, as tables for people and as values for scripts."""
 
 import math
 from collections.abc import Sequence

@@ -16,7 +16,8 @@ from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
 
 REFRESH_HZ = 6
 
-_STATUS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
+#: Colour of each status of an estimate.
+STATUS_COLORS = {"TRACKING": "green", "DEGRADED": "yellow", "LOST": "red", "INITIALIZING": "cyan"}
 _STATE = {State.RUNNING: "green", State.FAILED: "red", State.STALLED: "red", State.BACKOFF: "yellow"}
 
 
@@ -41,7 +42,7 @@ class TableDisplay:
         self._region.stop()
 
     def update(self, view: RigView) -> None:
-        """See `Display`; the region draws by itself what it was given last."""
+        """See `Display`; the region redraws its last content by itself."""
         self._region.update(draw(view, self._spinner))
 
     def estimate(self, report: EstimateReport) -> None:
@@ -121,7 +122,7 @@ def _numbers(tracker: TrackerLog) -> list[RenderableType]:
     if last is None:
         return [Text("–", style="dim")] * 7
     return [
-        Text(last.status, style=_STATUS.get(last.status, "")),
+        Text(last.status, style=STATUS_COLORS.get(last.status, "")),
         "–" if last.error_mm is None else f"{last.error_mm:.2f} mm",
         "–" if last.surface_mm is None else f"{last.surface_mm:.2f} mm",
         f"{last.solve_ms:.1f} ms",

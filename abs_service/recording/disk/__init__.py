@@ -1,1 +1,1 @@
-"""The disk under the recordings: its room, how long it lasts, what is deleted first."""
+"""The disk of the recordings: free space, forecast, retention."""

@@ -1,4 +1,4 @@
-"""Looks after the disk: deletes old recordings and says how long there is room."""
+"""Monitors the disk: deletes old recordings and forecasts the time until it is full."""
 
 import shutil
 from collections.abc import Callable
@@ -52,7 +52,7 @@ class DiskWatch:
         """Does both every ten seconds.
 
         Args:
-            written: what has been written so far, to all recordings and to all files of estimates [bytes].
+            written: bytes so far, to all recordings and to all files of estimates.
         """
         now_ns = self._clock.monotonic()
         rates = [meter.add(now_ns, total) for meter, total in zip(self._meters, written, strict=True)]

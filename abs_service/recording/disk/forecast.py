@@ -1,4 +1,4 @@
-"""How long the disk lasts."""
+"""Forecast of the time until the disk is full."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class Growth:
 
     @property
     def more(self) -> float:
-        """How much larger they get before as much is deleted as is written [bytes]; negative if they get smaller."""
+        """Growth until as much is deleted as is written [bytes]; negative if the files shrink."""
         return min(self.retain_bytes, self.retain_s * self.rate) - self.used
 
     @property

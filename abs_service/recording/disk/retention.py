@@ -22,7 +22,7 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class Retention:
-    """What is kept in a folder of recordings.
+    """Limits of age and size of the recordings in a folder.
 
     Only files with the names that a recorder of this rig gives them count, and those beside which there is a file
     `*.keep` do not: they are never deleted. An unfinished file is never deleted either, but its size counts.
@@ -30,7 +30,7 @@ class Retention:
     Attributes:
         directory: the folder.
         name: name of the rig, with which its recordings begin.
-        kind: what their names have after the time: "", or that of the files of estimates.
+        kind: suffix of their names after the time: "", or that of the files of estimates.
         retain_s: age at which a recording is deleted [s]; infinite to keep all.
         retain_bytes: size of all recordings together beyond which the oldest are deleted; infinite to keep all.
     """
@@ -60,11 +60,11 @@ class Retention:
         return sorted(found, key=lambda file: (file.mtime_ns, file.path))
 
     def growth(self, rate: float) -> Growth:
-        """How they grow when so much is recorded [bytes/s]."""
+        """Growth of the recordings at a recording rate [bytes/s]."""
         return Growth(rate, sum(file.size for file in self.files()), self.retain_s, self.retain_bytes)
 
     def apply(self, wall_ns: int) -> list[Path]:
-        """Deletes what is not to be kept, and returns it.
+        """Deletes the files beyond the limits, and returns them.
 
         Args:
             wall_ns: the present [ns since the epoch].

@@ -1,1 +1,1 @@
-"""When recordings begin and end."""
+"""Begin and end of recordings."""

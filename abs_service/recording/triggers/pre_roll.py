@@ -40,11 +40,11 @@ class PreRoll:
         self._held: deque[tuple[int, Sample]] = deque()
         self._size = 0
         self._lock = threading.Lock()
-        self._dropped = self._reported = 0  # younger than `seconds`, for want of room; when it was told last
+        self._dropped = self._reported = 0  # younger than `seconds`, for want of room; at the last report
 
     @property
     def is_open(self) -> bool:
-        """Whether it is recorded."""
+        """True while messages are recorded."""
         return bool(self._trigger.reason)
 
     def put(self, sample: Sample) -> None:

@@ -1,4 +1,4 @@
-"""When to record: always, or from a trigger on until a time after it."""
+"""Triggers of a recording: always, or from an event on until some time after it."""
 
 import threading
 from collections.abc import Callable
@@ -14,15 +14,15 @@ _DOUBTFUL = (DeformationState.STATUS_DEGRADED, DeformationState.STATUS_LOST)
 
 
 class Trigger(Protocol):
-    """Says whether to record; called from any thread."""
+    """Decides whether to record; called from any thread."""
 
     @property
     def reason(self) -> str:
-        """Why it is recorded, "" if it is not."""
+        """Reason for recording; "" while nothing is recorded."""
         ...
 
     def ask(self, recording: bool) -> str:
-        """Begins, or ends, as somebody asks; returns why that is refused, "" if it is not."""
+        """Begins or ends on a command; returns the reason for a refusal, "" if accepted."""
         ...
 
     def watch(self, sample: Sample) -> None:
@@ -81,7 +81,7 @@ class Asked:
         return ""
 
     def resume(self) -> None:
-        """Goes on with what a recorder that was killed did: until asked to end, or as after an event."""
+        """Resumes the recording of a killed recorder: until a command ends it, or as after an event."""
         with self._lock:
             self._asked = not self._watches_status
             self._event, self._until_ns = "the recorder was interrupted", self._clock() + self._post_roll_ns

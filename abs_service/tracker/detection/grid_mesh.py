@@ -12,13 +12,13 @@ from abs_service.tracker.mesh import Mesh
 from calib import pose
 
 #: Minimum number of vertices; fewer do not determine a deformation.
-LEAST_VERTICES = 25
+MIN_VERTICES = 25
 
 #: Minimum share of a grid point's neighbourhood that shows the object for it to become a vertex.
-LEAST_COVER = 0.75
+MIN_COVER = 0.75
 
 #: Least radius around a grid point: within it are three pixels at least, wherever the point lies [px].
-LEAST_RADIUS_PX = 1.5
+MIN_RADIUS_PX = 1.5
 
 #: Distances around a grid point that deviate by more from their median belong to another surface [m].
 LARGEST_RELIEF_M = 0.03
@@ -30,7 +30,7 @@ LONGEST_SIDE = 3.0
 
 #: A connected component with a smaller share of the vertices is an island and removed: the rim of the region often
 #: shows background, which cannot be bound to a smooth surface.
-LEAST_PART = 0.1
+MIN_PART = 0.1
 
 
 def grid_mesh(detection: InitialDetection) -> Mesh:
@@ -52,16 +52,14 @@ def grid_mesh(detection: InitialDetection) -> Mesh:
     grid = _grid(np.argwhere(valid)[:, ::-1].astype(np.float32), spacing)
     rows, columns = grid.shape[:2]
     pixels = grid.reshape(-1, 2)
-    at_grid, deviation = _local_planes(pixels, distance, max(0.75 * spacing, LEAST_RADIUS_PX))
+    at_grid, deviation = _local_planes(pixels, distance, max(0.75 * spacing, MIN_RADIUS_PX))
     place = np.where(np.isfinite(at_grid), np.arange(rows * columns), -1).reshape(rows, columns)
     positions = pose.transform(camera.T_rs, camera.directions(pixels) * at_grid[:, None])
     faces = _without_islands(_without_jumps(positions, triangles(place)))
     chart = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).reshape(-1, 2).astype(np.float64)
     used = np.unique(faces)
-    if len(used) < LEAST_VERTICES:
-        raise DetectionError(
-            f"the object is too small in the depth image: {len(used)} vertices, {LEAST_VERTICES} needed"
-        )
+    if len(used) < MIN_VERTICES:
+        raise DetectionError(f"the object is too small in the depth image: {len(used)} vertices, {MIN_VERTICES} needed")
     position_of = np.full(rows * columns, -1, np.int32)
     position_of[used] = np.arange(len(used), dtype=np.int32)
     unknown = np.full((len(used), 3), np.nan, np.float32)
@@ -104,7 +102,7 @@ def _local_planes(
         values = np.full(len(around), np.nan)
         values[inside] = distance[around[inside, 1], around[inside, 0]]
         near = np.abs(values - np.nanmedian(values)) < LARGEST_RELIEF_M if np.isfinite(values).any() else inside & False
-        if np.count_nonzero(near) < max(LEAST_COVER * len(around), 3):
+        if np.count_nonzero(near) < max(MIN_COVER * len(around), 3):
             continue
         plane = np.column_stack([np.ones(np.count_nonzero(near)), around[near] - pixel])
         inverse = np.linalg.pinv(plane)
@@ -146,4 +144,4 @@ def _without_islands(faces: NDArray[np.int64]) -> NDArray[np.int64]:
     graph = scipy.sparse.coo_array((np.ones(links.shape[1]), links), shape=(len(used), len(used)))
     count, part = scipy.sparse.csgraph.connected_components(graph, directed=False)
     sizes = np.bincount(part, minlength=count)
-    return faces[sizes[part[corners[:, 0]]] >= LEAST_PART * len(used)]
+    return faces[sizes[part[corners[:, 0]]] >= MIN_PART * len(used)]

@@ -1,4 +1,4 @@
-"""Doubts about a detected object: impossible sizes are refused, a region that looks like the scene is told."""
+"""Plausibility of a detected object: refuses impossible sizes, warns of a region that looks like the scene."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ LARGEST_SCENE_M = 200.0
 EXTENT_PERCENT = (2, 98)
 
 #: Number of points for the extent; more are slower but not more accurate.
-MOST_POINTS = 5000
+MAX_POINTS = 5000
 
 #: A surface that spans the image is the scene if it has more than this share of the measured pixels, and of all.
 SCENE_OF_MEASURED, SCENE_OF_IMAGE = 1 / 2, 1 / 3
@@ -34,7 +34,7 @@ def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor:
 
     Args:
         points: the points; none is in order, because then the region has more to say.
-        what: their name in the message.
+        what: name in the message.
         largest: largest possible diagonal [m].
         sensor: name of the sensor that measured them.
 
@@ -43,7 +43,7 @@ def check_extent(points: NDArray[np.float64], what: str, largest: float, sensor:
     """
     if not len(points):
         return
-    low, high = np.percentile(points[:: len(points) // MOST_POINTS + 1], EXTENT_PERCENT, axis=0)
+    low, high = np.percentile(points[:: len(points) // MAX_POINTS + 1], EXTENT_PERCENT, axis=0)
     extent = float(np.linalg.norm(high - low))
     if not SMALLEST_M <= extent <= largest:
         wide = f"{extent * 1e3:.2g} mm" if extent < 1 else f"{extent:.0f} m"

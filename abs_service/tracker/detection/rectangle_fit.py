@@ -13,7 +13,7 @@ from calib.camera import Camera
 from calib.pose import Pose
 
 #: Maximum number of points for the fits of plane and paraboloid; more are slower but not more accurate.
-MOST_POINTS = 5000
+MAX_POINTS = 5000
 
 
 @dataclass(frozen=True)
@@ -21,17 +21,17 @@ class Limits:
     """Thresholds of the detection.
 
     Attributes:
-        least_pixels: minimum number of pixels; the sides of a smaller sheet cannot be fitted.
+        minimum_pixels: minimum number of pixels; the sides of a smaller sheet cannot be fitted.
         largest_bow_m: largest height of a fitted paraboloid over the object for it to be flat [m].
-        least_gap_m: lower bound of the largest distance of the sheet's pixels from its plane, for small noise [m].
-        least_overlap: minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels
+        minimum_gap_m: lower bound of the largest distance of the sheet's pixels from its plane, for small noise [m].
+        minimum_overlap: minimum intersection over union of object and rectangle. A disc has 0.90, a sheet of 450 pixels
             0.96 and more, a sheet of which a finger occludes 6 % has 0.94.
     """
 
-    least_pixels: int = 200
+    minimum_pixels: int = 200
     largest_bow_m: float = 0.02
-    least_gap_m: float = 0.01
-    least_overlap: float = 0.93
+    minimum_gap_m: float = 0.01
+    minimum_overlap: float = 0.93
 
 
 LIMITS = Limits()
@@ -47,9 +47,9 @@ def find_sheet(detection: InitialDetection, limits: Limits = LIMITS) -> Sheet:
     """
     camera = detection.camera
     seen = np.isfinite(detection.distance)
-    if np.count_nonzero(seen) < limits.least_pixels:
+    if np.count_nonzero(seen) < limits.minimum_pixels:
         raise DetectionError(
-            f"the object has {np.count_nonzero(seen)} pixels, a sheet needs least_pixels = {limits.least_pixels}"
+            f"the object has {np.count_nonzero(seen)} pixels, a sheet needs minimum_pixels = {limits.minimum_pixels}"
         )
     window = _window(seen)
     rows, columns = np.indices(seen.shape)[:, *window]
@@ -60,7 +60,7 @@ def find_sheet(detection: InitialDetection, limits: Limits = LIMITS) -> Sheet:
     corner = np.array([columns[0, 0], rows[0, 0]])
     outline_rays = camera.directions(corner + _outline(pixels)) @ camera.T_rs[:3, :3].T
     sheet = _rectangle(_meet(outline_rays, camera.center, T_rp), T_rp)
-    _check_overlap(pixels, _meet(rays, camera.center, sheet.T_rp), sheet, limits.least_overlap)
+    _check_overlap(pixels, _meet(rays, camera.center, sheet.T_rp), sheet, limits.minimum_overlap)
     return sheet
 
 
@@ -72,7 +72,7 @@ def _window(seen: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 def _plane(points: NDArray[np.float64], camera: Camera) -> Pose:
     """The plane with the least absolute distances from points (k, 3); x to the camera's right, z away from it."""
-    points = points[:: len(points) // MOST_POINTS + 1]
+    points = points[:: len(points) // MAX_POINTS + 1]
     center, normal = np.mean(points, axis=0), camera.T_rs[:3, 2]
     weights = np.ones(len(points))
     for _ in range(20):
@@ -96,7 +96,7 @@ def _pixels_on_plane(points_p: NDArray[np.float64], limits: Limits) -> NDArray[n
     """
     valid = points_p[np.isfinite(points_p[..., 2])]
     _check_flat(valid, limits.largest_bow_m)
-    gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), limits.least_gap_m)
+    gap = max(4 * 1.4826 * float(np.median(np.abs(valid[:, 2]))), limits.minimum_gap_m)
     near = (np.abs(points_p[..., 2]) < gap).astype(np.uint8)  # False for NaN
     labels, statistics = cv2.connectedComponentsWithStats(cv2.medianBlur(near, 3))[1:3]
     return np.asarray(labels == 1 + np.argmax(statistics[1:, cv2.CC_STAT_AREA]))
@@ -108,7 +108,7 @@ def _check_flat(points_p: NDArray[np.float64], largest_bow_m: float) -> None:
     Raises:
         DetectionError: its height over the points exceeds `largest_bow_m`.
     """
-    a, b, z = points_p[:: len(points_p) // MOST_POINTS + 1].T
+    a, b, z = points_p[:: len(points_p) // MAX_POINTS + 1].T
     arch = np.column_stack([a * a, a * b, b * b])
     terms = np.column_stack([arch, np.ones_like(a), a, b])
     coefficients = np.zeros(6)
@@ -167,16 +167,19 @@ def _axes(angle: float) -> NDArray[np.float64]:
     return np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
 
 
-def _check_overlap(pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet, least_overlap: float) -> None:
+def _check_overlap(
+    pixels: NDArray[np.bool_], places: NDArray[np.float64], sheet: Sheet, minimum_overlap: float
+) -> None:
     """Compares the object's pixels (height, width) with those whose points (height, width, 2) are in the rectangle.
 
     Raises:
-        DetectionError: their overlap is below `least_overlap`.
+        DetectionError: their overlap is below `minimum_overlap`.
     """
     rectangle = np.all(np.abs(places) < (sheet.width / 2, sheet.height / 2), axis=-1)
     overlap = np.count_nonzero(pixels & rectangle) / np.count_nonzero(pixels | rectangle)
-    if overlap < least_overlap:
+    if overlap < minimum_overlap:
         raise DetectionError(
             f"the object is no rectangle: it has {overlap:.0%} in common with one of "
-            f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, a sheet least_overlap = {least_overlap:g} at least"
+            f"{sheet.width:.3f} m × {sheet.height:.3f} m around it, "
+            f"a sheet minimum_overlap = {minimum_overlap:g} at least"
         )

@@ -7,7 +7,7 @@ from abs_service.pairing.images import ColorImage, DepthImage
 from abs_service.pairing.observation import Observation
 from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
-from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MOST_POINTS, check_extent
+from abs_service.tracker.detection.plausibility import LARGEST_M, LARGEST_SCENE_M, MAX_POINTS, check_extent
 from abs_service.tracker.detection.regions.base import Region
 from calib.noise.base import DepthNoise, subtract_mean_offset
 from calib.rig import Rig
@@ -37,7 +37,7 @@ def detect_object(
 
 def _median_deviation(noise: DepthNoise, image: DepthImage, inside: NDArray[np.bool_]) -> float:
     """Median standard deviation [m] of the distances at the pixels of a mask (height, width), of some of them."""
-    rows, columns = (places[:: np.count_nonzero(inside) // MOST_POINTS + 1] for places in np.nonzero(inside))
+    rows, columns = (places[:: np.count_nonzero(inside) // MAX_POINTS + 1] for places in np.nonzero(inside))
     distance, amplitude = (values[rows, columns].astype(np.float64) for values in (image.distance, image.amplitude))
     deviation = noise.deviation(distance, amplitude, (rows, columns))
     return float(np.nanmedian(deviation)) if np.isfinite(deviation).any() else 0.0

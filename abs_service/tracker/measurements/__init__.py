@@ -1,4 +1,4 @@
-"""Kinds of measurement, one per file: how an image is decoded, what it says of the vertices, how it is scored.
+"""Kinds of measurement, one per file: decoding of an image, synthesis and likelihood.
 
 A module has `Noise`, the type of its noise models, and `Measurement`, which is made from one of them: a sensor finds
 its kind by the type of its noise model. A module with `Settings` is a `type` of `noise` in rig files as well.

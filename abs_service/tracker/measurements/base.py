@@ -1,4 +1,4 @@
-"""Interface of a kind of measurement, and what several kinds decode alike."""
+"""Interface of a kind of measurement, and decoding that several kinds share."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ class Comparison:
 
     Attributes:
         bounds: costs of the outlier model.
-        misplacement: texture registration noise.
+        registration_noise: of the texture.
         outline_px: standard deviation of the outline in a depth image; 0 for no outline.
     """
 
     bounds: Bounds
-    misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE
+    registration_noise: TextureRegistrationNoise = NO_REGISTRATION_NOISE
     outline_px: float = 0.0
 
 
@@ -74,7 +74,7 @@ class FirstImages:
 
 
 class PictureKind(MeasurementKind, Protocol):
-    """Measurements of what the surface looks like; their noise is an `ImageNoise`."""
+    """Measurements of the surface's appearance; their noise is an `ImageNoise`."""
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """Appearance (n, channels) of the vertices in one sensor, NaN where unknown.

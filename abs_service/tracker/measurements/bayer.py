@@ -36,7 +36,9 @@ class Measurement:
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:
         """The channel of a vertex that the pixel's filter passes."""
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.misplacement)
+        return ChannelTerm(
+            sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.registration_noise
+        )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """Values from the colour sensors, which measure all three channels of a vertex; else the sensor's own.

@@ -31,10 +31,10 @@ class Measurement:
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ColorTerm:
         """Three channels of a vertex."""
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ColorTerm(sensor.name, synthesizer, looks, self.noise, bounds, comparison.misplacement)
+        return ColorTerm(sensor.name, synthesizer, looks, self.noise, bounds, comparison.registration_noise)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """The sensor's own values, because no two cameras agree on a colour; else what others saw."""
+        """The sensor's own values, because no two cameras agree on a colour; else those of other cameras."""
         return known(seen, first.colors)
 
     def colors(self, seen: Values) -> Values:

@@ -32,7 +32,7 @@ class Measurement:
 
     @property
     def frames(self) -> tuple[Kind, ...]:
-        """The distances, and what the noise model needs besides."""
+        """The distances, and the other inputs of the noise model."""
         return (Kind.DEPTH, *_auxiliary(self.noise))
 
     def decoder(self, sensor: Sensor) -> Decoder:

@@ -34,10 +34,12 @@ class Measurement:
     def term(self, sensor: Sensor, mesh: Mesh, synthesizer: Synthesizer, comparison: Comparison) -> ChannelTerm:
         """One channel of a vertex."""
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.misplacement)
+        return ChannelTerm(
+            sensor.name, synthesizer, looks, self.noise, Passive(), bounds, comparison.registration_noise
+        )
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
-        """The sensor's own values; else the luma of what others saw."""
+        """The sensor's own values; else the luma of other cameras' colours."""
         return known(seen, first.colors @ LUMA[:, None])
 
     def colors(self, seen: Values) -> Values:

@@ -20,7 +20,7 @@ from drivers.contract.frame import Kind
 Noise = GaussianIntensity
 
 #: Smallest cosine of incidence from which a reflectivity is estimated.
-LEAST_COSINE = 0.2
+MIN_COSINE = 0.2
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Measurement:
         """The reflectivity of a vertex in this light."""
         light = Active(sensor.camera.center) if self.noise.illumination == "active" else Passive()
         looks, bounds = mesh.appearance_of(sensor.name), comparison.bounds
-        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.misplacement)
+        return ChannelTerm(sensor.name, synthesizer, looks, self.noise, light, bounds, comparison.registration_noise)
 
     def appearance(self, seen: Values, sensor: Sensor, first: FirstImages) -> Values:
         """The sensor's own values, per unit of its own light if it has one."""
@@ -55,4 +55,4 @@ def _brightness(camera: Camera, mesh: Mesh) -> Values:
     surface = Surface(*(np.ascontiguousarray(part.T[None], np.float32) for part in (mesh.vertices, mesh.normals)))
     shade = lambert(surface, camera.center)[0].astype(np.float64)
     cosine = shade * np.sum((mesh.vertices - camera.center) ** 2, axis=1)
-    return np.where(cosine > LEAST_COSINE, shade, np.nan)[:, None]
+    return np.where(cosine > MIN_COSINE, shade, np.nan)[:, None]

@@ -13,7 +13,7 @@ from abs_service.tracker.detection.shapes.sheet_mesh import Sheet, rectangle_of
 from abs_service.tracker.mesh import Mesh
 from abs_service.tracker.models.base import BOARD, ModelError, SparseJacobian, Surface
 from abs_service.tracker.models.parts import bends
-from abs_service.tracker.models.parts.bends import bend, roll, slopes
+from abs_service.tracker.models.parts.bends import bend, bend_jacobian, roll
 from abs_service.tracker.models.parts.rigid_transform import place
 from abs_service.tracker.models.parts.tile_buffer import LANES, TILE, write
 from calib import pose
@@ -44,27 +44,27 @@ class Settings:
         width_m: long side of the sheet [m]; 0 uses the detected length.
         height_m: short side of the sheet [m]; 0 uses the detected length.
         size_tolerance: largest relative difference between a given and the detected side; no effect with a template.
-        least_radius_m: radius [m] of the sheet when a bend is 2, its largest value.
+        minimum_radius_m: radius [m] of the sheet when a bend is 2, its largest value.
         bend_deviation: prior standard deviation of a bend. Opposite bends of neighbouring directions nearly cancel, so
             measurements alone do not determine their common magnitude.
-        least_pixels: least number of pixels of the sheet in the first depth image; no effect with a template.
+        minimum_pixels: minimum number of pixels of the sheet in the first depth image; no effect with a template.
         largest_bow_m: largest height by which the sheet may arch over its plane in the first depth image [m]; no effect
             with a template.
-        least_gap_m: distance from the sheet's plane up to which a pixel belongs to it in the first depth image, or four
-            deviations if that is more [m]; no effect with a template.
-        least_overlap: least share of the pixels of the sheet or of the rectangle around it that both have in common in
-            the first depth image; no effect with a template.
+        minimum_gap_m: distance from the sheet's plane up to which a pixel belongs to it in the first depth image, or
+            four deviations if that is more [m]; no effect with a template.
+        minimum_overlap: minimum share of the pixels of the sheet or of the rectangle around it that both have in
+            common in the first depth image; no effect with a template.
     """
 
     width_m: Annotated[float, Interval(ge=0, le=10)] = 0.0
     height_m: Annotated[float, Interval(ge=0, le=10)] = 0.0
     size_tolerance: Annotated[float, Interval(ge=0.05, lt=1)] = 0.15
-    least_radius_m: Annotated[float, Gt(0)] = 0.1
+    minimum_radius_m: Annotated[float, Gt(0)] = 0.1
     bend_deviation: Annotated[float, Gt(0)] = 1.0
-    least_pixels: Annotated[int, Interval(ge=50)] = Limits.least_pixels
+    minimum_pixels: Annotated[int, Interval(ge=50)] = Limits.minimum_pixels
     largest_bow_m: Annotated[float, Interval(gt=0, le=1)] = Limits.largest_bow_m
-    least_gap_m: Annotated[float, Interval(gt=0, le=0.1)] = Limits.least_gap_m
-    least_overlap: Annotated[float, Interval(ge=0.5, lt=1)] = Limits.least_overlap
+    minimum_gap_m: Annotated[float, Interval(gt=0, le=0.1)] = Limits.minimum_gap_m
+    minimum_overlap: Annotated[float, Interval(ge=0.5, lt=1)] = Limits.minimum_overlap
 
     def __post_init__(self) -> None:
         if (self.width_m == 0) != (self.height_m == 0):
@@ -82,11 +82,11 @@ class Settings:
             DetectionError: the object is not a flat rectangle, or not of the given size.
             ModelError: the sheet is too large for the least radius.
         """
-        limits = Limits(self.least_pixels, self.largest_bow_m, self.least_gap_m, self.least_overlap)
+        limits = Limits(self.minimum_pixels, self.largest_bow_m, self.minimum_gap_m, self.minimum_overlap)
         sheet = find_sheet(detection, limits)
         if self.width_m:
             sheet = sheet.of_size(self.width_m, self.height_m, self.size_tolerance)
-        return FlexPad(sheet, detection.vertices, self.least_radius_m, self.bend_deviation)
+        return FlexPad(sheet, detection.vertices, self.minimum_radius_m, self.bend_deviation)
 
     def of_mesh(self, mesh: Mesh) -> "FlexPad":
         """The model of a flat rectangular mesh, with about as many vertices on a regular grid.
@@ -104,7 +104,7 @@ class Settings:
                 f"the template is {sheet.width:.3f} m × {sheet.height:.3f} m, width_m × height_m is {self.width_m:g} m "
                 f"× {self.height_m:g} m; leave the latter out"
             )
-        return FlexPad(sheet, len(mesh.vertices), self.least_radius_m, self.bend_deviation)
+        return FlexPad(sheet, len(mesh.vertices), self.minimum_radius_m, self.bend_deviation)
 
 
 class FlexPad:
@@ -122,7 +122,7 @@ class FlexPad:
         prior: (9, 15), Gaussian with zero mean for bends and height map.
     """
 
-    def __init__(self, sheet: Sheet, vertices: int, least_radius: float, bend_deviation: float):
+    def __init__(self, sheet: Sheet, vertices: int, minimum_radius: float, bend_deviation: float):
         mesh = sheet.mesh(vertices)
         points = pose.transform(pose.inverse(sheet.T_rp), mesh.vertices)[:, :2]
         self._points = np.ascontiguousarray(points.T)
@@ -130,12 +130,12 @@ class FlexPad:
         self._half = 0.5 * sheet.width
         self._rotation, self._center = sheet.T_rp[:3, :3], sheet.T_rp[:3, 3]
         self._pose = np.ascontiguousarray(sheet.T_rp[:3], np.float64)
-        self._per_bend = 1 / (bends.FULL * least_radius)
-        self._series = bends.fit(float(np.linalg.norm(points, axis=1).max()), least_radius)
+        self._per_bend = 1 / (bends.FULL * minimum_radius)
+        self._series = bends.fit(float(np.linalg.norm(points, axis=1).max()), minimum_radius)
         roll = composed(bends.roll, ORDERS=self._series.coefficients.shape[1])
         self._deform = composed(_deform, roll=roll)
         self.rest = np.zeros(DIMENSION)
-        self.scales = _scales(points, least_radius, self._half)
+        self.scales = _scales(points, minimum_radius, self._half)
         self.roughness = np.zeros((0, DIMENSION))
         self.prior = np.eye(9, DIMENSION) / np.array([bend_deviation] * 8 + [HEIGHT_DEVIATION])[:, None]
         self.mesh = mesh
@@ -158,7 +158,7 @@ class FlexPad:
         turned = self.deform(theta[None]).vertices[0].T - (self._center + theta[TRANSLATION])
         result = np.empty((len(turned), 3, DIMENSION))
         sheet = self._points, np.matmul(turn, self._rotation), self._per_bend, self._half
-        slopes(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
+        bend_jacobian(theta[BENDS], theta[HEIGHT], FULL_HEIGHT, bends.SIDES, *sheet, result)
         result[:, :, ROTATION] = pose.rotated_points_jacobian(theta[ROTATION], turned)
         result[:, :, TRANSLATION] = np.eye(3)
         return result
@@ -168,10 +168,10 @@ class FlexPad:
         return SparseJacobian.from_dense(self.jacobian(theta))
 
 
-def _scales(points: NDArray[np.float64], least_radius: float, half: float) -> NDArray[np.float64]:
+def _scales(points: NDArray[np.float64], minimum_radius: float, half: float) -> NDArray[np.float64]:
     """Change (15,) of each parameter that moves the farthest vertex by about one metre when the sheet is bent by 1."""
     reach = np.max(bends.SIDES @ points.T, axis=1)
-    kappa = 1 / (bends.FULL * least_radius)
+    kappa = 1 / (bends.FULL * minimum_radius)
     rise = (1 - np.cos(kappa * reach)) / kappa
     radius = np.linalg.norm(points, axis=1).max()
     return np.concatenate([1 / rise, [half / rise.max() ** 2], np.full(3, 1 / radius), np.ones(3)])

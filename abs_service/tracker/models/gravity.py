@@ -107,8 +107,8 @@ class Gravity:
     def jacobian(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Jacobian (n, 3, dim) of the vertices with respect to theta, at theta (dim,)."""
         gripper = self._gripper(theta[None])[0]
-        slopes = self._slopes(theta[: self.segments])
-        in_plane = np.stack([slopes.real, slopes.imag], axis=-1) @ gripper[:, [0, 2]].T
+        derivatives = self._column_derivatives(theta[: self.segments])
+        in_plane = np.stack([derivatives.real, derivatives.imag], axis=-1) @ gripper[:, [0, 2]].T
         by_bends = np.tile(in_plane.transpose(1, 2, 0), (len(self._across), 1, 1))
         if len(theta) == self.segments:
             return by_bends
@@ -120,16 +120,16 @@ class Gravity:
         """The dense Jacobian as one group: every parameter moves every vertex."""
         return SparseJacobian.from_dense(self.jacobian(theta))
 
-    def _slopes(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
+    def _column_derivatives(self, bends: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Derivatives (segments, columns) of the columns' coordinates along the gripper's x (real) and z (imaginary).
 
         A bend changes the arc of its own segment and rotates the following ones.
         """
         shares = np.clip(self._along / self._step - np.arange(self.segments)[:, None], 0, 1)
         starts = self._step * np.exp(1j * (np.cumsum(bends) - bends))[:, None] * shares
-        end, slope = arc(bends[:, None] * shares)
+        end, derivative = arc(bends[:, None] * shares)
         passed = np.cumsum(starts * end, axis=0)
-        return starts * shares * slope + 1j * (passed[-1] - passed)
+        return starts * shares * derivative + 1j * (passed[-1] - passed)
 
     def inclination(self, theta: NDArray[np.float64]) -> NDArray[np.float64]:
         """Downward inclination of the strip from the horizontal at the ends of the segments, (segments + 1,) [rad].

@@ -19,7 +19,7 @@ from calib.jit import kernel
 SPANS = 3
 
 #: Least number of cells of the mesh's grid in a span; fewer vertices do not determine its control points.
-LEAST_CELLS = 3.0
+MIN_CELLS = 3.0
 
 ControlPoints = Annotated[int, Interval(ge=3, le=12)]
 
@@ -97,7 +97,7 @@ def derived_shape(mesh: Mesh, degree: int) -> tuple[int, int]:
     """Numbers of control points along the long and the short side of a mesh, for `control_points = "auto"`."""
     lengths, cells = _sides(mesh)
     wanted = np.clip(np.round(SPANS * lengths / lengths.max()), 1, SPANS)
-    spans = np.clip(np.floor(cells / LEAST_CELLS), 1, wanted).astype(int)
+    spans = np.clip(np.floor(cells / MIN_CELLS), 1, wanted).astype(int)
     # Three control points are the least that a side may have.
     return max(int(spans[0]) + degree, 3), max(int(spans[1]) + degree, 3)
 

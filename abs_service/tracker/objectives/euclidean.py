@@ -54,7 +54,7 @@ class Settings:
         """The fitness of a mesh in a rig.
 
         Raises:
-            ModelError: a sensor measures what there is no weight for.
+            ModelError: a sensor measures something without a weight.
         """
         return SquareSum(synthesizer, [self._term(sensor, mesh, synthesizer) for sensor in rig.sensors.values()])
 

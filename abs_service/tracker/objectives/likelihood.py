@@ -30,9 +30,9 @@ class Settings:
             one, at most log 2 from their sum. A sensor's own `outlier_share` goes before it.
         range_m: measuring range of a depth sensor [m]; outliers are uniform over it. A sensor's own `range_m` goes
             before it.
-        misplacement_px: texture registration noise: standard deviation of the position of the appearance on the mesh,
-            in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges, such
-            as those of a checkerboard.
+        texture_registration_px: texture registration noise: standard deviation of the position of the appearance on the
+            mesh, in pixels of the sensor. It widens the noise model around edges of a print. About 0.2 for sharp edges,
+            such as those of a checkerboard.
         outline_px: standard deviation of the outline at the free edges of the object, in pixels of the depth sensor;
             it stops a surface from sliding along itself. "auto" is half a pixel; 0 disables the outline. Edges in
             contact with another surface, cut by a mask or the image's border, and silhouettes of bodies are found in
@@ -41,16 +41,16 @@ class Settings:
 
     outlier_share: Annotated[float, Interval(gt=0, lt=1)] = 0.05
     range_m: Annotated[float, Gt(0)] = 5.0
-    misplacement_px: Annotated[float, Ge(0)] = 0.0
+    texture_registration_px: Annotated[float, Ge(0)] = 0.0
     outline_px: Literal["auto"] | Annotated[float, Interval(ge=0, le=3)] = "auto"
 
     def build(self, rig: Rig, mesh: Mesh, synthesizer: Synthesizer) -> TermSum:
         """The likelihood of a mesh in a rig."""
-        misplacement = TextureRegistrationNoise(self.misplacement_px)
+        registration_noise = TextureRegistrationNoise(self.texture_registration_px)
         outline_px = OUTLINE_PX if self.outline_px == "auto" else self.outline_px
         terms: list[Term] = []
         for sensor in rig.sensors.values():
-            comparison = Comparison(self.bounds(sensor), misplacement, outline_px)
+            comparison = Comparison(self.bounds(sensor), registration_noise, outline_px)
             terms.append(measurement(sensor.noise).term(sensor, mesh, synthesizer, comparison))
         return TermSum(synthesizer, terms)
 

@@ -51,7 +51,7 @@ class Stop(StrEnum):
 
 
 class Budget:
-    """Evaluations and time of one frame, and what was used of them.
+    """Budget of evaluations and time of one frame, and its consumption.
 
     Args:
         limit: maximum number of cost evaluations; a generation that has begun is completed.
@@ -102,7 +102,7 @@ StartSearch = Callable[[Problem, NDArray[np.float64], Budget], Search]
 
 
 class Optimizer(Protocol):
-    """A search for every frame; what it learns in one frame starts the next."""
+    """A search for every frame; its state in one frame starts the next."""
 
     def follow(self, problem: Problem, start: NDArray[np.float64], budget: Budget) -> Search:
         """Warm start: searches near the predicted parameters (dim,)."""

@@ -25,7 +25,7 @@ class Settings(AskAndTellSettings):
 
     def build(self, dimension: int, generator: np.random.Generator) -> AskAndTell:
         """A search in `dimension` dimensions that draws from `generator`."""
-        make = partial(PycmaSampler, dimension, generator, self.least_step)
+        make = partial(PycmaSampler, dimension, generator, self.minimum_step)
         population = self.population or default_population(dimension)
         return AskAndTell(Schedule("cma", self.generations, self.tolerance), make, population, self.step, self.restarts)
 
@@ -36,16 +36,18 @@ class PycmaSampler:
     Args:
         dimension: of Θ.
         generator: source of all randomness.
-        least_step: minimum step size at the start of a frame.
+        minimum_step: minimum step size at the start of a frame.
         population: candidates per generation.
         step: initial standard deviation of the candidates.
     """
 
-    def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
+    def __init__(
+        self, dimension: int, generator: np.random.Generator, minimum_step: float, population: int, step: float
+    ):
         with warnings.catch_warnings():  # pycma warns that it cannot plot
             warnings.simplefilter("ignore")
             from cma import CMAEvolutionStrategy  # noqa: PLC0415  # importing it takes a second
-        self._steps = least_step, step
+        self._steps = minimum_step, step
         options = {
             "randn": lambda *shape: generator.standard_normal(shape),
             "seed": np.nan,

@@ -28,7 +28,7 @@ class Settings(AskAndTellSettings):
 
     def build(self, dimension: int, generator: np.random.Generator) -> AskAndTell:
         """A search in `dimension` dimensions that draws from `generator`."""
-        make = partial(CmaEsSampler, dimension, generator, self.least_step)
+        make = partial(CmaEsSampler, dimension, generator, self.minimum_step)
         population = self.population or default_population(dimension)
         schedule = Schedule("cma_es", self.generations, self.tolerance)
         return AskAndTell(schedule, make, population, self.step, self.restarts)
@@ -53,14 +53,16 @@ class CmaEsSampler:
     Args:
         dimension: of Θ.
         generator: source of all randomness; its bits come 64 at a time, as those of NumPy's default do.
-        least_step: minimum step size at the start of a frame.
+        minimum_step: minimum step size at the start of a frame.
         population: candidates per generation.
         step: initial standard deviation of the candidates.
     """
 
-    def __init__(self, dimension: int, generator: np.random.Generator, least_step: float, population: int, step: float):
+    def __init__(
+        self, dimension: int, generator: np.random.Generator, minimum_step: float, population: int, step: float
+    ):
         self._bits = generator.bit_generator
-        self._steps = least_step, step
+        self._steps = minimum_step, step
         self._constants = Constants(dimension, population)
         self._sigma = step
         self._generation = 0

@@ -22,7 +22,7 @@ from abs_service.tracker.optimizers.search.levenberg_marquardt import descend
 from abs_service.tracker.posterior.curvature import search_metric
 
 #: Minimum step size of CMA-ES at the start of a frame, as a share of the initial one.
-LEAST_STEP = 0.5
+MIN_STEP = 0.5
 
 #: Weight of a new frame in the running mean of the outlier share.
 MEMORY = 0.03
@@ -55,7 +55,7 @@ class Settings:
 
     def build(self, dimension: int, generator: np.random.Generator) -> "Hybrid":
         """A search in `dimension` dimensions that draws from `generator`."""
-        make = partial(CmaEsSampler, dimension, generator, LEAST_STEP * self.step)
+        make = partial(CmaEsSampler, dimension, generator, MIN_STEP * self.step)
         return Hybrid(self, make, self.population or default_population(dimension))
 
 

@@ -53,7 +53,7 @@ class AttributeGradients(Protocol):
     """Gradients of the attributes at the vertices in one camera's image."""
 
     def sampler(self, lens: LensModel) -> Callable[..., None]:
-        """Kernel that synthesises what `at_centers` needs, see `sampling`."""
+        """Kernel that synthesises the inputs of `at_centers`, see `sampling`."""
         ...
 
     def steps(self, population: int, vertices: int) -> NDArray[np.float32]:

@@ -51,7 +51,7 @@ class View(Protocol):
         """Synthesises a population of deformed meshes."""
         ...
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients of the attributes at the samples of a population of one (m, channels, 2) [1/px], right and down.
 
         NaN where only the samples' own attributes are known.

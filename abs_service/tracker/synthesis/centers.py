@@ -10,7 +10,7 @@ from calib.jit import kernel, prange
 def at_centers(
     steps: NDArray[np.float32],
     values: NDArray[np.float32],
-    slopes: NDArray[np.float32],
+    gradients: NDArray[np.float32],
     result: NDArray[np.float32],
 ) -> None:
     """Value + gradient · step from the projection of the vertex to the centre of its pixel.
@@ -18,13 +18,13 @@ def at_centers(
     Args:
         steps: to the right and down (2, population, n) [px].
         values: of the vertices (channels, n).
-        slopes: to the right and down (channels, 2, n) [1/px].
+        gradients: to the right and down (channels, 2, n) [1/px].
         result: (population, channels, n).
     """
     for k in prange(result.shape[0]):
         rights, downs = steps[0, k], steps[1, k]
         for channel in range(values.shape[0]):
-            own, right, down = values[channel], slopes[channel, 0], slopes[channel, 1]
+            own, right, down = values[channel], gradients[channel, 0], gradients[channel, 1]
             looks = result[k, channel]
             for v in range(np.uintp(looks.size)):
                 looks[v] = own[v] + right[v] * rights[v] + down[v] * downs[v]

@@ -38,7 +38,7 @@ class Settings:
 
 
 #: Lower bound of the share of the predicted mesh in the image by which its number of pixels is divided.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 
 #: Samples of an empty population.
 _NONE = Samples(
@@ -110,14 +110,14 @@ class DenseView:
     def look(self, predicted: Surface) -> None:
         """Counts the pixels of the predicted mesh; the z-buffer resolves self-occlusion per candidate."""
         samples, share = self._render(predicted)
-        self._expected = float(samples.count[0]) / max(float(share[0]), LEAST_SHARE)
+        self._expected = float(samples.count[0]) / max(float(share[0]), MIN_SHARE)
 
     def synthesize(self, surface: Surface) -> Synthesis:
         """Synthesises a population; samples beyond a candidate's number of covered pixels have pixel −1."""
         samples, _ = self._render(surface)
         return Synthesis(samples.pixel, samples.distance, paint(self._attributes, self._detail, samples))
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: gradients of the image are more accurate than those of the lattice."""
         samples, _ = self._render(surface)
         return np.full((samples.pixel.shape[1], self._attributes.shape[1], 2), np.nan, np.float32)

@@ -11,7 +11,7 @@ from calib.lenses.lens import Lens
 SHORT_EDGE_PX = 0.5
 
 
-def project_with_slopes(
+def project_with_jacobian(
     camera: Camera, points: NDArray[np.floating]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """`Camera.project` and `Camera.projection_jacobian` in one pass, compiled for the common lenses.
@@ -26,11 +26,11 @@ def project_with_slopes(
     """
     if not isinstance(camera.lens, Lens):
         return camera.project(points), camera.projection_jacobian(points)
-    places, slopes = np.empty((len(points), 2)), np.empty((len(points), 2, 3))
+    places, jacobian = np.empty((len(points), 2)), np.empty((len(points), 2, 3))
     matrix = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     points = np.ascontiguousarray(points, np.float64)
-    _project(points, camera.T_sr, matrix, camera.lens.coefficients, places, slopes)
-    return places, slopes
+    _project(points, camera.T_sr, matrix, camera.lens.coefficients, places, jacobian)
+    return places, jacobian
 
 
 def metres_per_pixel(
@@ -44,7 +44,7 @@ def metres_per_pixel(
         edges: (k, 2); the edges around a vertex give the directions of its tangents in the image.
         lengths: components of every edge along the tangents at both its ends (2, k, 2) [m].
     """
-    places, _ = project_with_slopes(camera, vertices)
+    places, _ = project_with_jacobian(camera, vertices)
     result = np.empty((len(places), 2, 2))
     _regress(places, edges, lengths, result)
     return result
@@ -57,7 +57,7 @@ def _project(
     matrix: NDArray[np.float64],
     lens: NDArray[np.float64],
     places: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    jacobian: NDArray[np.float64],
 ) -> None:
     """Eq. 10 and its derivatives, see `Lens.distort` and `Lens.jacobian`; pose (4, 4) = T_sr."""
     fx, fy, cx, cy = matrix
@@ -79,8 +79,8 @@ def _project(
         mixed = (x * y * slope + 2 * p1 * x + 2 * p2 * y) * inverse
         back_u, back_v = -(along_x * x + fx * mixed * y), -(fy * mixed * x + along_y * y)
         for i in range(3):
-            slopes[v, 0, i] = along_x * pose[0, i] + fx * mixed * pose[1, i] + back_u * pose[2, i]
-            slopes[v, 1, i] = fy * mixed * pose[0, i] + along_y * pose[1, i] + back_v * pose[2, i]
+            jacobian[v, 0, i] = along_x * pose[0, i] + fx * mixed * pose[1, i] + back_u * pose[2, i]
+            jacobian[v, 1, i] = fy * mixed * pose[0, i] + along_y * pose[1, i] + back_v * pose[2, i]
 
 
 @kernel

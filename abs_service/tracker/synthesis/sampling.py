@@ -11,7 +11,7 @@ from calib.lenses.forward import distort, lens_parts, undistort_step
 from calib.lenses.lens import LensModel
 
 #: Smallest cosine of incidence at which the distance is extrapolated along the tangent plane to the pixel's centre.
-LEAST_COSINE = 0.2
+MIN_COSINE = 0.2
 
 
 def sampler(lens: LensModel) -> Callable[..., None]:
@@ -58,7 +58,7 @@ def _sample(
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     (fx, fy, cx, cy), own_lens = matrix, coefficients(lens)
     stride = width + 2
-    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-LEAST_COSINE)
+    per_fx, per_fy, flattest = one / fx, one / fy, np.float32(-MIN_COSINE)
     columns, rows, farthest = np.float32(width), np.float32(height), np.float32(limit)
     for k in prange(vertices.shape[0]):
         for v in range(vertices.shape[2]):

@@ -121,7 +121,7 @@ class SparseView:
         self._sample(surface.vertices, surface.normals, self._hidden, *self._optics, pixel, distance, steps)
         return Synthesis(pixel, distance, self._gradients.at_centers(self._attributes, steps))
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """Gradients for the predicted surface, see `look`."""
         return self._gradients.per_pixel(self._attributes)
 
@@ -153,7 +153,7 @@ class SparseView:
         return image
 
     def _front(self, surface: Surface, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float32]:
-        """What `render` returns for a surface at pixels (k,); of an image that nobody needs, no more is rendered."""
+        """Radial distances (k,) [m] of `render` at single pixels; renders only those unless the image is cached."""
         last, image = self._rendered
         return image[rows, columns] if last is surface else self._raster.render_at(surface.vertices[0], rows, columns)
 

@@ -153,7 +153,7 @@ class _SharedView:
         common = self._projection.synthesize(surface)
         return Synthesis(common.pixel, common.distance, self._attributes)
 
-    def slopes(self, surface: Surface) -> NDArray[np.float32]:
+    def attribute_gradients(self, surface: Surface) -> NDArray[np.float32]:
         """NaN: only the vertices' own attributes are known."""
         return np.full((*self._attributes[0].T.shape, 2), np.nan, np.float32)
 

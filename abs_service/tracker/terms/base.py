@@ -37,7 +37,7 @@ class Bounds:
 
 @dataclass(frozen=True, slots=True)
 class RimFit:
-    """Numbers of outer vertices of a mesh by what a depth image shows beside them.
+    """Numbers of rim vertices of a mesh by class, from the depth image beside them.
 
     Attributes:
         visible: on free edges, not behind an occluder, in a hole or behind the mesh's own surface.

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.tracker.synthesis.perspective import project_with_slopes
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from calib.camera import Camera
 from calib.jit import kernel
 
@@ -16,7 +16,7 @@ _BELL = np.exp(-0.5 * (_STEPS**2 + _STEPS[:, None] ** 2))
 _REGRESSION = _BELL / np.sum(_BELL * _STEPS**2)
 
 #: Smallest cosine between line of sight and normal; at grazing views a row would grow without bound.
-LEAST_COSINE = 0.2
+MIN_COSINE = 0.2
 
 
 def depth_rows(
@@ -51,13 +51,13 @@ def color_rows(image: NDArray[np.float32], camera: Camera, vertices: NDArray[np.
         camera: its camera.
         vertices: positions (n, 3) [m].
     """
-    places, projection = project_with_slopes(camera, vertices)
+    places, projection = project_with_jacobian(camera, vertices)
     rows = np.empty((len(places), image.shape[2], 3))
     _color_rows(image, places, _REGRESSION, projection, rows)
     return rows
 
 
-def channel_slopes(
+def channel_gradients(
     values: NDArray[np.float32],
     channels: NDArray[np.float32],
     camera: Camera,
@@ -123,7 +123,7 @@ def _depth_rows(
         v = use[k]
         x, y, z = vertices[v, 0] - center[0], vertices[v, 1] - center[1], vertices[v, 2] - center[2]
         along = normals[v, 0] * x + normals[v, 1] * y + normals[v, 2] * z
-        cosine = min(along / np.sqrt(x * x + y * y + z * z), -LEAST_COSINE)
+        cosine = min(along / np.sqrt(x * x + y * y + z * z), -MIN_COSINE)
         for i in range(3):
             rows[k, i] = -normals[v, i] * weight[v] / cosine
 

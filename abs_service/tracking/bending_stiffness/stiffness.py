@@ -22,19 +22,19 @@ Vector = NDArray[np.float64]
 STRETCHES = 8
 
 #: Minimum number of frames for an estimate of their scatter.
-LEAST_FRAMES = 5 * STRETCHES
+MIN_FRAMES = 5 * STRETCHES
 
 #: Range of loads w L³ / D that can be distinguished from zero load and from a thread.
-LEAST_LOAD, MOST_LOAD = 1e-3, 300.0
+MIN_LOAD, MAX_LOAD = 1e-3, 300.0
 
 #: Lower bound of the standard deviation of the gripper's inclination, even if the model keeps it fixed [rad].
-LEAST_DEVIATION = 1e-3
+MIN_DEVIATION = 1e-3
 
 #: Step of the numerical derivatives [rad], and relative step of the load.
 STEP = 1e-4
 
 #: Termination of the search for the load: largest step of its logarithm, and maximum number of steps.
-CONVERGED, MOST_STEPS = 1e-7, 60
+CONVERGED, MAX_STEPS = 1e-7, 60
 
 
 class StiffnessError(ValueError):
@@ -85,11 +85,11 @@ class Stiffness:
 def inclination_profile(model: Gravity, theta: Vector, covariance: NDArray[np.float64]) -> InclinationProfile:
     """Inclinations and their covariance, propagated from theta (dim,) and its covariance (dim, dim)."""
     offsets = STEP * np.eye(len(theta))
-    slopes = np.stack(
+    jacobian = np.stack(
         [(model.inclination(theta + step) - model.inclination(theta - step)) / (2 * STEP) for step in offsets], axis=1
     )
-    least = LEAST_DEVIATION**2 * np.eye(model.segments + 1)
-    return InclinationProfile(model.inclination(theta), slopes @ covariance @ slopes.T + least)
+    least = MIN_DEVIATION**2 * np.eye(model.segments + 1)
+    return InclinationProfile(model.inclination(theta), jacobian @ covariance @ jacobian.T + least)
 
 
 def estimate_stiffness(
@@ -109,8 +109,8 @@ def estimate_stiffness(
     Raises:
         StiffnessError: too few frames, or the strip does not bend, or hangs like a thread.
     """
-    if len(frames) < LEAST_FRAMES:
-        raise StiffnessError(f"{len(frames)} frames with a tracked strip are too few, at least {LEAST_FRAMES} needed")
+    if len(frames) < MIN_FRAMES:
+        raise StiffnessError(f"{len(frames)} frames with a tracked strip are too few, at least {MIN_FRAMES} needed")
     fit = _fit(frames)
     borders = np.linspace(0, len(frames), STRETCHES + 1).astype(int)
     parts = [_fit(frames[first:last]).log_load for first, last in pairwise(borders)]
@@ -149,7 +149,7 @@ def _fit(frames: Sequence[InclinationProfile]) -> _Fit:
     weights = np.linalg.inv(np.stack([frame.covariance for frame in frames])).astype(np.float64)
     count = inclination.shape[1]
     tip, log_load, information, residual = inclination[:, -1], 0.0, 1.0, inclination
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         load = float(np.exp(log_load))
         residual, by_tip = inclination - _shapes(tip, load, count), _by_tip(tip, load, count)
         by_load = (_shapes(tip, load * (1 + STEP), count) - _shapes(tip, load * (1 - STEP), count)) / (2 * STEP)
@@ -161,9 +161,9 @@ def _fit(frames: Sequence[InclinationProfile]) -> _Fit:
         step = float(np.clip(np.sum(load_rest - tip_load * tip_rest / tip_tip) / information, -0.5, 0.5))
         tip = tip + np.clip((tip_rest - tip_load * step) / tip_tip, -0.3, 0.3)
         log_load += step
-        if not np.log(LEAST_LOAD) < log_load < np.log(MOST_LOAD):
+        if not np.log(MIN_LOAD) < log_load < np.log(MAX_LOAD):
             raise StiffnessError(
-                f"the load w L³/D leaves the range {LEAST_LOAD:g} … {MOST_LOAD:g}: the strip bends too little, or "
+                f"the load w L³/D leaves the range {MIN_LOAD:g} … {MAX_LOAD:g}: the strip bends too little, or "
                 f"hangs like a thread; a longer or shorter piece of it tells more"
             )
         if abs(step) < CONVERGED:

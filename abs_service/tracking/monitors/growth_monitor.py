@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from abs_service.tracker.terms.base import SensorFit
 
 #: Share of the covered edges beyond which the object must continue, and their least number.
-LEAST_SHARE, LEAST_VERTICES = 0.5, 4
+MIN_SHARE, MIN_VERTICES = 0.5, 4
 
 #: The new mesh replaces the old one if its area is larger by this factor.
 LEAST_GROWTH = 1.1
@@ -27,7 +27,7 @@ class GrowthMonitor:
         """True, once, when the object has continued beyond covered edges of the mesh for long enough at `t_ns` [ns]."""
         covered = sum(fit.rim.covered for fit in fits)
         uncovered = sum(fit.rim.uncovered for fit in fits)
-        if uncovered < max(LEAST_VERTICES, LEAST_SHARE * covered):
+        if uncovered < max(MIN_VERTICES, MIN_SHARE * covered):
             self._since_ns = None
             return False
         self._since_ns = t_ns if self._since_ns is None else self._since_ns

@@ -8,7 +8,7 @@ from statistics import median
 PERIODS, SILENCE_NS = 15, 1_000_000_000
 #: Longest time until the first estimate, in which devices open [ns].
 FIRST_NS = 10_000_000_000
-#: A longer time between two calls of `check` was a stop of this process, in which it heard nobody [ns].
+#: A longer time between two calls of `check` was a stop of this process, without messages [ns].
 PAUSE_NS = 3_000_000_000
 
 

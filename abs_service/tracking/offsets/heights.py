@@ -1,4 +1,4 @@
-"""Heights of measured points above a mesh: what a depth image shows at every vertex beyond the estimated surface."""
+"""Heights of measured points above a mesh: residual of a depth image at every vertex, along the normal."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from calib.noise.base import DepthNoise
 INLIER_DEVIATIONS = 3.0
 
 #: Measurements at a smaller cosine between line of sight and normal are ignored: they hardly constrain the height.
-LEAST_COSINE = 0.3
+MIN_COSINE = 0.3
 
 #: Pixels farther away from a vertex are another vertex's, or too many for their use [px].
 LARGEST_RADIUS_PX = 2.5
@@ -70,7 +70,7 @@ class HeightSensor:
         distance = np.sqrt(np.vecdot(sight, sight))
         cosine = np.abs(np.vecdot(sight, normals)) / distance
         pixel, seen = self._pixel(vertices)
-        deviation, mean = self._noise_of(image, distance, pixel, seen & (cosine > LEAST_COSINE))
+        deviation, mean = self._noise_of(image, distance, pixel, seen & (cosine > MIN_COSINE))
         sigma = deviation * cosine
         limit = INLIER_DEVIATIONS * np.sqrt(sigma**2 + variance)
         height, pixels = np.empty_like(sigma), np.empty_like(sigma)

@@ -1,4 +1,4 @@
-"""A field of vertex offsets over a mesh: what single vertices show of it, and how neighbours are expected to agree.
+"""Gaussian random field of vertex offsets over a mesh: evidence of each vertex, and a prior that couples neighbours.
 
 Every vertex has evidence, a mean m and a precision p, of its own offset. The prior holds an offset o at a rest r with a
 precision a, and neighbours' deviations from it together. The most probable offsets minimise
@@ -24,7 +24,7 @@ from calib.jit import kernel
 EXACT_M, SWEEPS = 1e-7, 50
 
 #: Least variance of the difference of two neighbours, as a share of the variance of an offset: the mesh is only just
-#: fine enough for its relief. And the largest, that of independent ones.
+#: fine enough for its offsets. And the largest, that of independent ones.
 ALIKE, INDEPENDENT = 0.25, 2.0
 
 #: Edges of a grid per vertex, and of each vertex inside it: one along, one across, one diagonally.
@@ -91,9 +91,9 @@ class OffsetField:
             prior: see there.
         """
         diagonal, squares = self._diagonal(precision, prior), (prior.coupling * self._share) ** 2
-        heard = squares * self._messages
-        known = diagonal - np.bincount(self._to, heard, len(diagonal))
-        self._messages = 1 / (known[self._from] + heard[self._back])
+        incoming = squares * self._messages
+        known = diagonal - np.bincount(self._to, incoming, len(diagonal))
+        self._messages = 1 / (known[self._from] + incoming[self._back])
         return 1 / (diagonal - np.bincount(self._to, squares * self._messages, len(diagonal)))
 
     def _diagonal(self, precision: NDArray[np.float64], prior: Prior) -> NDArray[np.float64]:
@@ -132,8 +132,8 @@ def _sweep(
             break
 
 
-def relief_prior(offset: NDArray[np.float64], deviation: NDArray[np.float64], mesh: Mesh, parameters: int) -> Prior:
-    """Prior of the object's relief, its size and how far neighbours are alike, from the first frame's offsets.
+def offset_prior(offset: NDArray[np.float64], deviation: NDArray[np.float64], mesh: Mesh, parameters: int) -> Prior:
+    """Prior of the offsets: their variance and that of neighbours' differences, from the first frame.
 
     Both are what the offsets vary beyond their noise. The surface has already taken a part of that, as it was fitted to
     them. A size below what so many vertices tell of noise is not known to be smaller.

@@ -6,9 +6,9 @@ pixels with their noise: by the residual after the search, so that theta explain
 filter per vertex collects this evidence; with a random walk, evidence fades.
 
 The offsets are the most probable ones by the evidence and a prior (`offset_field.py`), which keeps them a surface. The
-object's relief is as large, and neighbours as much alike, as the first frame shows beyond its noise. A relief that
-changes, a random walk that is drawn back in `REST_S` (an Ornstein–Uhlenbeck process), is held at that of the first
-frame, and tilts little between neighbours. Vertices that are seen at a grazing angle or folded learn nothing from
+offsets vary as much, and neighbours differ as much, as the first frame shows beyond its noise. Offsets that
+change, by a random walk that is drawn back in `REST_S` (an Ornstein–Uhlenbeck process), are held at those of the first
+frame, and tilt edges little. Vertices that are seen at a grazing angle or folded learn nothing from
 their pixels, and none moves farther than half an edge from where it was in the first frame.
 """
 
@@ -23,7 +23,7 @@ from abs_service.pairing.images import DepthImage, Image
 from abs_service.tracker.mesh import Mesh, edge_lengths
 from abs_service.tracker.models.base import Surface
 from abs_service.tracking.offsets.heights import HeightSensor
-from abs_service.tracking.offsets.offset_field import OffsetField, change_prior, relief_prior
+from abs_service.tracking.offsets.offset_field import OffsetField, change_prior, offset_prior
 from calib.jit import kernel
 from calib.noise.base import DepthNoise
 from calib.rig import Sensor
@@ -31,17 +31,17 @@ from calib.rig import Sensor
 #: Time after which a changed offset is drawn back to rest by 63 % [s].
 REST_S = 5.0
 
-#: σ of the angle by which a change of relief tilts an edge of the mesh [rad]: two of them lengthen it by 8 %.
+#: σ of the angle by which a change of offsets tilts an edge of the mesh [rad]: two of them lengthen it by 8 %.
 TILT = 0.2
 
 #: An offset changes by no more than this share of the edges around it.
 LARGEST_CHANGE = 0.5
 
 #: A face is folded if the cosine of its angle to the surface is below this; its vertices are not measured.
-LEAST_FACING = 0.3
+MIN_FACING = 0.3
 
 #: The longest time step of the random walk [s], and the least σ of a first offset [m].
-LONGEST_INTERVAL_S, LEAST_DEVIATION_M = 0.5, 1e-5
+LONGEST_INTERVAL_S, MIN_DEVIATION_M = 0.5, 1e-5
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class Settings:
     """TOML keys of `vertex_offsets`.
 
     Attributes:
-        random_walk: standard deviation of the change of an offset in one second [m/√s]; with 0, the offsets are those
-            of a relief that never changes, averaged over all frames. Models without offsets, all but `nurbs`, need 0.
+        random_walk: standard deviation of the change of an offset in one second [m/√s]; with 0, the offsets are
+            constant, averaged over all frames. Models without offsets, all but `nurbs`, need 0.
     """
 
     random_walk: Annotated[float, Ge(0)] = 0.0
@@ -116,7 +116,7 @@ class LearntOffsets:
 
     def __init__(self, model: OffsetModel, sensor: Sensor, noise: DepthNoise, random_walk: float):
         mesh = model.mesh
-        deviation = np.maximum(np.broadcast_to(mesh.deviation, len(mesh.vertices)), LEAST_DEVIATION_M)
+        deviation = np.maximum(np.broadcast_to(mesh.deviation, len(mesh.vertices)), MIN_DEVIATION_M)
         self.variance = deviation**2
         self._model, self._random_walk = model, random_walk
         self._heights = HeightSensor(sensor.camera, noise, mesh)
@@ -124,7 +124,7 @@ class LearntOffsets:
         self._first = self._mean = self._offset = np.array(model.offset, np.float64)
         self._precision = 1 / self.variance
         self._around = edges_around(mesh)
-        self._prior = relief_prior(self._first, deviation, mesh, len(model.rest))
+        self._prior = offset_prior(self._first, deviation, mesh, len(model.rest))
         self._t_ns: int | None = None
 
     def update(self, image: Image | None, surface: Surface, t_ns: int) -> None:
@@ -141,7 +141,7 @@ class LearntOffsets:
         self._infer()
 
     def _begin(self) -> None:
-        """The most probable relief of the first frame, which changes from then on if it has a random walk."""
+        """Infers the offsets of the first frame; with a random walk, they change from then on."""
         self._infer()
         if self._random_walk:
             change = self._random_walk**2 * REST_S / 2  # variance of the process after a long time
@@ -156,7 +156,7 @@ class LearntOffsets:
         self._precision = total
 
     def _infer(self) -> None:
-        """The most probable offsets, within what their vertices' edges allow."""
+        """The most probable offsets, bounded by the lengths of their vertices' edges."""
         offset = self._field.solve(self._mean, self._precision, self._prior, self._offset)
         most = LARGEST_CHANGE * self._around
         self._offset = np.clip(offset, self._first - most, self._first + most)
@@ -189,7 +189,7 @@ def _mark_folded(
         facing = x * (normals[a, 0] + normals[b, 0] + normals[c, 0])
         facing += y * (normals[a, 1] + normals[b, 1] + normals[c, 1])
         facing += z * (normals[a, 2] + normals[b, 2] + normals[c, 2])
-        if facing / 3 < LEAST_FACING * np.sqrt(x * x + y * y + z * z):
+        if facing / 3 < MIN_FACING * np.sqrt(x * x + y * y + z * z):
             result[a] = result[b] = result[c] = True
 
 

@@ -1,4 +1,4 @@
-"""Kernels are compiled by other processes while this one goes on with their plain Python form.
+"""Kernels are compiled by other processes while this one runs their plain Python form.
 
 Which kernels a program needs, and for which types, shows only when it runs, and it cannot run on without their results.
 Python computes these slowly, but at once, so that all kernels are known, and being compiled, within seconds.
@@ -17,7 +17,7 @@ from abs_service.tracking.warmup.pool import Pool
 from calib.jit import Kernel
 
 #: Processes beyond this number gain little: the longest kernel alone takes a tenth of the whole.
-MOST_WORKERS = 8
+MAX_WORKERS = 8
 #: Interval of the reports while the last kernels are waited for [s].
 PERIOD_S = 0.2
 
@@ -48,10 +48,10 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
     is not in a module, is compiled at its next call.
 
     Args:
-        report: told how far it is, in the thread that waits.
+        report: called with the progress, in the waiting thread.
 
     Yields:
-        What compiles; its `total` says how many kernels were missing.
+        The compilation; its `total` is the number of missing kernels.
     """
     taken: list[Kernel] = []
 
@@ -59,7 +59,7 @@ def compiled_ahead(report: Callable[[Progress], None] = ignore) -> Iterator[Pool
         taken.append(kernel)
         return StandIn(kernel, pool)
 
-    workers = min(MOST_WORKERS, len(os.sched_getaffinity(0)))
+    workers = min(MAX_WORKERS, len(os.sched_getaffinity(0)))
     with Pool(workers) as pool:
         Kernel.stand_in = stand_in
         try:

@@ -30,7 +30,7 @@ def warm_up(rig: Rig, plan: Plan, report: Callable[[Progress], None] = ignore) -
     Args:
         rig: the sensors of the tracker; their noise models determine the kinds of images.
         plan: settings of the tracker.
-        report: told how many kernels are compiled.
+        report: called with the number of compiled kernels.
     """
     seen = Rig("warm-up", {name: _sensor(sensor) for name, sensor in rig.sensors.items()})
     with compiled_ahead(report) as pool:

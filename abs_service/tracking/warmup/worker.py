@@ -1,4 +1,4 @@
-"""A process that compiles the kernels that it is told and leaves them in the cache, until its standard input ends."""
+"""A process that compiles the kernels named on its standard input into the cache, until the input ends."""
 
 import gc
 import os

@@ -27,5 +27,5 @@ def changed_fraction(before: Grey, after: Grey, pixels: NDArray[np.float64]) -> 
         return 0.0
     difference -= np.median(difference)
     # At least a fifth of the pixels is unaffected by motion; a fifth of a normal distribution lies within 0.253 σ.
-    usual = float(np.quantile(np.abs(difference), 0.2)) / 0.253
-    return float(np.mean(np.abs(difference) > max(_DEVIATIONS * usual, _LEVELS)))
+    sigma = float(np.quantile(np.abs(difference), 0.2)) / 0.253
+    return float(np.mean(np.abs(difference) > max(_DEVIATIONS * sigma, _LEVELS)))

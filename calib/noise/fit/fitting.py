@@ -20,13 +20,13 @@ RANGE_M = 5.0
 
 #: Lower bound of the fitted deviation, in units of the samples' spread; without it, a sample exactly on the mean makes
 #: the likelihood unbounded.
-_LEAST_SPREAD = 1e-3
+_MIN_SPREAD = 1e-3
 
 #: Pseudo-samples along each axis of the domain, which regularise conditions without real samples.
 _PSEUDO_SAMPLES = 8
 
 #: Smallest singular value of a design matrix with unit columns for which its coefficients are identifiable.
-_LEAST_VARIETY = 1e-6
+_MIN_VARIETY = 1e-6
 
 #: σ of a normal distribution over its median absolute deviation.
 MAD_TO_SIGMA = 1.4826
@@ -92,10 +92,10 @@ def maximize_likelihood(
     q_mean, r_mean = np.linalg.qr(columns.mean)  # orthogonal columns: powers of x and a differ by orders of magnitude
     q_spread, r_spread = np.linalg.qr(columns.spread)
     k = q_mean.shape[1]
-    bound = np.maximum(least / unit, _LEAST_SPREAD)
-    samples = _Samples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
+    bound = np.maximum(least / unit, _MIN_SPREAD)
+    samples = ResidualSamples(residual / unit, Design(q_mean, q_spread), power, unit / span, bound)
     turned = Design(_solved(pseudo_samples.mean, r_mean), _solved(pseudo_samples.spread, r_spread))
-    regularization = _PseudoSamples(center / unit, turned, power)
+    regularization = PseudoSamples(center / unit, turned, power)
 
     def cost(parameters: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         """Negative log-likelihood per sample, and its gradient; ε is parametrised by its logit."""
@@ -115,7 +115,7 @@ def maximize_likelihood(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Samples:
+class ResidualSamples:
     """Log-likelihood of the samples, in units of their spread.
 
     Attributes:
@@ -130,7 +130,7 @@ class _Samples:
     columns: Design
     power: int
     uniform: float
-    least: float | NDArray[np.floating] = _LEAST_SPREAD
+    least: float | NDArray[np.floating] = _MIN_SPREAD
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64], logit: float) -> tuple[float, NDArray[np.floating]]:
         """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε."""
@@ -148,7 +148,7 @@ class _Samples:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _PseudoSamples:
+class PseudoSamples:
     """Expected log-likelihood of one pseudo-sample of mean `center` and spread 1 under each condition."""
 
     center: float
@@ -157,7 +157,7 @@ class _PseudoSamples:
 
     def cost(self, m: NDArray[np.float64], s: NDArray[np.float64]) -> tuple[float, NDArray[np.floating]]:
         """Negative log-likelihood, and its gradient with respect to m, s and the logit of ε, which is zero."""
-        v, inside = _bounded(self.columns.spread @ s, _LEAST_SPREAD**self.power)
+        v, inside = _bounded(self.columns.spread @ s, _MIN_SPREAD**self.power)
         variance = v ** (2 / self.power)
         off = self.columns.mean @ m - self.center
         square = (1 + off**2) / variance
@@ -187,10 +187,10 @@ def polynomials(samples: Samples, sigma_degrees: tuple[int, int], mu_degrees: tu
         part.ravel() for part in np.meshgrid(*(np.linspace(*span, _PSEUDO_SAMPLES) for span in (distances, amplitudes)))
     )
     pseudo_samples = Design(polyvander2d(x, a, mu_degrees), polyvander2d(x, a, sigma_degrees))
-    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples, least=samples.least_sigma)
+    law = maximize_likelihood(samples.residual, columns, pseudo_samples=pseudo_samples, least=samples.minimum_sigma)
     sigma = law.spread.reshape(sigma_degrees[0] + 1, sigma_degrees[1] + 1, 1)
     mu = law.mean.reshape(mu_degrees[0] + 1, mu_degrees[1] + 1, 1)
-    least = least_sigma(np.maximum(columns.spread @ law.spread, samples.least_sigma))
+    least = minimum_sigma(np.maximum(columns.spread @ law.spread, samples.minimum_sigma))
     return Polynomials(sigma, mu, distances, amplitudes, least)
 
 
@@ -201,7 +201,7 @@ def subsampled(samples: Samples) -> Samples:
     return samples.take(np.random.default_rng(0).choice(len(samples), LARGEST, replace=False))
 
 
-def least_sigma(sigma: NDArray[np.floating]) -> float:
+def minimum_sigma(sigma: NDArray[np.floating]) -> float:
     """Lower bound for a fitted deviation where the domain holds no samples [m]."""
     return max(float(np.quantile(sigma, 0.005)), 1e-6)
 
@@ -219,7 +219,7 @@ def _spread_of(residual: NDArray[np.floating]) -> float:
 
 def _check_variety(columns: NDArray[np.floating]) -> None:
     scaled = columns / np.linalg.norm(columns, axis=0)
-    if columns.shape[1] and np.linalg.svd(scaled, compute_uv=False)[-1] < _LEAST_VARIETY:
+    if columns.shape[1] and np.linalg.svd(scaled, compute_uv=False)[-1] < _MIN_VARIETY:
         raise NoiseError(
             f"the samples vary too little to tell {columns.shape[1]} coefficients apart; "
             "measure at more distances and on more materials, or ask for lower powers"
@@ -238,7 +238,7 @@ def _bounded(
     return np.maximum(v, least), v > least
 
 
-def _start(samples: _Samples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
+def _start(samples: ResidualSamples) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Initial parameters by least squares with clipped residuals; constant spread if a linear one would be negative."""
     r, (mean, spread), power = samples.residual, samples.columns, samples.power
     middle = np.median(r) if mean.shape[1] else 0.0
@@ -247,4 +247,4 @@ def _start(samples: _Samples) -> tuple[NDArray[np.floating], NDArray[np.floating
     size = np.maximum(size, 1.5 * samples.least) ** power  # where bounds hold, likelihood has no slope
     linear = spread.T @ size
     constant = spread.T @ np.full(len(r), size.mean())
-    return offset, linear if (spread @ linear).min() > _LEAST_SPREAD**power else constant
+    return offset, linear if (spread @ linear).min() > _MIN_SPREAD**power else constant

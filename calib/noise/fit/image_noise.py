@@ -54,9 +54,7 @@ def from_static_scene(
     """
     pictures = np.asarray(images, np.float64)
     if len(pictures) < 2:
-        raise NoiseError(
-            f"noise is told from at least 2 pictures of a scene in which nothing moves, not {len(pictures)}"
-        )
+        raise NoiseError(f"noise is estimated from at least 2 pictures of a static scene, not {len(pictures)}")
     whole = ((pictures > 0) & (pictures < full_scale)).all(axis=0)
     real = np.broadcast_to(np.where(whole, pictures.mean(axis=0), np.nan), pictures.shape)
     return real + (pictures - real) * np.sqrt(len(pictures) / (len(pictures) - 1)), real

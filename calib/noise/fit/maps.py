@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from calib.files import limited
 from calib.noise.base import NoiseError
 
-#: Lower bound of the deviation in files without `least_sigma` [m].
-LEAST_SIGMA = 1e-4
+#: Lower bound of the deviation in files without `minimum_sigma` [m].
+MIN_SIGMA = 1e-4
 
 
 def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
-    """Arrays of a file with `distances` and `amplitudes` (2,), the calibrated domain, and `least_sigma` () [m].
+    """Arrays of a file with `distances` and `amplitudes` (2,), the calibrated domain, and `minimum_sigma` () [m].
 
     Args:
         file: the .npz.
@@ -25,19 +25,19 @@ def load(file: Path, required: set[str]) -> dict[str, NDArray[np.float64]]:
     found = arrays(file, required | {"distances", "amplitudes"})
     for key in ("distances", "amplitudes"):
         check_domain(file, found, key)
-    found["least_sigma"] = np.array(least_sigma(file, found))
+    found["minimum_sigma"] = np.array(minimum_sigma(file, found))
     return found
 
 
-def least_sigma(file: Path, found: dict[str, NDArray[np.float64]]) -> float:
-    """Lower bound of the deviation in the arrays of a file [m], or the usual one.
+def minimum_sigma(file: Path, found: dict[str, NDArray[np.float64]]) -> float:
+    """Lower bound of the deviation in the arrays of a file [m], or the default one.
 
     Raises:
         NoiseError: it is not a number above 0.
     """
-    least = found.get("least_sigma", np.array(LEAST_SIGMA))
+    least = found.get("minimum_sigma", np.array(MIN_SIGMA))
     if least.shape != () or not least > 0:
-        raise NoiseError(f"least_sigma in {str(file)!r} must be a number above 0, not {least.tolist()}")
+        raise NoiseError(f"minimum_sigma in {str(file)!r} must be a number above 0, not {least.tolist()}")
     return float(least)
 
 

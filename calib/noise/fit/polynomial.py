@@ -53,14 +53,14 @@ class Polynomials:
         sigma: coefficients of the deviation [m], (i, j, places): [i, j] belongs to xⁱ aʲ.
         mu: coefficients of the mean offset [m], likewise.
         distances, amplitudes: calibrated domain.
-        least_sigma: lower bound of the deviation [m].
+        minimum_sigma: lower bound of the deviation [m].
     """
 
     sigma: NDArray[np.floating]
     mu: NDArray[np.floating]
     distances: Span
     amplitudes: Span
-    least_sigma: float
+    minimum_sigma: float
 
     @property
     def use_amplitude(self) -> bool:
@@ -75,7 +75,7 @@ class Polynomials:
         self, x: NDArray[np.float64], a: NDArray[np.float64], place: NDArray[np.integer]
     ) -> NDArray[np.float64]:
         """Standard deviation σ(x, a) [m] at places (n,) or (1,)."""
-        return np.maximum(evaluate(self.sigma, place, x, a, self.distances, self.amplitudes), self.least_sigma)
+        return np.maximum(evaluate(self.sigma, place, x, a, self.distances, self.amplitudes), self.minimum_sigma)
 
 
 def evaluate(

@@ -16,7 +16,7 @@ CUT = 3.0
 _DEVIATIONS_95 = 1.959964
 
 #: Upper bound of the outlier fraction.
-_MOST_OUTLIERS = 0.5
+_MAX_OUTLIERS = 0.5
 
 #: Convergence tolerance of the outlier fraction in expectation–maximisation.
 _SETTLED = 1e-6
@@ -55,7 +55,7 @@ def goodness_of_fit(model: DepthNoise, samples: Samples) -> Quality:
     inlier = np.ones_like(density)
     while abs(share - previous) > _SETTLED:
         inlier = (1 - share) * density / ((1 - share) * density + share / RANGE_M)
-        previous, share = share, min(float(1 - inlier.mean()), _MOST_OUTLIERS)
+        previous, share = share, min(float(1 - inlier.mean()), _MAX_OUTLIERS)
     z = (samples.residual - model.mean(x, a, p)) / model.deviation(x, a, p)
     near, total = z[np.abs(z) < CUT], max(float(inlier.sum()), 1e-9)
     return Quality(

@@ -48,7 +48,7 @@ class Samples:
         return self.measured - self.true
 
     @property
-    def least_sigma(self) -> NDArray[np.float64]:
+    def minimum_sigma(self) -> NDArray[np.float64]:
         """Deviation (n,) [m] that quantisation alone makes; a bit less, as residuals of few steps are not uniform."""
         return 0.9 * self.step / np.sqrt(12)
 

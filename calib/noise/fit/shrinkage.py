@@ -28,7 +28,7 @@ _EQUAL_M = 1e-6
 _FEW = 4
 
 #: Lower bound of a factor on the deviation: a place that repeats itself is stuck or filtered, not ten times better.
-LEAST_FACTOR = 0.1
+MIN_FACTOR = 0.1
 
 
 class Repeats(NamedTuple):
@@ -102,13 +102,13 @@ def refine(
     near, far = parent.distances
     middle, half = (near + far) / 2, (far - near) / 2
     basis = basis_of(samples.true, parent.distances, degree)
-    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.least_sigma)
+    offsets, factors = shrink(residual, deviation, basis, place, len(parent_of), least=samples.minimum_sigma)
     mu = np.zeros((max(parent.mu.shape[0], degree + 1), parent.mu.shape[1], len(parent_of)))
     mu[: parent.mu.shape[0]] = parent.mu[..., parent_of]
     for power in range(degree + 1):
         raw = polypow([-middle / half, 1 / half], power)  # ((x − middle) / half)ᵖᵒʷᵉʳ as a polynomial in x
         mu[: power + 1, 0] += np.outer(raw, offsets[:, power])
-    least = parent.least_sigma * float(factors.min())
+    least = parent.minimum_sigma * float(factors.min())
     return Polynomials(parent.sigma[..., parent_of] * factors, mu, parent.distances, parent.amplitudes, least)
 
 
@@ -144,7 +144,7 @@ def shrink(
     """
     of = place.astype(np.int64)
     mean_square = np.bincount(of, np.square(least / deviation), places) / np.bincount(of, minlength=places).clip(1)
-    floor = np.maximum(np.sqrt(mean_square), LEAST_FACTOR)
+    floor = np.maximum(np.sqrt(mean_square), MIN_FACTOR)
     groups = _Groups(residual, deviation, basis, of, places, repeats, floor)
     offsets = np.zeros((groups.number, groups.basis.shape[1]))
     offsets[:, 0] = groups.medians(groups.residual)
@@ -177,15 +177,15 @@ def _offsets(
     k = groups.basis.shape[1]
     precision = weight / (factors[groups.of] * groups.deviation) ** 2
     information = np.empty((groups.number, k, k))
-    told = np.empty((groups.number, k))
+    moments = np.empty((groups.number, k))
     for i in range(k):
-        told[:, i] = groups.sum(precision * groups.basis[:, i] * groups.residual)
+        moments[:, i] = groups.sum(precision * groups.basis[:, i] * groups.residual)
         for j in range(i + 1):
             information[:, i, j] = information[:, j, i] = groups.sum(
                 precision * groups.basis[:, i] * groups.basis[:, j]
             )
     covariance = np.linalg.inv(information + np.linalg.inv(prior))
-    offsets = np.einsum("gij,gj->gi", covariance, told)
+    offsets = np.einsum("gij,gj->gi", covariance, moments)
     known = groups.sum(weight) > 0
     following = (np.einsum("gi,gj->ij", offsets[known], offsets[known]) + covariance[known].sum(axis=0)) / known.sum()
     return offsets, following + np.eye(k) * _EQUAL_M**2, np.einsum("gij,gji->g", information, covariance)
@@ -208,14 +208,14 @@ def _common_variance(squares: NDArray[np.float64], freedom: NDArray[np.float64])
 
     By the moments of the logarithm of a scaled F distribution.
     """
-    told = (freedom >= _FEW) & (squares > 0)
-    if not told.any():
+    usable = (freedom >= _FEW) & (squares > 0)
+    if not usable.any():
         return max(float(squares.sum() / max(freedom.sum(), 1.0)), 1e-6), 1.0
-    half = freedom[told] / 2
-    logarithm = np.log(squares[told] / freedom[told]) - scipy.special.digamma(half) + np.log(half)
+    half = freedom[usable] / 2
+    logarithm = np.log(squares[usable] / freedom[usable]) - scipy.special.digamma(half) + np.log(half)
     excess = float(np.var(logarithm) - scipy.special.polygamma(1, half).mean())
     if excess <= 1e-6:  # no more scatter than sampling alone explains
-        return float(squares[told].sum() / freedom[told].sum()), 1e6
+        return float(squares[usable].sum() / freedom[usable].sum()), 1e6
     confidence = 2 * scipy.optimize.brentq(lambda y: scipy.special.polygamma(1, y) - excess, 1e-3, 1e7)
     centre = logarithm.mean() + scipy.special.digamma(confidence / 2) - np.log(confidence / 2)
     return float(np.exp(centre)), float(confidence)

@@ -91,18 +91,22 @@ class Adjustment:
     @cached_property
     def noise(self) -> NDArray[np.float64]:
         """Covariance of the sensors' parameters (k, k), if noise were the only error and no pose were repeated."""
-        return uncertainty.noise_covariance(self._pulls, _covariance_inflation(self.equations, self.residuals))
+        return uncertainty.noise_covariance(
+            self._pose_information, _covariance_inflation(self.equations, self.residuals)
+        )
 
     @cached_property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of increments of the parameters (size, size), from how far the poses of the board disagree."""
         if self.layout.board_start == 0:
             return self.independent
-        return uncertainty.with_boards(self.independent, uncertainty.pose_covariance(self._pulls, self.noise))
+        return uncertainty.with_boards(
+            self.independent, uncertainty.pose_covariance(self._pose_information, self.noise)
+        )
 
     @cached_property
-    def _pulls(self) -> uncertainty.Pulls:
-        return uncertainty.pulls(self.equations, self.residuals)
+    def _pose_information(self) -> uncertainty.PoseInformation:
+        return uncertainty.pose_information(self.equations, self.residuals)
 
 
 def adjust(formulate: Formulate, start: State, groups: int, note: Callable[[str], None]) -> Adjustment:

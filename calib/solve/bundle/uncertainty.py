@@ -30,8 +30,8 @@ MAX_SHARE = 0.95
 
 
 @dataclass(frozen=True)
-class Pulls:
-    """What each distinct pose says of the sensors' k parameters, with all board poses eliminated.
+class PoseInformation:
+    """Information of each distinct pose on the sensors' k parameters, with all board poses eliminated.
 
     Attributes:
         information: by pose (poses, k, k).
@@ -48,7 +48,7 @@ class Pulls:
     efficiency: float
 
 
-def pulls(equations: Equations, residuals: NDArray[np.float64]) -> Pulls:
+def pose_information(equations: Equations, residuals: NDArray[np.float64]) -> PoseInformation:
     """Information and scores of the poses at the minimum; `residuals` (n,) are normalised."""
     count = equations.layout.board_start
     jacobian = equations.jacobian(np.zeros(equations.layout.size))
@@ -60,7 +60,7 @@ def pulls(equations: Equations, residuals: NDArray[np.float64]) -> Pulls:
     influence = robust.influence(residuals)
     rows = [np.flatnonzero(of_rows == index) for index in range(len(poses))]
     prior = reduced[len(of_rows) :]
-    return Pulls(
+    return PoseInformation(
         np.stack([reduced[own].T @ reduced[own] for own in rows]),
         np.stack([reduced[own].T @ influence[own] for own in rows]),
         repeats,
@@ -69,23 +69,23 @@ def pulls(equations: Equations, residuals: NDArray[np.float64]) -> Pulls:
     )
 
 
-def noise_covariance(said: Pulls, inflation: float) -> NDArray[np.float64]:
+def noise_covariance(poses: PoseInformation, inflation: float) -> NDArray[np.float64]:
     """Covariance (k, k) if noise were the only error and every distinct pose had been seen once."""
-    once = np.sum(said.information / said.repeats[:, None, None], axis=0)
-    return inflation * _inverse(once + said.prior)
+    once = np.sum(poses.information / poses.repeats[:, None, None], axis=0)
+    return inflation * _inverse(once + poses.prior)
 
 
-def pose_covariance(said: Pulls, noise: NDArray[np.float64]) -> NDArray[np.float64]:
+def pose_covariance(poses: PoseInformation, noise: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance (k, k) from the scatter of the poses; `noise` as of `noise_covariance`."""
-    if len(said.scores) < MIN_POSES:
+    if len(poses.scores) < MIN_POSES:
         return noise
-    lower = linalg.cholesky(said.information.sum(axis=0) + said.prior, lower=True)
+    lower = linalg.cholesky(poses.information.sum(axis=0) + poses.prior, lower=True)
     white = linalg.solve_triangular(lower, np.eye(len(lower)), lower=True)
-    scatter = white @ said.prior @ white.T
-    for information, score, repeats in zip(said.information, said.scores, said.repeats, strict=True):
+    scatter = white @ poses.prior @ white.T
+    for information, score, repeats in zip(poses.information, poses.scores, poses.repeats, strict=True):
         shares, axes = linalg.eigh(white @ information @ white.T)
         alone = shares > MAX_SHARE
-        pull = axes.T @ white @ score / (said.efficiency * np.sqrt(1 - np.where(alone, 0, shares)))
+        pull = axes.T @ white @ score / (poses.efficiency * np.sqrt(1 - np.where(alone, 0, shares)))
         pull = axes @ np.where(alone, 0, pull)
         scatter += np.outer(pull, pull) + repeats * (axes * np.where(alone, shares, 0)) @ axes.T
     return _shrunk(white.T @ scatter @ white, noise)

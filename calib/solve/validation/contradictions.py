@@ -24,7 +24,7 @@ _HARMLESS_PX = 0.5
 #: Fraction of outliers among the distances of a view that contradicts.
 _OUTLIERS = 0.5
 #: Above this fraction of contradicting shots there is no rest that they contradict.
-_MOST = 1 / 3
+_MAX_SHARE = 1 / 3
 #: Images of a shot that fit this many times better alone, and miss by this much together, are of different moments.
 _BETTER, _SCATTERS_PX = 3.0, 0.5
 #: Exchanged images put the board in the same place again to this share of what they are apart.
@@ -39,7 +39,7 @@ class Contradiction:
         shot: its number.
         sensors: whose view misses most, and, if each of the two fits alone, the other one of the pair.
         miss: root mean square residual of the first one's view [px], or [m] for distances.
-        usual: median over its views.
+        median: over its views.
         of: "corners" or "distances".
         apart: distance of the boards that the two see [m]; 0 for a single sensor.
         exchanged_with: shots whose image of one sensor fits that of the other here.
@@ -48,7 +48,7 @@ class Contradiction:
     shot: int
     sensors: tuple[str, ...]
     miss: float
-    usual: float
+    median: float
     of: str
     apart: float = 0.0
     exchanged_with: tuple[int, ...] = ()
@@ -56,8 +56,8 @@ class Contradiction:
     def __str__(self) -> str:
         """One clause for people."""
         unit, scale = ("px", 1.0) if self.of == "corners" else ("mm", 1e3)
-        miss, usual = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.usual))
-        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {usual} are usual"
+        miss, median = (f"{scale * each:.2g} {unit}" for each in (self.miss, self.median))
+        said = f"{self.of} of {self.sensors[0]} miss by {miss}, {median} are usual"
         if self.apart:
             said += f"; {' and '.join(self.sensors)} see the board {self.apart * 1e3:.1f} mm apart, and each fits alone"
         if self.exchanged_with:
@@ -84,9 +84,9 @@ def contradictions(solution: Solution) -> list[Contradiction]:
     """Shots that contradict the rest, the worst first; empty if they are too many to have a rest."""
     boards = _boards(solution)
     found = [one for shot in solution.task.shots if (one := _of_shot(solution, shot, boards)) is not None]
-    if len(found) > _MOST * len(solution.task.shots):
+    if len(found) > _MAX_SHARE * len(solution.task.shots):
         return []
-    return sorted(found, key=lambda one: -one.miss / one.usual)
+    return sorted(found, key=lambda one: -one.miss / one.median)
 
 
 def scatter(solution: Solution) -> list[Scatter]:
@@ -127,14 +127,14 @@ def _of_shot(
         if view.shot != shot:
             continue
         others = [one.rms for one in solution.views if (one.sensor, one.of) == (view.sensor, view.of)]
-        usual = max(float(np.median(others)), 1e-12)
+        median = max(float(np.median(others)), 1e-12)
         if view.of == "corners":
             sizes = np.linalg.norm(view.residuals, axis=1) / solution.deviations[f"{view.sensor} corners"]
             is_bad = float(np.median(sizes)) > _DEVIATIONS and view.rms > _HARMLESS_PX
         else:
             is_bad = float(np.mean(view.outliers)) > _OUTLIERS
-        if is_bad and (worst is None or view.rms / usual > worst.miss / worst.usual):
-            worst = Contradiction(shot, (view.sensor,), view.rms, usual, view.of)
+        if is_bad and (worst is None or view.rms / median > worst.miss / worst.median):
+            worst = Contradiction(shot, (view.sensor,), view.rms, median, view.of)
     return None if worst is None else _with_partner(worst, boards)
 
 

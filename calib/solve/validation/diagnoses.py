@@ -142,10 +142,10 @@ def unlike_the_rest(task: Task, state: State) -> str:
         misses.setdefault(view.sensor, {})[view.shot] = float(np.median(np.nan_to_num(errors, nan=np.inf)))
     found: dict[int, str] = {}
     for sensor, by_shot in misses.items():
-        usual = float(np.median([*by_shot.values()]))
-        far = {shot: miss for shot, miss in by_shot.items() if miss > max(FAR_RATIO * usual, FAR_PX)}
+        median = float(np.median([*by_shot.values()]))
+        far = {shot: miss for shot, miss in by_shot.items() if miss > max(FAR_RATIO * median, FAR_PX)}
         found |= {
-            shot: f"shot {shot} of {sensor} by {miss:.2g} px, {usual:.2g} px are usual" for shot, miss in far.items()
+            shot: f"shot {shot} of {sensor} by {miss:.2g} px, {median:.2g} px are usual" for shot, miss in far.items()
         }
     if not found:
         return ""

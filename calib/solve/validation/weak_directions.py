@@ -1,7 +1,7 @@
 """Depth terms that the shots hardly hold, in words: distances that are long look like a sensor that stands elsewhere.
 
-Parameters are expressed by what they move at the scene's distance [m]. The eigenvector of a sensor's depth terms with
-the largest variance, and what changes with it, is the change that leaves all residuals nearly as they are.
+Parameters are expressed by the displacement that they cause at the scene's distance [m]. The eigenvector of a sensor's
+depth terms with the largest variance, with the parameters that it changes, leaves all residuals nearly as they are.
 """
 
 import numpy as np
@@ -51,7 +51,7 @@ def _is_relative(name: str) -> bool:
 
 
 def _named(solution: Solution, parts: dict[tuple[str, str], float]) -> dict[str, list[str]]:
-    """What a direction changes, in words, by sensor."""
+    """Parameters that a direction changes, in words, by sensor."""
     named: dict[str, list[str]] = {}
     for sensor in dict.fromkeys(sensor for sensor, _ in parts):
         own = {name: value for (owner, name), value in parts.items() if owner == sensor}
@@ -64,11 +64,11 @@ def _named(solution: Solution, parts: dict[tuple[str, str], float]) -> dict[str,
 
 
 def _reason(named: dict[str, list[str]], parts: dict[tuple[str, str], float], reach: float, distance: float) -> str:
-    told = "; ".join(f"{sensor}: {', '.join(words)}" for sensor, words in named.items())
+    changes = "; ".join(f"{sensor}: {', '.join(words)}" for sensor, words in named.items())
     fixed = " ".join(f"--fixed-pose {sensor}" for sensor in named if (sensor, "x") in parts)
     remedy = f", or keep a pose that is known ({fixed})" if fixed else ""
     return (
-        f"{told}: held by the shots to {reach * 1e3:.2g} mm only (95 %, at {distance:g} m), as one looks like the "
+        f"{changes}: held by the shots to {reach * 1e3:.2g} mm only (95 %, at {distance:g} m), as one looks like the "
         f"other; show the board at more distances, from near to far{remedy}"
     )
 

@@ -30,7 +30,7 @@ def build(dai: Any, device: Any, pipeline: Any, address: Address) -> Outputs:
     """Builds the pipeline for an address.
 
     Raises:
-        DeviceError: the device lacks a requested camera; names what it has.
+        DeviceError: the device lacks a requested camera; names those that it has.
     """
     features = device.getConnectedCameraFeatures()
     kinds = dai.CameraSensorType

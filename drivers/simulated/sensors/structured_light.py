@@ -20,12 +20,12 @@ class StructuredLightNoise:
         random: σ of the inverse depth [1/m]; the σ of the depth is random · z² (Khoshelham and Elberink,
             Sensors 2012, for a Kinect v1).
         step: quantisation step of the inverse depth [1/m].
-        least_cosine: minimum cosine of incidence for a return.
+        minimum_cosine: minimum cosine of incidence for a return.
     """
 
     random: float = 1.425e-3
     step: float = 2.85e-3
-    least_cosine: float = 0.2
+    minimum_cosine: float = 0.2
 
 
 class StructuredLight:
@@ -61,7 +61,7 @@ class StructuredLight:
         for sight in sights:
             full = sight.share == 1
             distance[sight.region] = np.where(full, sight.distance, distance[sight.region])
-            flat = sight.cosine < self.noise.least_cosine
+            flat = sight.cosine < self.noise.minimum_cosine
             lost[sight.region] = np.where(full, flat, lost[sight.region] | (sight.share > 0))
         lost |= np.isnan(distance)
         for body, sight in zip(exposure.moment.bodies, sights):

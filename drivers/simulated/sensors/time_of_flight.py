@@ -43,7 +43,7 @@ class TimeOfFlightNoise:
         sigma_distance: growth of σ with the distance.
         sigma_amplitude: σ times amplitude [m].
         amplitude: standard deviation of the measured amplitude.
-        least_amplitude: minimum amplitude; weaker returns are invalid.
+        minimum_amplitude: minimum amplitude; weaker returns are invalid.
     """
 
     mu_offset: float = 0.0
@@ -54,7 +54,7 @@ class TimeOfFlightNoise:
     sigma_distance: float = 0.0005
     sigma_amplitude: float = 9.0
     amplitude: float = 25.0
-    least_amplitude: float = 500.0
+    minimum_amplitude: float = 500.0
 
     def mu(self, x: NDArray[np.floating], a: NDArray[np.floating]) -> NDArray[np.floating]:
         """Mean offset μ [m], averaged over pixels, at distance `x` [m] and amplitude `a`."""
@@ -97,7 +97,7 @@ class TimeOfFlight:
             measured = distance + self.noise.mu(distance, amplitude) + self.pattern
             measured += self.noise.sigma(distance, amplitude) * normal[0]
             brightness = amplitude + self.noise.amplitude * normal[1]
-            lost = ~(measured > 0) | ~(brightness >= self.noise.least_amplitude)
+            lost = ~(measured > 0) | ~(brightness >= self.noise.minimum_amplitude)
         depth = np.clip(np.rint(np.where(lost, 0, measured) * (LEVELS / RANGE_M)), 0, LEVELS - 1).astype("<u2")
         levels = np.clip(np.rint(np.nan_to_num(brightness)), 0, 65535).astype("<u2")
         return [

@@ -93,7 +93,7 @@ def findings(folder: Path) -> Findings:
     ratio = edges_agree(exposure)
     noises = {"depth": Constant(SIGMA_M), "color": GaussianColor(15.0)}
     rig = Rig("azure", {name: Sensor(name, exposure.cameras[name], noise) for name, noise in noises.items()})
-    plan = demo_plan(nurbs.Settings((6, 6)), reference="depth", region=nearest.Settings(least_pixels=3000))
+    plan = demo_plan(nurbs.Settings((6, 6)), reference="depth", region=nearest.Settings(minimum_pixels=3000))
     tracking = TrackingSession(rig, plan)
     estimate = [tracking.track(_again(exposure, k), lambda: True) for k in range(3)][-1]
     if tracking.mesh is None:

@@ -33,7 +33,7 @@ from evaluation.sequences import demo_plan
 #: Neighbouring pixels whose distances differ by more show different surfaces [m].
 LARGEST_STEP_M = 0.015
 #: Surfaces with fewer pixels are left out.
-LEAST_PIXELS = 700
+MIN_PIXELS = 700
 #: One pixel in so many is hidden.
 PARTS = 10
 
@@ -139,7 +139,7 @@ def _hidden(seen: O3rExposure, noise: DepthNoise, whole: O3rExposure) -> Iterato
     sizes = np.bincount(labels.ravel(), minlength=count)
     distance, own = whole.image(Kind.DEPTH), whole.image(Kind.DEVIATION)
     unseen = ~np.isfinite(seen.image(Kind.DEPTH)) & np.isfinite(distance) & np.isfinite(own)
-    for label in np.flatnonzero(sizes >= LEAST_PIXELS)[1:]:
+    for label in np.flatnonzero(sizes >= MIN_PIXELS)[1:]:
         found = _rendered(seen, noise, int(label))
         there = unseen & np.isfinite(found)
         yield from_images(np.where(there, distance, np.nan), found, own).take(there.ravel())

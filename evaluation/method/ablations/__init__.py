@@ -134,7 +134,7 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
     search = cma_es.Settings()
     populations = {f"{count}": {"optimizer": cma_es.Settings(count, 30)} for count in settings.populations}
     generations = {f"{count}": {"optimizer": cma_es.Settings(16, count)} for count in settings.generations}
-    misplaced = {count: {**changes, "objective": MISPLACED} for count, changes in generations.items()}
+    widened = {count: {**changes, "objective": REGISTRATION} for count, changes in generations.items()}
     additions = {name: {"optimizer": one} for name, one in plain_cma.additions(*settings.paper_budget).items()}
     starts = {
         "prediction, step size and covariance": {"optimizer": search},
@@ -144,7 +144,7 @@ def _of_searches(settings: Settings, rig: Rig) -> list[Question]:
     return [
         _question("Population of CMA-ES, 30 generations", rig, populations),
         _question("Generations of CMA-ES, 16 candidates", rig, generations),
-        _question("Generations of CMA-ES, colours misplaced by 0.2 px", rig, misplaced),
+        _question("Generations of CMA-ES, texture registration noise of 0.2 px", rig, widened),
         _question(ADDITIONS, rig, additions),
         _question("Warm start of CMA-ES, 20 generations", rig, starts),
         _question("Warm start of hybrid", rig, {"prediction": {}, "none": {"optimizer": Cold(hybrid.Settings())}}),
@@ -160,7 +160,7 @@ def _noise_variants(settings: Settings) -> tuple[Variant, ...]:
 
 
 #: Allows for colours that are not quite where they belong, which makes the cost of a frame smoother.
-MISPLACED = likelihood.Settings(misplacement_px=0.2)
+REGISTRATION = likelihood.Settings(texture_registration_px=0.2)
 
 #: By what is left out. Without the motion prior nothing but the last frame's solution, where a search begins, is kept.
 PRIORS: Mapping[str, priors.Settings] = {

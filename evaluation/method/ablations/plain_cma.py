@@ -29,7 +29,7 @@ SCALE_M = 0.01
 
 #: Smallest step size that a frame of the plain search begins with, in that unit: the last frame's, as in the paper; at
 #: least half of it was worse.
-PLAIN_LEAST = 0.0
+PLAIN_MIN = 0.0
 
 #: The same where a long search shall not begin with the small steps that the last frame's ended with.
 WIDE = 0.5
@@ -69,18 +69,18 @@ class Settings:
         begin: one of the functions above.
         population: candidates per generation; 0: 4 + 3 ln dim.
         generations: per frame at most.
-        least_step: smallest step size that a frame begins with, in the units of the metric; 0: that of the last frame.
+        minimum_step: smallest initial step size of a frame, in the units of the metric; 0: that of the last frame.
     """
 
     begin: Begin
     population: int = 0
     generations: int = 20
-    least_step: float = 0.5
+    minimum_step: float = 0.5
 
     def build(self, dimension: int, generator: np.random.Generator) -> "CmaFrom":
         """A search in `dimension` dimensions that draws from `generator`."""
         schedule = Schedule("cma", self.generations, 0.5)
-        make = partial(PycmaSampler, dimension, generator, self.least_step)
+        make = partial(PycmaSampler, dimension, generator, self.minimum_step)
         return CmaFrom(self.begin, schedule, make, self.population or default_population(dimension))
 
 
@@ -154,13 +154,13 @@ def additions(generations: int, population: int) -> Mapping[str, OptimizerSettin
         generations, population: the paper's budget.
     """
     return {
-        PAPER: FromLast(Settings(in_theta, population, generations, PLAIN_LEAST)),
+        PAPER: FromLast(Settings(in_theta, population, generations, PLAIN_MIN)),
         PAPER_WIDE: FromLast(Settings(in_theta, population, generations, WIDE)),
-        TENTH: FromLast(Settings(in_theta, population, max(1, generations // 10), PLAIN_LEAST)),
+        TENTH: FromLast(Settings(in_theta, population, max(1, generations // 10), PLAIN_MIN)),
         "cma with a tenth of the paper's generations": cma.Settings(population, max(1, generations // 10)),
-        "plain, from the last solution": FromLast(Settings(in_theta, least_step=PLAIN_LEAST)),
-        "plain, from the motion prediction": Settings(in_theta, least_step=PLAIN_LEAST),
-        "the same after a Newton step": Settings(after_newton, least_step=PLAIN_LEAST),
+        "plain, from the last solution": FromLast(Settings(in_theta, minimum_step=PLAIN_MIN)),
+        "plain, from the motion prediction": Settings(in_theta, minimum_step=PLAIN_MIN),
+        "the same after a Newton step": Settings(after_newton, minimum_step=PLAIN_MIN),
         "from the motion prediction, in the metric": Settings(in_metric),
         "the same after a Newton step: cma": cma.Settings(),
         "compiled, half of the covariance kept: cma_es": cma_es.Settings(),

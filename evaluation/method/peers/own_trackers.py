@@ -88,7 +88,7 @@ class Template:
         if self.setup.model == "flexpad":
             turned = Sheet(pose.from_rotation_vector(self.first.turn, self.first.center), *SIZE)
             settings = flexpad.Settings()
-            return flexpad.FlexPad(turned, SIDE**2, settings.least_radius_m, settings.bend_deviation)
+            return flexpad.FlexPad(turned, SIDE**2, settings.minimum_radius_m, settings.bend_deviation)
         return self.setup.surface.of_mesh(template(self.first))
 
 

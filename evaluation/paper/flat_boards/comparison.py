@@ -114,7 +114,7 @@ class Measure:
 
 
 def largest_bends(followed: TrackedSequence) -> NDArray[np.float64]:
-    """Largest |bend| (frames,) of FlexPad, clamped to 2, a radius of `least_radius_m`; the true bends are 0."""
+    """Largest |bend| (frames,) of FlexPad, clamped to 2, a radius of `minimum_radius_m`; the true bends are 0."""
     return np.minimum(np.abs(followed.thetas[:, flexpad.BENDS]).max(axis=1), FULL)
 
 

@@ -70,8 +70,8 @@ MODEL = flexpad.Settings(WIDTH, HEIGHT)
 
 #: Goals: least ratios Euclidean / likelihood, plain (the paper's of E1) and bounded, mean and in every sequence;
 #: largest error of the likelihood's surface [mm] and of its bends, which reach 1.3 here.
-LEAST_PLAIN, LEAST_BOUNDED, LEAST_ANYWHERE = 1.92, 1.2, 1.0
-MOST_SURFACE_MM, MOST_BEND = 0.75, 0.05
+MIN_PLAIN, MIN_BOUNDED, MIN_ANYWHERE = 1.92, 1.2, 1.0
+MAX_SURFACE_MM, MAX_BEND = 0.75, 0.05
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ class Bent:
         first = 2 * DIRECTIONS.index(self.degrees)
         for number, estimate in enumerate(followed.estimates):
             placement = self.moves.at(estimate.t_host_ns * 1e-9)
-            true[number, first : first + 2] = -2 * MODEL.least_radius_m * placement.curvature
+            true[number, first : first + 2] = -2 * MODEL.minimum_radius_m * placement.curvature
             poses.append(pose_error(_unbent(followed.models[number], estimate.theta), placement.T_rp))
         rotation, translation = np.mean(poses, axis=0)
         return Errors(bends, true, followed.thetas[:, flexpad.HEIGHT], float(rotation), float(translation))
@@ -185,11 +185,11 @@ def _goals(tracked: list[Tracked]) -> tuple[Goal, ...]:
     )
     limited = "Surface error, Euclidean that is bounded like the likelihood / likelihood"
     return (
-        at_least("Surface error, Euclidean / likelihood", float(np.mean(plain)), LEAST_PLAIN),
-        at_least(limited, float(np.mean(bounded)), LEAST_BOUNDED),
-        at_least(f"{limited}, in the worst sequence", min(bounded), LEAST_ANYWHERE),
-        at_most("Surface error of the likelihood", surface, MOST_SURFACE_MM, "mm"),
-        at_most("Error of its bends", bend, MOST_BEND),
+        at_least("Surface error, Euclidean / likelihood", float(np.mean(plain)), MIN_PLAIN),
+        at_least(limited, float(np.mean(bounded)), MIN_BOUNDED),
+        at_least(f"{limited}, in the worst sequence", min(bounded), MIN_ANYWHERE),
+        at_most("Surface error of the likelihood", surface, MAX_SURFACE_MM, "mm"),
+        at_most("Error of its bends", bend, MAX_BEND),
     )
 
 

@@ -1,4 +1,4 @@
-"""What the service does when something fails: every fault, made again and again to real processes.
+"""Reaction of the service to faults: every fault, injected repeatedly into real processes.
 
 Files, sockets and clocks are real; the camera is simulated. Where this machine does not permit a
 fault, that is said instead of an outcome.
@@ -7,7 +7,7 @@ Statistic: of each fault, the tries in which every promise was kept, and the lon
 TRACKING, without a recorded depth image, until a component's health was not OK, and to recover.
 Goals: every promise is kept in every try; the bounds are those of `Fault`, written before the first run.
     Changed on 2026-11-24 after single tries: nothing has to be in health while the router itself is away, since nobody
-    could hear it; how soon it tracks after a restart is a bound of its own, which is stricter than before.
+    could receive it; how soon it tracks after a restart is a bound of its own, which is stricter than before.
 Seeds: none; faults come when the rig is calm, at no fixed phase of its periods.
 Easier than reality: one fault at a time, and a rig that may restart its processes as often as it likes.
 """
@@ -29,7 +29,7 @@ TITLE = "Faults: what is promised, lost, said and how soon it is well again"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What is tried.
+    """Faults and their number.
 
     Attributes:
         tries: of each fault.

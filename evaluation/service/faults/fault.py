@@ -77,7 +77,7 @@ class Elsewhere:
 
 @dataclass(frozen=True, slots=True)
 class Try:
-    """What was seen of one try. NaN: it did not happen.
+    """Measurements of one try. NaN: it did not happen.
 
     Attributes:
         noticed_s: from the beginning to the first health that is not OK [s].
@@ -152,7 +152,7 @@ def make_once(fault: Fault, rig: RunningRig) -> Seen:
 
 
 def judge(seen: Seen, rig: RunningRig, recorded_ns: Sequence[int]) -> Try:
-    """What was seen of a try; `recorded_ns` has the times of all recorded images, CLOCK_MONOTONIC [ns]."""
+    """Measurements of a try; `recorded_ns` has the times of all recorded images, CLOCK_MONOTONIC [ns]."""
     made, listener = seen.made, rig.listener
     said = [(t_ns, one) for t_ns, one in listener.health if made.begin_ns <= t_ns <= seen.calm_ns]
     bad = [(t_ns, one) for t_ns, one in said if one.level > Health.LEVEL_OK]
@@ -171,7 +171,7 @@ def judge(seen: Seen, rig: RunningRig, recorded_ns: Sequence[int]) -> Try:
 
 
 def _all_ok_ns(said: Sequence[tuple[int, Health]]) -> float:
-    """When the last component became OK that was not [ns]; 0 if all were."""
+    """Time at which the last component recovered to OK [ns]; 0 if all were OK."""
     latest_ns = 0
     for component in {one.component for _, one in said}:
         levels = [(t_ns, one.level) for t_ns, one in said if one.component == component]

@@ -46,7 +46,7 @@ class Row:
 
 
 def row(fault: Fault, tries: Sequence[Try]) -> Row:
-    """What came of a fault's tries."""
+    """The row of a fault: promises kept and longest times over its tries."""
     missed = [words for words in (one.missed(fault) for one in tries) if words]
     most = Counter(words.split(" for ")[0].split(" after ")[0] for words in missed).most_common(1)
     example = max((words for words in missed if most and words.startswith(most[0][0])), default="")

@@ -112,8 +112,8 @@ class RunningRig:
 
         def calm() -> bool:
             latest = self.listener.latest(since_ns)
-            heard = all(name in latest for name in self._components)
-            return heard and all(one.level == 1 for one in latest.values()) and self.listener.tracks(since_ns)
+            all_report = all(name in latest for name in self._components)
+            return all_report and all(one.level == 1 for one in latest.values()) and self.listener.tracks(since_ns)
 
         return self._wait(calm, timeout_s, "the rig did not become calm" if required else "")
 

@@ -12,7 +12,7 @@ FAULTS: tuple[Fault | Elsewhere, ...] = (
     *hosts.FAULTS,
     Elsewhere(
         "mistakes in a configuration",
-        "exit code 2 with file, key, value and what is allowed",
+        "exit code 2 with file, key, value and the allowed values",
         "tests/system/test_user_errors.py",
     ),
     Elsewhere(

@@ -107,7 +107,7 @@ def _compared(name: str, frames: Sequence[Frame], known: Mapping[str, Candidate]
         pixels = np.ascontiguousarray(frame.data)
         for codec_name, candidate in known.items():
             if candidate.applies(pixels):
-                of_codec.setdefault(codec_name, []).append(_passed(candidate, pixels))
+                of_codec.setdefault(codec_name, []).append(round_trip(candidate, pixels))
     rows: list[tuple[Cell, ...]] = []
     for codec_name, passes in of_codec.items():
         left, encode_s, decode_s = np.array(passes).T
@@ -116,7 +116,7 @@ def _compared(name: str, frames: Sequence[Frame], known: Mapping[str, Candidate]
     return rows
 
 
-def _passed(candidate: Candidate, pixels: candidates.Pixels) -> tuple[float, float, float]:
+def round_trip(candidate: Candidate, pixels: candidates.Pixels) -> tuple[float, float, float]:
     """Share of the bytes that is left, and processor times to encode and to decode [s]."""
     begin_s = time.thread_time()
     encoded = candidate.encode(pixels)
@@ -148,8 +148,8 @@ def _recorders(
     rows, shares, cores = [], {}, {}
     for name, (depths, colors, delivered, chosen) in rigs.items():
         context.progress(name)
-        today = _record((depths, colors), ImageCodec.RAW, ImageCodec.RAW)
-        made = _record((depths, delivered), ImageCodec.LOSSLESS, chosen)
+        today = record((depths, colors), ImageCodec.RAW, ImageCodec.RAW)
+        made = record((depths, delivered), ImageCodec.LOSSLESS, chosen)
         raw = sum(frame.data.nbytes for frame in (*depths, *delivered))
         median, late = (RATE_HZ * float(np.quantile(made.set_s, share)) for share in (0.5, 0.95))
         megabytes = RATE_HZ / len(depths) * 1e-6
@@ -161,7 +161,7 @@ def _recorders(
     return tuple(rows), shares, cores
 
 
-def _record(streams: Sequence[Sequence[Frame]], depth: ImageCodec, color: ImageCodec) -> Recorded:
+def record(streams: Sequence[Sequence[Frame]], depth: ImageCodec, color: ImageCodec) -> Recorded:
     """Records sets of images as the recorder does, without its queue."""
     encode, set_s = encoded_image.encoder(depth, color), []
     with tempfile.TemporaryDirectory() as folder:

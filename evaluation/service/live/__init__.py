@@ -32,7 +32,7 @@ P50_MS, P99_MS, START_S, HELP_S, GROWTH_MB_MIN = 40.0, 66.0, 5.0, 0.5, 0.3
 FILE_S = 150.0
 
 #: Minimum time for estimating growth per minute [s].
-LEAST_S = 120.0
+MIN_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,11 +91,7 @@ def findings(settings: Settings, help_s: Sequence[float], starts: Sequence[Start
         at_most("Age at publication, p99", float(np.percentile(published_ms, 99)), P99_MS, "ms"),
         at_most("Start to the first estimate, the quickest", min(one.first_s for one in starts), START_S, "s"),
         at_most("--help, the quickest", min(help_s), HELP_S, "s"),
-        *(
-            memory_goal(name, one)
-            for name, one in growth.items()
-            if settings.duration_s - settings.warm_up_s >= LEAST_S
-        ),
+        *(memory_goal(name, one) for name, one in growth.items() if settings.duration_s - settings.warm_up_s >= MIN_S),
     )
     ages_ms = {"publication": published_ms, "arrival at the subscriber": arrived_ms}
     wanted_ms = {"p50": P50_MS, "p99": P99_MS}

@@ -1,4 +1,4 @@
-"""Arguments that cannot be used: the message names argument, value and what is allowed."""
+"""Arguments that cannot be used: the message names argument, value and the allowed values."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What `calibrate verify` says has changed: distances and not a motion, and what these shots cannot tell apart."""
+"""Causes named by `calibrate verify`: distances instead of a motion, and causes that these shots cannot separate."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -54,20 +54,20 @@ def metadata(tmp_path):
 def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configuration(metadata):
     bus, metadata = metadata
     metadata.add_device("cam", FakeDevice())
-    told = {sample.topic: sample.payload for sample in bus.query("**", 1)}
-    assert set(told) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
-    model = SensorModel.FromString(told["tof/model"])
+    published = {sample.topic: sample.payload for sample in bus.query("**", 1)}
+    assert set(published) == {"config", "tf", "tof/model", "tof/calibration", "color/model", "color/calibration"}
+    model = SensorModel.FromString(published["tof/model"])
     assert (model.noise, model.fx, model.width) == ("gaussian_polynomial", 5.0, 4)
     assert list(model.noise_parameters["sigma"].values) == [1e-2, 2e-3]
     assert list(model.noise_parameters["outlier_share"].values) == [0.1]
     assert "range_m" not in model.noise_parameters
     assert np.reshape(model.T_rs, (4, 4))[:3, 3].tolist() == [0.1, 0.2, 0.3]
-    assert SensorModel.FromString(told["color/model"]).calib_id == CAMERA.calib_id
-    calibration = CameraCalibration.FromString(told["tof/calibration"])
+    assert SensorModel.FromString(published["color/model"]).calib_id == CAMERA.calib_id
+    calibration = CameraCalibration.FromString(published["tof/calibration"])
     assert list(calibration.K) == [5, 0, 1.5, 0, 5, 1.0, 0, 0, 1]
     assert (calibration.frame_id, len(calibration.D), len(calibration.P)) == ("tof", 8, 12)
-    assert "[sensors.tof]" in Config.FromString(told["config"]).toml
-    tof, color = FrameTransforms.FromString(told["tf"]).transforms
+    assert "[sensors.tof]" in Config.FromString(published["config"]).toml
+    tof, color = FrameTransforms.FromString(published["tf"]).transforms
     assert (tof.parent_frame_id, tof.child_frame_id, tof.rotation.w) == ("rig", "tof", 1.0)
     x, y, z, w = pose.to_quaternion(CAMERA.T_rs)
     assert (color.rotation.x, color.rotation.y, color.rotation.z, color.rotation.w) == (x, y, z, w)
@@ -75,8 +75,8 @@ def test_what_the_sensors_are_is_announced_with_the_calibration_of_the_configura
 
 def test_a_fisheye_camera_is_published_and_restored_from_recordings():
     camera = dataclasses.replace(CAMERA, lens=KannalaBrandt(np.array([0.1, 0.02])))
-    told = sensor_metadata.calibration("tof", camera, 0)
-    assert (told.distortion_model, list(told.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
+    calibration = sensor_metadata.calibration("tof", camera, 0)
+    assert (calibration.distortion_model, list(calibration.D)) == ("kannala_brandt", [0.1, 0.02, 0, 0])
     model = sensor_metadata.sensor_model(Header(), "tof", camera, {})
     assert (
         decode_camera(SensorModel.FromString(model.SerializeToString())).calib_id == camera.calib_id == model.calib_id

@@ -16,7 +16,7 @@ def commands():
 
 @pytest.fixture(scope="module")
 def completed(commands, tmp_path_factory):
-    """What bash completes the last word of a line to."""
+    """The completions that bash offers for the last word of a line."""
     script = tmp_path_factory.mktemp("completion") / "abs-service"
     script.write_text(completion.bash(commands))
 

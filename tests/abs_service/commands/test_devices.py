@@ -115,10 +115,10 @@ def test_one_device_is_described_with_its_controls(monkeypatch, capsys):
     assert "exposure_s     0.01  a number from 1e-05 to 0.03 s" in text
     assert device.closed.is_set()
     assert cli.main(["devices", "fake://1", "--json"]) == Exit.OK
-    told = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
-    assert [control["value"] for control in told["controls"]] == [0.01, True]
-    assert told["controls"][0]["maximum"] == 0.03
-    assert not any(value == math.inf for value in told["controls"][1].values())
+    described = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert [control["value"] for control in described["controls"]] == [0.01, True]
+    assert described["controls"][0]["maximum"] == 0.03
+    assert not any(value == math.inf for value in described["controls"][1].values())
 
 
 def test_a_malformed_address_is_explained(capsys):

@@ -59,7 +59,7 @@ def lines_of_sight():
 
 
 def radial(k):
-    """What was measured [m]: radial distances."""
+    """Measured radial distances [m] of frame k."""
     return next(frame.si() for frame in SIMULATION.frames(k) if (frame.sensor, frame.stream) == ("tof", "depth"))
 
 

@@ -1,4 +1,4 @@
-"""What `abs-service info` says of a recording is what was written into it."""
+"""`abs-service info` shows of a recording what was written into it."""
 
 import json
 

@@ -30,11 +30,11 @@ def test_keys_are_for_their_owner_whatever_the_umask(tmp_path, umask):
 
 def test_there_is_one_for_each_role_and_their_ends_are_said(tmp_path, capsys):
     assert cli.main(["keys", str(tmp_path / "lab"), "--host", "rig.lab", "--host", "10.0.0.7", "--days", "9"]) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for name in roles.NAMES:
         found = tls(tmp_path / "lab", name).check("", listens=False)
         assert found.name == name
-        assert f"{name}.pem, {name}.key: until {found.ends.date()}" in told
+        assert f"{name}.pem, {name}.key: until {found.ends.date()}" in printed
     for endpoint in ("tls/rig.lab:1", "tls/10.0.0.7:1"):
         assert tls(tmp_path / "lab", "rig").check(endpoint, listens=True).name == "rig"
 

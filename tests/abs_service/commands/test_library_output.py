@@ -1,4 +1,4 @@
-"""What zenoh writes to standard output becomes lines of the log."""
+"""Output of zenoh to standard output becomes lines of the log."""
 
 import os
 import subprocess
@@ -21,12 +21,12 @@ def test_refusals_are_said_without_wrong_advice():
 
 def test_a_line_that_repeats_is_passed_on_once_in_ten_seconds_with_a_count():
     now = [0.0]
-    told = library_output.Repetitions(lambda: now[0])
-    assert [told.line(text) for text in ("a", "a", "b", "a")] == ["a", "", "b", ""]
+    repetitions = library_output.Repetitions(lambda: now[0])
+    assert [repetitions.line(text) for text in ("a", "a", "b", "a")] == ["a", "", "b", ""]
     now[0] = 10.0
-    assert told.line("a") == "a (2 times more since)"
+    assert repetitions.line("a") == "a (2 times more since)"
     now[0] = 20.0
-    assert told.line("a") == "a"
+    assert repetitions.line("a") == "a"
 
 
 def test_lines_past_python_are_logged_and_those_of_python_stay_where_they_were():

@@ -46,7 +46,7 @@ def count(image: np.ndarray, color: str) -> int:
 
 
 def has(picture: Path, color: str) -> bool:
-    """Whether the depth image of a picture, without the legend, has pixels of a colour."""
+    """True if the depth image of a picture, without the legend, has pixels of a colour."""
     return count(drawn(picture)[LINE:, :-LEGEND], color) > 0
 
 

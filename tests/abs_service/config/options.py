@@ -52,7 +52,7 @@ mesh = { vertices = 150 }
 [record]
 """)
 
-USUAL = {
+DEFAULTS = {
     "scene": "sheet",
     "depth_head": "tof",
     "head": "color",
@@ -85,7 +85,7 @@ class Option:
     Attributes:
         part: key of the table that names the part, and its type, say `model.rigid`.
         keys: other keys of that table.
-        others: what else differs from `USUAL`.
+        others: what else differs from `DEFAULTS`.
     """
 
     part: str
@@ -103,7 +103,7 @@ class Option:
         """The rig file."""
         key, _, kind = self.part.partition(".")
         table = ", ".join([f'type = "{kind}"', *filter(None, [self.keys])])
-        return RIG.substitute(USUAL | self.others | {key: f"{{ {table} }}"})
+        return RIG.substitute(DEFAULTS | self.others | {key: f"{{ {table} }}"})
 
 
 def _option(part: str, keys: str = "", **others: str) -> Option:

@@ -275,7 +275,7 @@ def test_every_status_of_the_wire_has_a_colour():
     from abs_service.display.terminal import table
 
     names = {name.removeprefix("STATUS_") for name in dict(DeformationState.Status.items())}
-    assert names - {"UNSPECIFIED"} == table._STATUS.keys()
+    assert names - {"UNSPECIFIED"} == table.STATUS_COLORS.keys()
 
 
 @pytest.mark.parametrize(

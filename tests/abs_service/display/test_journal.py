@@ -56,7 +56,7 @@ class Journal:
         return RigView("lab", "", Path(), self.live, [self.child], second, int(second * S), "")
 
     def entries(self, second=0.0):
-        """What is written at this time of the rig, without what all entries share."""
+        """Journal entries written at this time of the rig, without the fields that all entries share."""
         self.display.update(self.view(second))
         return list(self._read())
 

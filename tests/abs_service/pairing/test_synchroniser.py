@@ -243,7 +243,7 @@ def test_promises_hold_for_any_traffic(case):
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.integers(-5, 5), min_size=2, max_size=30), st.randoms(use_true_random=False))
 def test_streams_of_one_rate_are_matched_completely(jitter, random):
-    """However the two streams interleave: if nothing is lost, nothing is missing."""
+    """Two streams interleaved in any way: if nothing is lost, nothing is missing."""
     depth = [frame(TOF, 1000 + 33 * seq, seq) for seq in range(len(jitter))]
     color = [frame(COLOR, 1000 + 33 * seq + shift, seq) for seq, shift in enumerate(jitter)]
     sync = synchroniser()

@@ -1,5 +1,7 @@
 """A rig on a loopback bus with a recorder, and how to read what it recorded."""
 
+import time
+
 import numpy as np
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
@@ -30,10 +32,11 @@ class Rig:
         free_bytes=lambda folder: 1 << 40,
         open_file=open_for_writing,
         trigger: Trigger = ALWAYS,
+        monotonic=time.monotonic_ns,
         **settings,
     ):
         self.bus = LoopbackBus()
-        self.clock = WallClock()
+        self.clock = WallClock(monotonic)
         self.headers = HeaderFactory("demo", self.clock)
         self.health = Health(self.bus, "record", self.headers)
         settings = RecorderSettings(directory, "demo", "version = 1\n", **settings)
@@ -47,7 +50,7 @@ class Rig:
         return image, info
 
     def written(self, count):
-        """Whether so many messages have been recorded."""
+        """True once so many messages have been recorded."""
         return self.said.counters["recorded"] >= count
 
     @property

@@ -1,4 +1,4 @@
-"""Whatever happens to a file, all that is sound in it is saved, and what is not is counted."""
+"""Recovery saves every sound message of a damaged file and counts the others."""
 
 import fcntl
 import random

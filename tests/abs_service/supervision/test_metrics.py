@@ -1,7 +1,8 @@
-"""What Prometheus reads, through its own parser; and what stands in its way."""
+"""Metrics as Prometheus's own parser reads them; and errors that prevent them."""
 
 import socket
 import sys
+import threading
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -124,6 +125,9 @@ def test_the_missing_extra_is_named(monkeypatch, port):
         pass
 
 
-def test_none_by_default():
+def test_none_by_default(monkeypatch):
+    monkeypatch.setitem(sys.modules, "prometheus_client", None)  # the extra is not needed then
+    before = threading.enumerate()
     with metrics.served(0) as update:
         update(view())
+        assert threading.enumerate() == before

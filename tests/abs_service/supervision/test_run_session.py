@@ -150,9 +150,9 @@ def test_health_of_a_child_is_a_sign_of_life_and_its_silence_is_noticed():
     )
     bench.session.run_until(lambda: False)  # ends because capture, once heard, is silent and has no restart left
     assert bench.supervisor.children["capture"].state == "failed"
-    told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
-    assert told[-1].level == Health.LEVEL_ERROR
-    assert "capture failed: needed more than 0 restarts" in told[-1].message
+    reported = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
+    assert reported[-1].level == Health.LEVEL_ERROR
+    assert "capture failed: needed more than 0 restarts" in reported[-1].message
 
 
 def test_a_topology_that_the_network_lost_is_queried():
@@ -180,8 +180,8 @@ def test_a_tracker_that_falls_silent_is_an_error_whatever_the_cause(monkeypatch)
     publisher.put(state)
 
     def last():
-        told = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
-        return told[-1] if told else Health()
+        reported = [Health.FromString(sample.payload) for sample in bench.bus.sent if sample.topic == "health/run"]
+        return reported[-1] if reported else Health()
 
     bench.session.run_until(lambda: last().level == Health.LEVEL_ERROR or bench.session.elapsed_s > 30)
     assert last().message == "track/sheet: no estimate for 0 s"

@@ -1,4 +1,4 @@
-"""What systemd is told: over a real datagram socket, at times in the test's hand; and what the unit file promises."""
+"""Notifications to systemd, over a real datagram socket and with a clock of the test; and the unit file."""
 
 import os
 import re
@@ -50,7 +50,7 @@ class Manager:
         log.last = EstimateReport(tracker, 0, "", status, (), (), (), None, None, None, 1.0, 1.0, 1, 1, 0)
 
     def after(self, seconds):
-        """What is sent until then, texts apart."""
+        """Messages sent until then, without the status texts."""
         self.now_ns += int(seconds * S)
         self.notifier.update(RigView("demo", "", Path(), self.live, (), 0.0, self.now_ns, ""))
         return [message for message in self.received() if not message.startswith("STATUS=")]
@@ -148,7 +148,9 @@ def test_without_a_watchdog_none_is_fed(start, environment):
 
 @pytest.mark.parametrize("address", ["", "/nowhere/notify", "@nowhere"])
 def test_a_systemd_that_is_not_there_does_no_harm(address):
+    before = os.listdir("/proc/self/fd")
     systemd.notifier({"NOTIFY_SOCKET": address}).stopping()
+    assert os.listdir("/proc/self/fd") == before  # no socket is left
 
 
 @pytest.mark.slow
@@ -158,7 +160,7 @@ def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, e
         f'version = 1\nname = "bench"\nbus.endpoint = "{endpoint}"\nrecord = {{ minimum_free_bytes = 0 }}\n'
         '[devices.sim]\nuri = "simulated://sheet?tof=32x24&sensors=tof"\n[sensors.tof]\ndevice = "sim"\n'
     )
-    told = []
+    received = []
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         manager.bind(str(tmp_path / "notify"))
         manager.settimeout(60)
@@ -166,13 +168,13 @@ def test_a_running_rig_tells_systemd_when_it_is_ready_alive_and_ending(launch, e
         monkeypatch.setenv("WATCHDOG_USEC", "4000000")
         monkeypatch.delenv("WATCHDOG_PID", raising=False)
         process = launch("run", tmp_path / "rig.toml")
-        while told.count("WATCHDOG=1") < 3:
-            told.append(manager.recv(4096).decode())
+        while received.count("WATCHDOG=1") < 3:
+            received.append(manager.recv(4096).decode())
         process.send_signal(signal.SIGTERM)
-        while "STOPPING=1" not in told:
-            told.append(manager.recv(4096).decode())
+        while "STOPPING=1" not in received:
+            received.append(manager.recv(4096).decode())
         assert process.wait(20) == 0
-    order = [message for message in told if message in ("READY=1", "WATCHDOG=1", "STOPPING=1")]
+    order = [message for message in received if message in ("READY=1", "WATCHDOG=1", "STOPPING=1")]
     assert order == ["READY=1", *["WATCHDOG=1"] * (len(order) - 2), "STOPPING=1"]
 
 

@@ -74,7 +74,7 @@ def sparse(camera: Camera, mesh: Mesh | None = None) -> Sparse:
 
 
 def seen(camera: Camera, surface: Surface) -> Synthesis:
-    """What a camera sees of single points."""
+    """Synthesis of single points in a camera."""
     points = surface.vertices.shape[2]
     return SparseView(camera, np.zeros((0, 3), np.int32), np.zeros((points, 0), np.float32)).synthesize(surface)
 

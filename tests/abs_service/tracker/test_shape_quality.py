@@ -1,4 +1,4 @@
-"""What a deformed mesh shows by itself."""
+"""Quality of a deformed mesh, without measurements."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""When an estimate is to be trusted."""
+"""Status of an estimate, with its reasons."""
 
 from dataclasses import replace
 

@@ -7,7 +7,7 @@ from abs_service.tracking.session import TrackingSession
 from tests.abs_service.tracking.driving import default_plan, drive, rig_of, simulate
 
 SIMULATION = simulate("simulated://sheet?seed=1&speed=4")
-MOTION = seed.Settings(motion_s=0.5, least_motion_m=0.01)
+MOTION = seed.Settings(motion_s=0.5, minimum_motion_m=0.01)
 PLAN = default_plan(region=MOTION, optimizer=cma.Settings(generations=2))
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from abs_service.tracker.detection.strip.strip_detection import Strip
 from abs_service.tracker.models.gravity import Gravity
 from abs_service.tracking.bending_stiffness.stiffness import (
-    LEAST_FRAMES,
+    MIN_FRAMES,
     InclinationProfile,
     StiffnessError,
     estimate_stiffness,
@@ -70,7 +70,7 @@ def test_a_nearly_straight_strip_sags_as_the_small_deflection_formula_says():
     """Horizontally clamped, the free end of a cantilever under its own weight inclines by w L³ / (6 D)."""
     load = 0.05
     inclination = load / 6 * (1 - (1 - np.linspace(0, 1, 5)) ** 3)
-    found = estimate_stiffness([InclinationProfile(inclination, 1e-8 * np.eye(5))] * LEAST_FRAMES, 1.0, 0.0, 0.0)
+    found = estimate_stiffness([InclinationProfile(inclination, 1e-8 * np.eye(5))] * MIN_FRAMES, 1.0, 0.0, 0.0)
     assert found.load == pytest.approx(load, rel=0.01)
     assert found.bending(weight=2.0, length=1.0) == pytest.approx(2.0 / load, rel=0.01)
 
@@ -89,9 +89,9 @@ def test_a_strip_that_is_curved_by_itself_does_not_fit():
 
 
 def test_what_cannot_be_told_is_refused():
-    with pytest.raises(StiffnessError, match=f"{LEAST_FRAMES - 1} frames .* are too few, at least {LEAST_FRAMES}"):
-        estimate_stiffness(frames(4.0, LEAST_FRAMES - 1), 1.0, 0.0, 0.0)
-    straight = [InclinationProfile(np.full(5, 0.4), 1e-8 * np.eye(5))] * LEAST_FRAMES
+    with pytest.raises(StiffnessError, match=f"{MIN_FRAMES - 1} frames .* are too few, at least {MIN_FRAMES}"):
+        estimate_stiffness(frames(4.0, MIN_FRAMES - 1), 1.0, 0.0, 0.0)
+    straight = [InclinationProfile(np.full(5, 0.4), 1e-8 * np.eye(5))] * MIN_FRAMES
     with pytest.raises(StiffnessError, match="the strip bends too little"):
         estimate_stiffness(straight, 1.0, 0.0, 0.0)
 

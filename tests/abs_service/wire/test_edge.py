@@ -1,4 +1,4 @@
-"""What the processes of a rig send comes in; everything else is counted by its cause."""
+"""Messages of a rig's processes are accepted; everything else is counted by its cause."""
 
 import math
 from typing import Any
@@ -15,11 +15,11 @@ from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from hypothesis import given
 
 from abs_service.bus.contract import Sample
-from abs_service.bus.health import Health as Told
+from abs_service.bus.health import Health as HealthPublisher
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.capture import sensor_metadata
 from abs_service.wire.checked_bus import CheckedBus
-from abs_service.wire.edge import MOST_PER_S, MOST_TOPICS, Edge
+from abs_service.wire.edge import MAX_PER_S, MAX_TOPICS, Edge
 from abs_service.wire.viewer_messages import point_cloud, scene_update
 from tests.abs_service.bus.loopback import LoopbackBus, health_now
 from tests.abs_service.wire.golden.freeze import BINARY, published
@@ -129,7 +129,7 @@ def test_too_many_messages_of_a_topic_in_a_second_are_refused():
     now_ns = [0]
     edge = Edge(lambda: now_ns[0])
     health = sample("health/run", Health(component="run"))
-    assert sum(edge.admits(health) for _ in range(MOST_PER_S + 10)) == MOST_PER_S
+    assert sum(edge.admits(health) for _ in range(MAX_PER_S + 10)) == MAX_PER_S
     assert edge.refused == {"rate": 10}
     assert edge.admits(sample("health/record", Health(component="record")))
     now_ns[0] = S
@@ -138,8 +138,8 @@ def test_too_many_messages_of_a_topic_in_a_second_are_refused():
 
 def test_too_many_topics_are_refused_and_the_known_ones_go_on():
     edge = Edge(lambda: 0)
-    flood = [sample(f"health/{number}", Health(component=str(number))) for number in range(MOST_TOPICS + 5)]
-    assert sum(map(edge.admits, flood)) == MOST_TOPICS
+    flood = [sample(f"health/{number}", Health(component=str(number))) for number in range(MAX_TOPICS + 5)]
+    assert sum(map(edge.admits, flood)) == MAX_TOPICS
     assert edge.refused == {"topics": 5}
     assert edge.admits(flood[0])
 
@@ -155,19 +155,19 @@ class TestABusThatIsChecked:
         bus, arrived = LoopbackBus(), []
         checked = CheckedBus(bus, lambda: 0)
         checked.subscribe("**", arrived.append)
-        told = LoopbackBus()
-        health = Told(told, "run", HeaderFactory("demo", WallClock()))
+        health_bus = LoopbackBus()
+        health = HealthPublisher(health_bus, "run", HeaderFactory("demo", WallClock()))
         bad, good = sample("tof/model", SensorModel()), sample("tof/model", MODEL)
         bus.deliver(bad)
         bus.deliver(good)
         assert arrived == [good]
         checked.report(health)
-        said = health_now(health, told)
+        said = health_now(health, health_bus)
         assert said.counters["refused.content"] == 1
         assert said.level == Health.LEVEL_WARNING
         assert said.message.startswith("refused 1 messages, the last: tof/model: ")
         checked.report(health)  # nothing new
-        assert health_now(health, told).level == Health.LEVEL_OK
+        assert health_now(health, health_bus).level == Health.LEVEL_OK
 
     def test_answers_are_checked_too(self):
         bus = LoopbackBus()

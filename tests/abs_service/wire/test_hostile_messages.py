@@ -99,8 +99,8 @@ class Run:
 
     @property
     def said(self):
-        told = [one for one in self.bus.sent if one.topic == "health/run"]
-        return Message.FromString(told[-1].payload)
+        published = [one for one in self.bus.sent if one.topic == "health/run"]
+        return Message.FromString(published[-1].payload)
 
 
 @pytest.fixture(autouse=True)
@@ -150,9 +150,9 @@ class Recording:
     """A recorder of a rig, and its health."""
 
     def __init__(self, directory):
-        self.bus, self.told = LoopbackBus(), LoopbackBus()
+        self.bus, self.health_bus = LoopbackBus(), LoopbackBus()
         clock = WallClock()
-        self.health = Health(self.told, "record", HeaderFactory("demo", clock))
+        self.health = Health(self.health_bus, "record", HeaderFactory("demo", clock))
         encode = encoded_image.encoder(ImageCodec.LOSSLESS, ImageCodec.RAW)
         rig = RecorderSettings(directory, "demo", "version = 1\n", encode, minimum_free_bytes=0)
         self.recorder = Recorder(CheckedBus(self.bus, clock.monotonic), rig, self.health, clock)
@@ -163,7 +163,7 @@ class Recording:
             self.bus.deliver(one)
         self.recorder.stop(10)
         self.recorder.report()
-        return health_now(self.health, self.told)
+        return health_now(self.health, self.health_bus)
 
 
 class TestRecorder:
@@ -192,7 +192,7 @@ class TestRecorder:
 
 
 class Tracking:
-    """What a tracker takes from the bus: frame sets of one depth stream."""
+    """Input of a tracker from the bus: frame sets of one depth stream."""
 
     def __init__(self):
         self.bus, self.headers = LoopbackBus(), HeaderFactory("demo", WallClock())
@@ -224,7 +224,7 @@ class TestTracker:
         health = Health(LoopbackBus(), "track/sheet", HeaderFactory("demo", WallClock()))
         answers = iter([SensorModel(sensor="tof"), SensorModel(), MODEL])
         bus.answer_queries("tof/model", MODEL.DESCRIPTOR.full_name, lambda: next(answers).SerializeToString())
-        cameras = track._cameras(CheckedBus(bus, time.monotonic_ns), ("tof",), health, stop)
+        cameras = track.await_cameras(CheckedBus(bus, time.monotonic_ns), ("tof",), health, stop)
         assert cameras["tof"].width == MODEL.width
 
     @given(st.lists(samples(("tof/depth/image",)), min_size=1, max_size=5))
@@ -233,18 +233,20 @@ class TestTracker:
         for one in hostile:
             tracking.bus.deliver(one)
             tracking.sets.take()
-        health = Health(LoopbackBus(), "track/sheet", tracking.headers)
+        bus = LoopbackBus()
+        health = Health(bus, "track/sheet", tracking.headers)
         health.count_up_to(tracking.sets.counters)
-        health.publish()
+        assert health_now(health, bus).component == "track/sheet"
 
     @given(st.lists(samples(("clock/there",)), min_size=1, max_size=5))
     def test_no_answer_of_a_clock_ends_it(self, answers):
         bus = LoopbackBus()
         bus.query = lambda pattern, timeout_s: answers
         clocks = ClockOffsets(CheckedBus(bus, time.monotonic_ns), time.monotonic_ns, "here")
-        clocks.offset("there")
+        assert clocks.offset("there") is None
         clocks.measure()
-        clocks.offset("there")
+        known = clocks.offset("there")
+        assert known is None or known.error_ns >= 0
 
 
 class FakeLink(Link):
@@ -273,11 +275,12 @@ class TestRemoteDevice:
         for one in hostile:
             pattern = TRUTHS if one.topic.endswith("truth") else IMAGES
             link.listeners[pattern](one.topic, one.payload, one.attachment)
-        health = Health(LoopbackBus(), "capture", HeaderFactory("demo", WallClock()))
+        bus = LoopbackBus()
+        health = Health(bus, "capture", HeaderFactory("demo", WallClock()))
         health.count_up_to(device.counters)
         for name, value in device.gauges.items():
             health.gauge(name, value)
-        health.publish()
+        assert health_now(health, bus).component == "capture"
 
 
 def test_every_kind_of_key_is_among_the_topics():

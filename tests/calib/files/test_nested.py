@@ -20,7 +20,7 @@ def test_json_and_yaml_that_are_nested_too_deeply_are_refused() -> None:
 
 
 def test_what_people_write_is_read() -> None:
-    key = ".".join("a" * nested.MOST_PARTS)
+    key = ".".join("a" * nested.MAX_PARTS)
     table = nested.toml(f'x = [{", ".join(["1.5"] * 100)}]\ny = "{". " * 100}"\n{key} = 1\n')
     assert table["x"] == [1.5] * 100
     assert nested.yaml("a: [1, 2]") == {"a": [1, 2]}

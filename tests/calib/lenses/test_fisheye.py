@@ -98,8 +98,8 @@ def test_a_camera_with_a_fisheye_projects_and_looks_back():
     np.testing.assert_allclose(camera.project(camera.rays()), np.stack([columns, rows], axis=-1), atol=1e-9)
     assert np.degrees(np.arccos(camera.rays()[..., 2])).max() > 70
     point, step = np.array([1.0, -0.7, 0.4]), 1e-6
-    slopes = [(camera.project(point + e) - camera.project(point - e)) / (2 * step) for e in step * np.eye(3)]
-    np.testing.assert_allclose(camera.projection_jacobian(point), np.stack(slopes, axis=-1), atol=1e-6)
+    jacobian = [(camera.project(point + e) - camera.project(point - e)) / (2 * step) for e in step * np.eye(3)]
+    np.testing.assert_allclose(camera.projection_jacobian(point), np.stack(jacobian, axis=-1), atol=1e-6)
 
 
 def test_the_kind_of_lens_is_part_of_the_calib_id_and_did_not_change_that_of_old_cameras():

@@ -1,4 +1,4 @@
-"""What docs/explanation/noise.md shows works: its tables are models, and its example runs."""
+"""The tables in docs/explanation/noise.md are valid models, and its example runs."""
 
 import re
 import tomllib

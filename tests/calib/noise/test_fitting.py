@@ -116,7 +116,7 @@ def test_as_many_unseen_samples_as_promised_lie_within_one_and_two_deviations(se
 def test_a_model_that_is_wrong_by_a_factor_is_told_by_the_variance():
     right = tof_amplitude.fit(laws.time_of_flight(1))
     half = dataclasses.replace(
-        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, least_sigma=1e-4
+        right, sigma=tuple(s / 2 for s in right.sigma), sigma_amplitude=right.sigma_amplitude / 2, minimum_sigma=1e-4
     )
     quality = goodness_of_fit(half, laws.time_of_flight(2))
     assert quality.variance == pytest.approx(4, rel=0.1)
@@ -224,15 +224,15 @@ def test_samples_that_vary_too_little_for_a_model_are_no_reason_to_guess(name):
 
 
 @pytest.mark.parametrize("power", [1, 2])
-def test_the_gradients_of_the_fit_are_the_slopes_of_its_cost(power):
+def test_the_gradients_of_the_fit_are_those_of_its_cost(power):
     generator = np.random.default_rng(1)
     columns = fitting.Design(generator.normal(size=(50, 2)), generator.uniform(0.5, 2, (50, 3)))
-    samples = fitting._Samples(generator.normal(size=50), columns, power, 0.01)
-    imagined = fitting._PseudoSamples(0.3, columns, power)
+    samples = fitting.ResidualSamples(generator.normal(size=50), columns, power, 0.01)
+    imagined = fitting.PseudoSamples(0.3, columns, power)
     at, steps = np.array([0.2, -0.1, 0.5, 0.3, 0.4, -2.0]), 1e-6 * np.eye(6)
     for cost in (lambda p: samples.cost(p[:2], p[2:5], p[5]), lambda p: imagined.cost(p[:2], p[2:5])):
-        slopes = [(cost(at + step)[0] - cost(at - step)[0]) / 2e-6 for step in steps]
-        np.testing.assert_allclose(cost(at)[1], slopes, rtol=1e-5, atol=1e-6)
+        differences = [(cost(at + step)[0] - cost(at - step)[0]) / 2e-6 for step in steps]
+        np.testing.assert_allclose(cost(at)[1], differences, rtol=1e-5, atol=1e-6)
 
 
 def test_the_domain_leaves_outliers_aside():

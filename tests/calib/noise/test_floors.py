@@ -76,7 +76,7 @@ def test_the_law_of_the_image_is_not_better_than_its_steps(share: float) -> None
 
 
 def test_maps_of_a_file_do_not_pass_below_the_least_deviation(tmp_path: Path) -> None:
-    """A file of an older version, without `least_sigma` and with factors that had collapsed."""
+    """A file of an older version, without `minimum_sigma` and with factors that had collapsed."""
     model = own_of_pixels()
     np.savez(tmp_path / "own.npz", offset=model.offset, factor=np.full(model.shape, 2e-9), distances=model.distances)
     read = per_pixel.Settings(tmp_path / "own.npz", TofAmplitude((1e-3,), 0.0)).build()

@@ -32,7 +32,7 @@ FITS = {"color": color.fit, "grey": grey.fit, "bayer": bayer.fit}
 
 
 def exposures(query: str, stream: str, number: int) -> np.ndarray:
-    """What a head of the simulator delivers (number, …) while nothing moves, in SI values."""
+    """Images (number, …) of a stream of the simulator at rest, in SI values."""
     simulation = parse(f"simulated://sheet?{query}").build()
     frames = [frame for k in range(number) for frame in simulation.expose(k)[0] if frame.stream == stream]
     return np.array([frame.si() if frame.data.ndim == 2 else frame.data for frame in frames], float)
@@ -204,9 +204,9 @@ def test_readings_of_a_barrier_err_as_often_as_it_says_and_tell_it_again(model, 
     sizes = np.array([crossing.sum(), (~crossing).sum()])
     rates = np.array([model.miss, model.false_alarm])
     allowed = 5 * np.sqrt(rates * (1 - rates) / sizes) + 1 / sizes
-    told = np.array([1 - readings[crossing].mean(), readings[~crossing].mean()])
-    assert np.all(np.abs(told - rates) < allowed)
-    if told.max() < 0.49:
+    estimated = np.array([1 - readings[crossing].mean(), readings[~crossing].mean()])
+    assert np.all(np.abs(estimated - rates) < allowed)
+    if estimated.max() < 0.49:
         found = binary.fit(readings, crossing, 0.8)
         assert np.all(np.abs(np.array([found.miss, found.false_alarm]) - rates) < allowed)
         assert found.length_m == 0.8

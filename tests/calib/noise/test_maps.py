@@ -35,12 +35,12 @@ def test_what_is_written_can_be_read(tmp_path, module, model):
     np.testing.assert_array_equal(read.deviation(X, A, P), model.deviation(X, A, P))
     np.testing.assert_array_equal(read.mean(X, A, P), model.mean(X, A, P))
     assert read.shape == model.shape == (4, 5)
-    assert read.least_sigma == model.least_sigma
+    assert read.minimum_sigma == model.minimum_sigma
 
 
 def test_a_file_that_does_not_say_its_least_deviation_has_the_usual_one(tmp_path):
-    read = pixel_polynomial.Settings(saved(tmp_path, PIXELS, least_sigma=None)).build()
-    assert read.least_sigma == 1e-4
+    read = pixel_polynomial.Settings(saved(tmp_path, PIXELS, minimum_sigma=None)).build()
+    assert read.minimum_sigma == 1e-4
 
 
 @pytest.mark.parametrize(
@@ -51,7 +51,7 @@ def test_a_file_that_does_not_say_its_least_deviation_has_the_usual_one(tmp_path
         ("pixel", {"mu": np.ones((1, 1, 9, 9))}, r"of one image size"),
         ("pixel", {"distances": np.ones(3)}, r"distances .* \[lowest, highest\]"),
         ("pixel", {"amplitudes": np.array([5.0, 1.0])}, r"amplitudes .* \[lowest, highest\]"),
-        ("pixel", {"least_sigma": 0.0}, r"least_sigma .* above 0, not 0.0"),
+        ("pixel", {"minimum_sigma": 0.0}, r"minimum_sigma .* above 0, not 0.0"),
         ("pixel", {"mu": np.array([None, {}])}, "cannot be read as .npz"),
         ("region", {"labels": None}, r"lacks the array\(s\) \['labels'\]"),
         ("region", {"sigma": np.ones((1, 1, 4, 5))}, r"\(i, j, regions\)"),

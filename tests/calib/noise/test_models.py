@@ -78,9 +78,9 @@ def test_outside_the_calibrated_domain_the_edge_s_value_holds(name):
 
 
 def test_the_deviation_is_never_below_its_bound():
-    steep = GaussianPolynomial(((1e-2,), (-1e-2,)), least_sigma=2e-3)
+    steep = GaussianPolynomial(((1e-2,), (-1e-2,)), minimum_sigma=2e-3)
     np.testing.assert_allclose(steep.deviation(np.array([0.5, 0.9, 5.0]), A, P), [5e-3, 2e-3, 2e-3])
-    falling = TofAmplitude((1e-2, -1e-2), 0.0, least_sigma=2e-3)
+    falling = TofAmplitude((1e-2, -1e-2), 0.0, minimum_sigma=2e-3)
     np.testing.assert_allclose(falling.deviation(np.array([0.5, 0.9, 5.0]), A, P), [5e-3, 2e-3, 2e-3])
     domain = np.array(DISTANCES), np.array([0.0, 1.0])
     below, none = np.full((1, 1, 4, 5), -1.0), np.zeros((1, 1, 4, 5))
@@ -177,10 +177,10 @@ def test_ranges_of_numbers_are_declared():
     assert bounds == {
         ("color", "sigma"): (Gt(0),),
         ("constant", "sigma"): (Gt(0),),
-        ("gaussian_polynomial", "least_sigma"): (Gt(0),),
+        ("gaussian_polynomial", "minimum_sigma"): (Gt(0),),
         ("structured_light", "noise"): (Gt(0),),
         ("structured_light", "step"): (Ge(0),),
         ("structured_light", "floor"): (Ge(0),),
         ("tof_amplitude", "sigma_amplitude"): (Ge(0),),
-        ("tof_amplitude", "least_sigma"): (Gt(0),),
+        ("tof_amplitude", "minimum_sigma"): (Gt(0),),
     }

@@ -49,8 +49,8 @@ def test_the_deviation_is_positive_and_the_offset_finite_wherever_one_asks(model
     sigma = model.deviation(x, a, p)[0]
     assert 0 < sigma < np.inf
     assert np.isfinite(model.mean(x, a, p)[0])
-    if hasattr(model, "least_sigma"):
-        assert sigma >= model.least_sigma
+    if hasattr(model, "minimum_sigma"):
+        assert sigma >= model.minimum_sigma
 
 
 @given(any_model(), ANYWHERE, PIXEL)

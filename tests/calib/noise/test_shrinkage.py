@@ -114,7 +114,7 @@ def test_a_pixel_without_samples_is_like_its_region_and_a_region_without_like_th
 
 
 def test_pixels_that_are_alike_stay_so():
-    """Where pixels differ by chance only, their maps are flat to a fraction of what chance makes of each."""
+    """For pixels that differ by chance only, the maps' spread is a fraction of a single pixel's standard error."""
     head = Head(1)
     head.offset[...], head.slope[...], head.factor[...] = 5e-3, 0, 1
     model = pixel_polynomial.fit(head.boards(6, 2), LABELS, *DEGREES)

@@ -1,4 +1,4 @@
-"""Static sequences: what moves is left out, planes and steps are found, and the parts of the error told apart."""
+"""Static sequences: what moves is left out, planes and steps are found, and the parts of the error separated."""
 
 import numpy as np
 import pytest
@@ -110,11 +110,11 @@ def test_temporal_fixed_and_systematic_part_are_told_apart() -> None:
     uri = "simulated://wall?sensors=tof&distance=1.2&reflectivity=0.8&offset=0.02&pattern=0.004" + SMALL
     static, head = sequence(uri, last=60)
     found = reference.known(static, 1.2, everywhere(static), RANDOM(0))
-    told = parts.separate(static, found, Constant(1.0, 0.02), static.still)
+    separated = parts.separate(static, found, Constant(1.0, 0.02), static.still)
     law = np.sqrt(np.mean(np.square(head.noise.sigma(*head.ideal(())))))
-    assert told.temporal == pytest.approx(law, rel=0.03)
-    assert told.fixed == pytest.approx(0.004, rel=0.1)
-    assert told.offset == pytest.approx(0.02, abs=3e-4)
+    assert separated.temporal == pytest.approx(law, rel=0.03)
+    assert separated.fixed == pytest.approx(0.004, rel=0.1)
+    assert separated.offset == pytest.approx(0.02, abs=3e-4)
     shared, deviation = parts.pattern([static], [found], Constant(1.0, 0.02))
     assert np.nanstd(shared - head.pattern) < 1.5 * np.nanmedian(deviation)
 

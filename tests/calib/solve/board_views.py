@@ -88,7 +88,7 @@ def look(
     times: Mapping[int, float] = {},
     points: int = 150,
 ) -> Seen:
-    """What the heads see of boards `T_rb`, with noise."""
+    """Corners and distances of boards `T_rb` in all heads, with noise."""
     seen = Seen()
     for shot, T_rb in boards.items():
         for name, head in heads.items():

@@ -1,4 +1,4 @@
-"""What goes wrong when people calibrate, and whether they are told."""
+"""Common errors in calibrating, and their diagnoses."""
 
 from dataclasses import replace
 

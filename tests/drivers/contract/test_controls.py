@@ -1,4 +1,4 @@
-"""Validation of control values; errors name what is allowed."""
+"""Validation of control values; errors name the allowed values."""
 
 import math
 

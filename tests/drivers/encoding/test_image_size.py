@@ -34,7 +34,11 @@ def jpeg(width: int, height: int) -> bytes:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".tiff", ".pgm", ".bmp", ".webp"])
 def test_images_of_every_format_pass(suffix: str) -> None:
-    image_size.check(cv2.imencode(suffix, np.zeros((20, 30), np.uint8))[1].tobytes())
+    encoded = cv2.imencode(suffix, np.zeros((20, 30), np.uint8))[1]
+    image_size.check(encoded.tobytes())
+    decoded = cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE)
+    assert decoded is not None
+    assert decoded.shape == (20, 30)
 
 
 @pytest.mark.parametrize(

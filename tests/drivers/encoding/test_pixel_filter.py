@@ -43,9 +43,7 @@ def test_the_format_is_the_stated_one(image):
 def test_every_filter_is_undone(image, predictor, green_subtracted):
     pixels, mosaic = image
     chosen = Filter(predictor, green_subtracted and pixels.ndim == 3)
-    integers = pixels.view(f"<u{pixels.dtype.itemsize}")
-    planes = pixel_filter._filtered(pixel_filter._split(integers, mosaic), chosen)
-    data = zstandard.compress(b"".join(pixel_filter._to_bytes(plane) for plane in planes))
+    data = pixel_filter.encode_with(chosen, pixels, mosaic)
     assert pixel_filter.decode(data, chosen, pixels.shape, pixels.dtype, mosaic).tobytes() == pixels.tobytes()
 
 

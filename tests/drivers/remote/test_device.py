@@ -51,10 +51,10 @@ class Wire:
 
 
 @pytest.fixture
-def heard():
+def connected():
     """Starts a device on a fake link with a manual clock."""
 
-    def heard(same_clock: bool):
+    def connected(same_clock: bool):
         wire, sink, now = Wire(), RecordingSink(), [5_000_000_000]
         cameras = {"tof": CAMERAS["tof"]}
         remote = RemoteRig(cameras, STREAMS, same_clock)
@@ -62,7 +62,7 @@ def heard():
         device.start(sink)
         return device, wire, sink, now
 
-    return heard
+    return connected
 
 
 def frame(seq: int, t_host_ns: int, t_arrival_ns: int = 0, epoch: int = 900, which: int = 0) -> Frame:
@@ -70,8 +70,8 @@ def frame(seq: int, t_host_ns: int, t_arrival_ns: int = 0, epoch: int = 900, whi
     return replace(FRAMES[which], seq=seq, epoch=epoch, t_host_ns=t_host_ns, t_arrival_ns=arrival_ns)
 
 
-def test_with_a_shared_clock_only_the_epoch_of_a_frame_changes(heard) -> None:
-    device, wire, sink, _ = heard(same_clock=True)
+def test_with_a_shared_clock_only_the_epoch_of_a_frame_changes(connected) -> None:
+    device, wire, sink, _ = connected(same_clock=True)
     sent = frame(41, 1_234_567_891, t_arrival_ns=1_240_000_000)
     wire.say(sent)
     (got,) = sink.frames
@@ -82,8 +82,8 @@ def test_with_a_shared_clock_only_the_epoch_of_a_frame_changes(heard) -> None:
     assert device.gauges == {}
 
 
-def test_host_times_of_another_host_are_mapped(heard) -> None:
-    device, wire, sink, now = heard(same_clock=False)
+def test_host_times_of_another_host_are_mapped(connected) -> None:
+    device, wire, sink, now = connected(same_clock=False)
     for k in range(600):
         exposure_ns = 5_000_000_000 + k * 33_333_333
         theirs_ns = round(exposure_ns * (1 - DRIFT)) + AHEAD_NS
@@ -97,8 +97,8 @@ def test_host_times_of_another_host_are_mapped(heard) -> None:
     assert sink.frames[-1].t_sigma_ns > 0
 
 
-def test_a_reboot_of_the_other_host_is_a_new_epoch(heard) -> None:
-    _, wire, sink, now = heard(same_clock=False)
+def test_a_reboot_of_the_other_host_is_a_new_epoch(connected) -> None:
+    _, wire, sink, now = connected(same_clock=False)
     for k in range(60):
         now[0] += 33_333_333
         wire.say(frame(k, now[0] + (AHEAD_NS if k < 30 else 0)))
@@ -106,8 +106,8 @@ def test_a_reboot_of_the_other_host_is_a_new_epoch(heard) -> None:
     assert abs(sink.frames[-1].t_host_ns - now[0]) < 10_000_000
 
 
-def test_missing_and_malformed_frames_are_counted(heard) -> None:
-    device, wire, sink, _ = heard(same_clock=True)
+def test_missing_and_malformed_frames_are_counted(connected) -> None:
+    device, wire, sink, _ = connected(same_clock=True)
     for seq in (1, 2, 5, 6):
         wire.say(frame(seq, seq * 10**7))
     wire.listeners["*/*/image"]("tof/depth/image", b"\xff", b"\xff")
@@ -115,8 +115,8 @@ def test_missing_and_malformed_frames_are_counted(heard) -> None:
     assert [f.seq for f in sink.frames] == [1, 2, 5, 6]
 
 
-def test_each_remote_epoch_is_one_epoch_without_losses(heard) -> None:
-    device, wire, sink, _ = heard(same_clock=True)
+def test_each_remote_epoch_is_one_epoch_without_losses(connected) -> None:
+    device, wire, sink, _ = connected(same_clock=True)
     for epoch in (900, 950):
         for seq in (7, 8):
             for which in (0, 1):
@@ -125,8 +125,8 @@ def test_each_remote_epoch_is_one_epoch_without_losses(heard) -> None:
     assert device.counters["missing"] == 0
 
 
-def test_the_end_of_the_remote_process_is_a_failure(heard) -> None:
-    device, wire, sink, _ = heard(same_clock=True)
+def test_the_end_of_the_remote_process_is_a_failure(connected) -> None:
+    device, wire, sink, _ = connected(same_clock=True)
     wire.on_gone()
     assert device.state == DeviceState.FAILED
     assert sink.states[-1] == (DeviceState.FAILED, 'the capture of rig "bench" has ended')

@@ -62,8 +62,8 @@ def test_ray_distances_agree_with_ray_marching(capsules: np.ndarray) -> None:
     assert np.all((part >= 0) == (share > 0))
     points = RAYS * distance[..., None]
     h = 1e-5
-    slopes = [clearance(points + step, capsules) - clearance(points - step, capsules) for step in h * np.eye(3)]
-    normal = np.stack(slopes, axis=-1) / (2 * h)
+    gradients = [clearance(points + step, capsules) - clearance(points - step, capsules) for step in h * np.eye(3)]
+    normal = np.stack(gradients, axis=-1) / (2 * h)
     smooth = (share == 1) & (np.abs(np.linalg.norm(normal, axis=-1) - 1) < 1e-6)  # not in a crease of two capsules
     np.testing.assert_allclose(cosine[smooth], -(normal * RAYS).sum(-1)[smooth], atol=2e-3)
 

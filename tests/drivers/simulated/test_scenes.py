@@ -67,26 +67,26 @@ def test_the_device_delivers_the_truth_of_both() -> None:
 @pytest.mark.parametrize("scene", ["sheet", "board", "pair", "strip"])
 def test_a_leaving_surface_is_out_of_every_view_in_the_interval(scene: str) -> None:
     heads = "sensors=tof,structured_light,color,bayer,ir,barrier&noise=0&lens=-0.25,0.06"
-    simulation, usual = build(scene, f"{heads}&leave=3,5"), build(scene, heads)
+    simulation, original = build(scene, f"{heads}&leave=3,5"), build(scene, heads)
     for k in (91, 120, 149):
         gone = {frame.key: frame.data for frame in simulation.frames(k)}
         for key, image in gone.items():
             np.testing.assert_array_equal(image, {f.key: f.data for f in simulation.frames(121)}[key])
         assert gone["barrier", "binary"] == 0
-        for before, after in zip(usual.truths(k), simulation.truths(k)):
+        for before, after in zip(original.truths(k), simulation.truths(k)):
             np.testing.assert_allclose(
                 after.points_r - before.points_r, np.broadcast_to((1.2, 0, 0), (21, 31, 3)), atol=1e-6
             )
     for k in (0, 70, 163, 200):
-        for frame, expected in zip(simulation.frames(k), usual.frames(k)):
+        for frame, expected in zip(simulation.frames(k), original.frames(k)):
             np.testing.assert_array_equal(frame.data, expected.data)
 
 
 @pytest.mark.parametrize("scene", ["sheet", "board", "pair"])
 def test_a_turn_is_a_right_angle_in_a_quarter_of_a_second(scene: str) -> None:
-    turning, usual = build(scene, "sensors=tof&turn=4&seed=2"), build(scene, "sensors=tof&seed=2")
+    turning, original = build(scene, "sensors=tof&turn=4&seed=2"), build(scene, "sensors=tof&seed=2")
     for t, share in ((3.99, 0), (4.125, 0.5), (4.26, 1), (9, 1)):
-        for surface, expected in zip(turning.scene.at(t).surfaces, usual.scene.at(t).surfaces):
+        for surface, expected in zip(turning.scene.at(t).surfaces, original.scene.at(t).surfaces):
             grids = surface.grid(3, 3), expected.grid(3, 3)
             right, before = (grid[1, 2] - grid[1, 0] for grid in grids)
             cosine = right @ before / np.linalg.norm(right) / np.linalg.norm(before)

@@ -1,4 +1,4 @@
-"""What the figures at material points are made of: bindings to a mesh, 95 % regions, folds, edges and corners."""
+"""Parts of the figures at material points: bindings to a mesh, 95 % regions, folds, edges and corners."""
 
 from dataclasses import replace
 

@@ -48,13 +48,13 @@ def test_a_search_within_the_rate_misses_nothing_and_one_that_is_not_misses_what
 def test_a_real_toy_is_tracked_within_the_goals(data_set: Callable[[str], Path]) -> None:
     sequence = toy.Toy(data_set(toy.FOLDER), 30)
     frames = list(sequence.follow(time.process_time_ns, lambda k, frames: None if k in (12, 20, 21) else frames))
-    usual, least = toy.medians(frames), toy.worst(frames)
+    medians, worst = toy.medians(frames), toy.worst(frames)
     assert [frame.index for frame in frames] == [k for k in range(30) if k not in (12, 20, 21)]
     assert all(frame.tracking for frame in frames)
-    assert max(usual.forward_mm, usual.backward_mm) < 1.3
-    assert max(least.forward_mm, least.backward_mm) < 2
-    assert usual.covered > 0.85
-    assert least.inside > 0.95
+    assert max(medians.forward_mm, medians.backward_mm) < 1.3
+    assert max(worst.forward_mm, worst.backward_mm) < 2
+    assert medians.covered > 0.85
+    assert worst.inside > 0.95
 
 
 @pytest.mark.slow

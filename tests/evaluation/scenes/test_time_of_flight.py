@@ -40,7 +40,7 @@ def test_the_mean_of_many_exposures_errs_less() -> None:
 
 def test_what_is_too_faint_or_out_of_range_has_no_return() -> None:
     generator = np.random.default_rng(3)
-    assert np.isnan(TimeOfFlight(least_amplitude=200.0).measure(view(1.0, 1e-3), generator).distance).all()
+    assert np.isnan(TimeOfFlight(minimum_amplitude=200.0).measure(view(1.0, 1e-3), generator).distance).all()
     assert np.isnan(TimeOfFlight().measure(view(5.2, 0.5), generator).distance).all()
 
 

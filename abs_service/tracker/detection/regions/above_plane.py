@@ -16,10 +16,10 @@ from calib.noise.base import NoiseError
 from calib.sequences import plane
 
 #: Minimum share of the returns on a plane for it to be what the object lies on.
-LEAST_SHARE = 0.2
+MIN_SHARE = 0.2
 
 #: Number of pixels of the subsampled image in which the plane is found; more are slower but not more accurate.
-MOST_PIXELS = 20_000
+MAX_PIXELS = 20_000
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Settings:
             distances there.
         seed: column and row of a pixel of the object [px]; without it, the object is the largest connected surface.
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
-        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored, except for finding the plane.
     """
 
     clearance_m: Annotated[float, Gt(0)] = 0.01
     seed: tuple[Annotated[int, Ge(0)], Annotated[int, Ge(0)]] | None = None
     largest_step_m: Annotated[float, Gt(0)] = 0.04
-    least_pixels: Annotated[int, Ge(16)] = 200
+    minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
 
     def build(self) -> Restricted:
@@ -46,16 +46,16 @@ class Settings:
         return Restricted(self._above, restricted(self._selected, self.within).select)
 
     def _above(self, view: DepthView) -> DepthView:
-        """The view without the plane and what is beyond it; DetectionError if there is no plane."""
+        """The view without the plane and everything beyond it; DetectionError if there is no plane."""
         q = _dominant_plane(view, self.clearance_m)
         height = _height(view, q)
         with np.errstate(invalid="ignore"):
             share = np.count_nonzero(np.abs(height) <= self.clearance_m) / np.count_nonzero(view.measured)
             above = height > self.clearance_m
-        if share < LEAST_SHARE:
+        if share < MIN_SHARE:
             raise DetectionError(
                 f"no plane: the largest has {share:.0%} of the returns within clearance_m = {self.clearance_m:g} m, "
-                f"{LEAST_SHARE:.0%} needed"
+                f"{MIN_SHARE:.0%} needed"
             )
         return limited(view, above)
 
@@ -63,8 +63,8 @@ class Settings:
         """Pixels (height, width) of the object among those above the plane; DetectionError if there is none."""
         try:
             if self.seed is not None:
-                return surface_at(self.seed, view.distance, self.largest_step_m, self.least_pixels)
-            labels, large = large_surfaces(view.distance, self.largest_step_m, self.least_pixels)
+                return surface_at(self.seed, view.distance, self.largest_step_m, self.minimum_pixels)
+            labels, large = large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
         except DetectionError as error:
             raise DetectionError(f"more than clearance_m = {self.clearance_m:g} m above the plane: {error}") from None
         return labels == large[0]
@@ -78,7 +78,7 @@ def _dominant_plane(view: DepthView, tolerance: float) -> NDArray[np.float64]:
     Raises:
         DetectionError: there is no plane.
     """
-    step = int(np.ceil(np.sqrt(view.distance.size / MOST_PIXELS)))
+    step = int(np.ceil(np.sqrt(view.distance.size / MAX_PIXELS)))
     distance, rays = view.distance[::step, ::step], view.camera.rays()[::step, ::step]
     tolerances = np.full(distance.shape, tolerance)
     try:

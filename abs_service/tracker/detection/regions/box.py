@@ -11,7 +11,7 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.within import Restricted, restricted
 from calib import pose
 
-LEAST_PIXELS = 16
+MIN_PIXELS = 16
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Settings:
         with np.errstate(invalid="ignore"):
             points_b = pose.transform(pose.inverse(T_rb), view.points_r)
             inside = np.all(np.abs(points_b) <= (highest - lowest) / 2, axis=-1) & view.measured
-        if np.count_nonzero(inside) < LEAST_PIXELS:
+        if np.count_nonzero(inside) < MIN_PIXELS:
             turned = f" turned by {list(self.rotation)} rad" if any(self.rotation) else ""
             raise DetectionError(f"the box {list(self.lowest)} … {list(self.highest)}{turned} holds no surface")
         return inside

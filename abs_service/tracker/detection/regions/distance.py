@@ -22,14 +22,14 @@ class Settings:
         farthest_m: largest radial distance of the object [m].
         nearest_m: smallest radial distance of the object [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
-        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
     """
 
     farthest_m: Annotated[float, Gt(0)]
     nearest_m: Annotated[float, Ge(0)] = 0.0
     largest_step_m: Annotated[float, Gt(0)] = 0.04
-    least_pixels: Annotated[int, Ge(16)] = 200
+    minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class Settings:
         with np.errstate(invalid="ignore"):
             in_range = (view.distance >= self.nearest_m) & (view.distance <= self.farthest_m)
         try:
-            labels, large = large_surfaces(limited(view, in_range).distance, self.largest_step_m, self.least_pixels)
+            labels, large = large_surfaces(limited(view, in_range).distance, self.largest_step_m, self.minimum_pixels)
         except DetectionError as error:
             raise DetectionError(f"from {self.nearest_m:g} to {self.farthest_m:g} m: {error}") from None
         return labels == large[0]

@@ -10,7 +10,7 @@ from abs_service.tracker.detection.depth_view import DepthView, limited
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.segments.within import load_mask
 
-LEAST_PIXELS = 16
+MIN_PIXELS = 16
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,6 @@ class Mask:
             DetectionError: the mask has another size than the image, or no return.
         """
         inside = limited(view, self._mask).measured
-        if np.count_nonzero(inside) < LEAST_PIXELS:
+        if np.count_nonzero(inside) < MIN_PIXELS:
             raise DetectionError("the mask holds no surface")
         return inside

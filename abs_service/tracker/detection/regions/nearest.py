@@ -21,12 +21,12 @@ class Settings:
 
     Attributes:
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
-        least_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
+        minimum_pixels: minimum number of pixels of a surface; smaller ones are ignored as noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
     """
 
     largest_step_m: Annotated[float, Gt(0)] = 0.04
-    least_pixels: Annotated[int, Ge(16)] = 200
+    minimum_pixels: Annotated[int, Ge(16)] = 200
     within: Path | None = None
 
     def build(self) -> Restricted:
@@ -39,7 +39,7 @@ class Settings:
         Raises:
             DetectionError: there is none, or it is a scene in which everything is connected.
         """
-        labels, large = large_surfaces(view.distance, self.largest_step_m, self.least_pixels)
+        labels, large = large_surfaces(view.distance, self.largest_step_m, self.minimum_pixels)
         nearest = labels == min(large, key=lambda label: float(np.median(view.distance[labels == label])))
         if is_scene(nearest, view.measured):
             share = np.count_nonzero(nearest) / np.count_nonzero(view.measured)

@@ -25,11 +25,11 @@ class Settings:
         pixel: column and row of a pixel of the object in the depth image [px]. One of `pixel`, `color` and `motion_s`
             is needed.
         color: red, green, blue of the object; the largest surface of about this colour is it.
-        motion_s: time within which the object moves [s]; what has moved in it is the object.
+        motion_s: time within which the object moves [s]; pixels that moved in it belong to the object.
         grow: edges at which the object ends: steps in distance ("depth"), or edges of its colours, too ("color").
-        least_motion_m: least change towards the sensor of a surface that has moved [m].
+        minimum_motion_m: least change towards the sensor of a surface that has moved [m].
         largest_step_m: largest difference in distance between neighbouring pixels of one surface [m].
-        least_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
+        minimum_pixels: minimum number of pixels of a surface, and of what moved or has the colour; less is noise.
         within: mask image as of the region `mask`; pixels outside are ignored.
     """
 
@@ -37,9 +37,9 @@ class Settings:
     color: tuple[Level, Level, Level] | None = None
     motion_s: Annotated[float, Ge(0.5)] | None = None
     grow: Literal["depth", "color"] = "depth"
-    least_motion_m: Annotated[float, Gt(0)] = 0.02
+    minimum_motion_m: Annotated[float, Gt(0)] = 0.02
     largest_step_m: Annotated[float, Gt(0)] = 0.04
-    least_pixels: Annotated[int, Ge(16)] = 16
+    minimum_pixels: Annotated[int, Ge(16)] = 16
     within: Path | None = None
 
     def __post_init__(self) -> None:
@@ -47,7 +47,7 @@ class Settings:
 
     def build(self) -> Restricted:
         """The region; DetectionError if `within` is missing or no image."""
-        seed, surfaces = self._seed(), Surfaces(self.largest_step_m, self.least_pixels)
+        seed, surfaces = self._seed(), Surfaces(self.largest_step_m, self.minimum_pixels)
 
         def select(view: DepthView) -> NDArray[np.bool_]:
             seeded = seed(view, surfaces)
@@ -62,7 +62,7 @@ class Settings:
             case None, (_, _, _) as color, None:
                 return ColorSeed(color)
             case None, None, float() | int() as seconds:
-                return MotionSeed(seconds, self.least_motion_m)
+                return MotionSeed(seconds, self.minimum_motion_m)
         given = [name for name in ("pixel", "color", "motion_s") if getattr(self, name) is not None]
         raise DetectionError(
             f"one of pixel, color and motion_s says where the object is, not {' and '.join(given) or 'none'}"

@@ -1,1 +1,1 @@
-"""Pixels of one thing in a depth image: connected surfaces, grown from what is known of them."""
+"""Pixels of one thing in a depth image: connected surfaces, grown from seeds."""

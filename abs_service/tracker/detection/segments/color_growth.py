@@ -1,4 +1,4 @@
-"""The part of a surface with an object's colours, where depth does not tell the object from what touches it."""
+"""The part of a surface with an object's colours, for objects that touch others and do not differ in depth."""
 
 import cv2
 import numpy as np

@@ -33,14 +33,14 @@ def connected_surfaces(distance: NDArray[np.float32], largest_step: float) -> tu
 
 
 def large_surfaces(
-    distance: NDArray[np.float32], largest_step: float, least_pixels: int
+    distance: NDArray[np.float32], largest_step: float, minimum_pixels: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Label of every pixel's surface, 0 for none, and the labels (k,) of the large surfaces, the largest first.
 
     Args:
         distance: radial distances (height, width) [m], NaN without return.
         largest_step: largest difference between connected neighbours [m].
-        least_pixels: minimum number of pixels of a surface.
+        minimum_pixels: minimum number of pixels of a surface.
 
     Raises:
         DetectionError: no surface is large enough.
@@ -48,23 +48,24 @@ def large_surfaces(
     labels, count = connected_surfaces(distance, largest_step)
     sizes = np.bincount(labels.ravel(), minlength=count)[1:]
     by_size = 1 + np.argsort(-sizes, kind="stable")
-    large = by_size[sizes[by_size - 1] >= least_pixels]
+    large = by_size[sizes[by_size - 1] >= minimum_pixels]
     if not len(large):
         largest = int(sizes.max(initial=0))
         raise DetectionError(
-            f"no connected surface of at least least_pixels = {least_pixels} pixels in sight; the largest has {largest}"
+            f"no connected surface of at least minimum_pixels = {minimum_pixels} pixels in sight; "
+            f"the largest has {largest}"
         )
     return labels, large
 
 
 def surface_at(
-    pixel: tuple[int, int], distance: NDArray[np.float32], largest_step: float, least_pixels: int
+    pixel: tuple[int, int], distance: NDArray[np.float32], largest_step: float, minimum_pixels: int
 ) -> NDArray[np.bool_]:
     """Pixels (height, width) of the connected surface at a pixel, or else of the one nearest to it within `REACH_PX`.
 
     Args:
         pixel: its column and row.
-        distance, largest_step, least_pixels: see `large_surfaces`.
+        distance, largest_step, minimum_pixels: see `large_surfaces`.
 
     Raises:
         DetectionError: the pixel is outside the image, or there is no surface near it.
@@ -72,14 +73,14 @@ def surface_at(
     height, width = distance.shape
     if not (0 <= pixel[0] < width and 0 <= pixel[1] < height):
         raise DetectionError(f"the pixel {list(pixel)} is outside the depth image of {width} × {height} pixels")
-    labels, large = large_surfaces(distance, largest_step, least_pixels)
+    labels, large = large_surfaces(distance, largest_step, minimum_pixels)
     rows, columns = np.nonzero(np.isin(labels, large))
     away = np.hypot(columns - pixel[0], rows - pixel[1])
     nearest = int(np.argmin(away))
     row, column = rows[nearest], columns[nearest]
     if away[nearest] > REACH_PX:
         raise DetectionError(
-            f"no connected surface of at least least_pixels = {least_pixels} pixels within {REACH_PX} pixels of "
+            f"no connected surface of at least minimum_pixels = {minimum_pixels} pixels within {REACH_PX} pixels of "
             f"{list(pixel)}; the nearest one is {away[nearest]:.0f} pixels away, at [{column}, {row}]"
         )
     return labels == labels[row, column]

@@ -1,4 +1,4 @@
-"""Seeds: what is known of the object beforehand, as pixels of a depth image and the surface that they lie on."""
+"""Seeds: prior knowledge of the object, as pixels of a depth image and the surface that they lie on."""
 
 from collections import deque
 from collections.abc import Callable
@@ -47,7 +47,7 @@ class Surfaces:
     """Settings of connected surfaces: see `large_surfaces`."""
 
     largest_step_m: float
-    least_pixels: int
+    minimum_pixels: int
 
 
 #: Finds a seed in a view; DetectionError if it is not there.
@@ -66,7 +66,7 @@ class PixelSeed:
 
     def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
         """The disc of the surface that is nearest to the pixel; DetectionError if there is no surface near it."""
-        surface = surface_at(self.pixel, view.distance, surfaces.largest_step_m, surfaces.least_pixels)
+        surface = surface_at(self.pixel, view.distance, surfaces.largest_step_m, surfaces.minimum_pixels)
         row, column = np.ogrid[: surface.shape[0], : surface.shape[1]]
         away = np.hypot(column - self.pixel[0], row - self.pixel[1])
         return Seeded(surface & (away <= away[surface].min() + DISC * surface.shape[1]), surface)
@@ -94,15 +94,15 @@ class ColorSeed:
 
 
 class MotionSeed:
-    """The surface that moved in front of what was there before; compares the last of images in order of time.
+    """The surface that moved in front of the previous scene; compares the last of images in order of time.
 
     Args:
         seconds: for how long images are compared [s].
-        least_m: how much nearer than before a moved surface is [m].
+        minimum_m: how much nearer than before a moved surface is [m].
     """
 
-    def __init__(self, seconds: float, least_m: float):
-        self._seconds, self._least_m = seconds, least_m
+    def __init__(self, seconds: float, minimum_m: float):
+        self._seconds, self._minimum_m = seconds, minimum_m
         self._before: deque[tuple[int, NDArray[np.float32]]] = deque()
 
     def __call__(self, view: DepthView, surfaces: Surfaces) -> Seeded:
@@ -114,11 +114,10 @@ class MotionSeed:
             )
         before = np.sort([np.nan_to_num(distance, nan=-np.inf) for _, distance in self._before], axis=0)
         with np.errstate(invalid="ignore"):
-            nearer = before[-min(BEHIND, len(before))] - view.distance > self._least_m
+            nearer = before[-min(BEHIND, len(before))] - view.distance > self._minimum_m
         inner = np.asarray(cv2.erode(nearer.view(np.uint8), np.ones((RIM_PX, RIM_PX)))).view(np.bool_)
-        what = (
-            f"nothing moved by {self._least_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
-        )
+        limits = f"{self._minimum_m:g} m towards the camera, or in front of something, in {self._seconds:g} s"
+        what = f"nothing moved by {limits}"
         return _largest_patch(view, surfaces, inner, what)
 
     def _remember(self, view: DepthView) -> float:
@@ -129,7 +128,7 @@ class MotionSeed:
         while len(self._before) > 1 and view.t_ns - self._before[1][0] >= period_ns:
             self._before.popleft()
         if self._before and not 0 <= view.t_ns - self._before[-1][0] <= period_ns:
-            self._before.clear()  # nobody asked for a while
+            self._before.clear()  # no detection for a while
         if not self._before or view.t_ns - self._before[-1][0] >= period_ns / COMPARED:
             self._before.append((view.t_ns, view.distance))
         return (view.t_ns - self._before[0][0]) * 1e-9
@@ -158,15 +157,15 @@ def _largest_patch(view: DepthView, surfaces: Surfaces, pixels: NDArray[np.bool_
     """The largest connected patch of pixels (height, width) on a connected surface; `what` is missing otherwise.
 
     Raises:
-        DetectionError: none has `least_pixels`.
+        DetectionError: none has `minimum_pixels`.
     """
-    labels, large = large_surfaces(view.distance, surfaces.largest_step_m, surfaces.least_pixels)
+    labels, large = large_surfaces(view.distance, surfaces.largest_step_m, surfaces.minimum_pixels)
     there = (pixels & np.isin(labels, large)).view(np.uint8)
     patches = np.asarray(cv2.connectedComponents(cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3))))[1])
     sizes = np.bincount(patches.ravel())[1:]
     most = int(sizes.max(initial=0))
-    if most < surfaces.least_pixels:
-        raise DetectionError(f"{what}: the largest has {most} pixels, least_pixels = {surfaces.least_pixels}")
+    if most < surfaces.minimum_pixels:
+        raise DetectionError(f"{what}: the largest has {most} pixels, minimum_pixels = {surfaces.minimum_pixels}")
     patch = patches == 1 + np.argmax(sizes)
     surface = labels == np.argmax(np.bincount(labels[patch]))
     return Seeded(patch & surface, surface)

@@ -18,7 +18,7 @@ Select = Callable[[DepthView], NDArray[np.bool_]]
 
 @dataclass(frozen=True, eq=False)
 class Restricted:
-    """A region made of two steps: the view is limited, then the object's pixels are selected from what is left."""
+    """A region made of two steps: the view is limited, then the object's pixels are selected from the rest."""
 
     limit: Callable[[DepthView], DepthView]
     selection: Select

@@ -16,7 +16,7 @@ from calib import pose
 from calib.pose import Pose
 
 #: A vertex is seen if the depth image agrees with its distance within this, or within 4 σ if that is more [m].
-LEAST_AGREEMENT_M, AGREEMENT_DEVIATIONS = 0.01, 4.0
+MIN_AGREEMENT_M, AGREEMENT_DEVIATIONS = 0.01, 4.0
 
 
 class KnownObject:
@@ -71,7 +71,7 @@ class FirstSight:
         camera, distance = self.detection.camera, self.detection.distance
         sight = mesh.vertices - camera.center
         away, facing = np.linalg.norm(sight, axis=1), np.einsum("ni,ni->n", mesh.normals, sight) < 0
-        agreement = max(LEAST_AGREEMENT_M, AGREEMENT_DEVIATIONS * self.detection.deviation)
+        agreement = max(MIN_AGREEMENT_M, AGREEMENT_DEVIATIONS * self.detection.deviation)
         measured = at_points(distance, camera, mesh.vertices)
         return facing & (np.abs(measured - away) < agreement)  # False for NaN
 

@@ -27,7 +27,7 @@ SAMPLES, PAINTED = 1500, 10_000
 FEWEST, MOST = 0.5, 2.0
 
 #: Faces are divided until no edge is longer than this share of the distance between vertices, or there are so many.
-FINENESS, MOST_VERTICES = 0.7, 50_000
+FINENESS, MAX_VERTICES = 0.7, 50_000
 
 #: Vertices this near to each other, as a share of the object's size, are one: of another face, or with another texture.
 SAME = 1e-6
@@ -62,7 +62,7 @@ def load(path: Path, metres: float, vertices: int) -> KnownObject:
         vertices: see above.
 
     Raises:
-        DetectionError: the file is missing, or no mesh that can be tracked; names the key and what is allowed.
+        DetectionError: the file is missing, or no mesh that can be tracked; names the key and the allowed values.
     """
     content = _read(path)
     given = _checked(_mesh(content, metres), path)
@@ -117,7 +117,7 @@ def _divided(content: _Content, longest: float) -> _Content:
     """The same surface with every face divided into four until no edge is longer."""
     subdivide = import_module("trimesh.remesh").subdivide
     vertices, faces = content.vertices, content.faces
-    while len(vertices) < MOST_VERTICES:
+    while len(vertices) < MAX_VERTICES:
         sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         if edge_lengths(vertices[:, :3], sides).max() <= longest:
             break

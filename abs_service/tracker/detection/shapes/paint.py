@@ -12,7 +12,7 @@ NEIGHBORS = 8
 #: Opposite sides of a body count apart by this share of its size.
 SIDES_APART = 0.05
 
-#: Weight that keeps slopes finite where these points lie in a plane or on a line, as a share of their mean square.
+#: Weight that keeps gradients finite where these points lie in a plane or on a line, as a share of their mean square.
 RIDGE = 1e-3
 
 

@@ -3,7 +3,7 @@
 A robust iterative closest point method (ICP) from many starts. Every point of the object is drawn onto the tangential
 plane of the nearest sample of the surface that faces the camera (Chen and Medioni, 1992), or onto the sample itself if
 it lies beside the surface. And every sample that lies before the background is drawn onto the nearest point of the
-object: the camera would have seen it. What something else hides counts neither way, so the object may be partly hidden.
+object: the camera would have seen it. Occluded points are ignored, so the object may be partly occluded.
 """
 
 from dataclasses import dataclass
@@ -36,13 +36,13 @@ ALIKE = 1.03
 REACH = 1.1
 
 #: A sample lies before the background if that is farther away by more than this, or by so many σ if that is more [m].
-LEAST_GAP_M, GAP_DEVIATIONS = 0.01, 3.0
+MIN_GAP_M, GAP_DEVIATIONS = 0.01, 3.0
 
 #: A segmented object lacks so many pixels at its rim.
 RIM_PX = 2
 
 #: The fit is bad if its error (root mean square of the best 90 %) exceeds this, or so many σ if that is more [m].
-LEAST_ERROR_M, ERROR_DEVIATIONS = 0.004, 2.0
+MIN_ERROR_M, ERROR_DEVIATIONS = 0.004, 2.0
 #: … or if a larger share of the object lies beside the template, or of the template before the background.
 LARGEST_SHARE = 0.1
 
@@ -55,9 +55,9 @@ class Scene:
         points: some points (k, 3) of the object [m].
         tree: for the nearest of them.
         camera: the depth camera.
-        background: distance (height, width) [m] of what is around the object; infinite where nothing is seen and most
+        background: distance (height, width) [m] of the scene around the object; infinite where nothing is seen and most
             of the surroundings is empty, NaN where it is unknown, and on and next to the object.
-        gap: see `LEAST_GAP_M` [m].
+        gap: see `MIN_GAP_M` [m].
         scale: size of an error from which on it counts linearly instead of squared [m].
     """
 
@@ -77,7 +77,7 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Match:
-    """Linearised errors of one pose, and what they consist of.
+    """Linearised errors of one pose, and their parts.
 
     Attributes:
         residual: (m,) [m].
@@ -141,10 +141,10 @@ def _scene(detection: InitialDetection) -> Scene:
     around = detection.surroundings if detection.surroundings.size else np.full_like(distance, np.nan)
     is_empty = np.count_nonzero(np.isnan(around[~near])) > np.count_nonzero(~near) / 2
     background = np.where(np.isnan(around), np.inf if is_empty else np.nan, around)
-    gap = max(LEAST_GAP_M, GAP_DEVIATIONS * deviation)
+    gap = max(MIN_GAP_M, GAP_DEVIATIONS * deviation)
     points = detection.points
     tree = scipy.spatial.KDTree(points)
-    return Scene(points, tree, camera, np.where(near, np.nan, background), gap, max(LEAST_ERROR_M, deviation))
+    return Scene(points, tree, camera, np.where(near, np.nan, background), gap, max(MIN_ERROR_M, deviation))
 
 
 def _starts(scene: Scene, samples: Samples) -> list[Pose]:
@@ -238,7 +238,7 @@ def _check(match: Match, samples: Samples, scene: Scene, deviation: float) -> No
     """DetectionError if the surface does not fit."""
     errors = np.sort(match.errors)[: max(int(0.9 * len(match.errors)), 1)]
     error = float(np.sqrt(np.mean(errors**2))) if len(errors) else np.inf
-    limit = max(LEAST_ERROR_M, ERROR_DEVIATIONS * deviation)
+    limit = max(MIN_ERROR_M, ERROR_DEVIATIONS * deviation)
     if error <= limit and max(match.beside, match.before) <= LARGEST_SHARE:
         return
     raise DetectionError(

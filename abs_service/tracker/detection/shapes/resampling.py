@@ -12,7 +12,7 @@ from abs_service.tracker.detection.shapes.samples import farthest_first
 from abs_service.tracker.mesh import Mesh, area_vectors, edge_lengths
 
 #: Vertices are chosen among so many; more are slower and no better.
-MOST_CANDIDATES = 12_000
+MAX_CANDIDATES = 12_000
 
 #: Turned away from each other, two points count as this many spacings apart, so that both sides of a thin body have
 #: vertices.
@@ -21,7 +21,7 @@ SIDES_APART = 1.0
 
 def evenly_spread(mesh: Mesh, count: int) -> NDArray[np.intp]:
     """Indices of `count` vertices of a mesh, evenly spread, the first k for any k."""
-    among = np.random.default_rng(0).permutation(len(mesh.vertices))[:MOST_CANDIDATES]
+    among = np.random.default_rng(0).permutation(len(mesh.vertices))[:MAX_CANDIDATES]
     return among[farthest_first(_places(mesh, count)[among], count)]
 
 

@@ -13,7 +13,7 @@ from calib.pose import Pose
 
 #: A mesh is flat if its thickness is at most this share of its long side, and a rectangle if its area is at least this
 #: share of that of the rectangle around it.
-FLAT, LEAST_AREA = 0.005, 0.98
+FLAT, MIN_AREA = 0.005, 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def rectangle_of(mesh: Mesh) -> Sheet | None:
     """The flat rectangle that a mesh covers, its z axis against the normals of the mesh; None if it is none."""
     center, axes = principal_axes(mesh.vertices)
     width, height, thickness = np.ptp((mesh.vertices - center) @ axes, axis=0).tolist()
-    if thickness > FLAT * width or mesh.area < LEAST_AREA * width * height:
+    if thickness > FLAT * width or mesh.area < MIN_AREA * width * height:
         return None
     z = -np.sign(axes[:, 2] @ mesh.normals.sum(axis=0)) * axes[:, 2]
     T_rp = np.eye(4)

@@ -188,9 +188,9 @@ def load_deviation(elastica: FittedElastica, flat: NDArray[np.float64]) -> float
     """Standard deviation of the logarithm of a fitted elastica's load, from the scatter of its points (n, 2)."""
     steps = STEP * np.eye(3)
     ahead, back = ([_changed(elastica, sign * step).unroll(flat)[1] for step in steps] for sign in (1, -1))
-    slopes = (np.array(ahead) - np.array(back)) / (2 * STEP)
+    jacobian = (np.array(ahead) - np.array(back)) / (2 * STEP)
     scatter = 1.4826 * np.median(np.abs(elastica.unroll(flat)[1]))  # robust σ from the MAD
-    return float(scatter * np.sqrt(np.linalg.inv(slopes @ slopes.T)[2, 2]))
+    return float(scatter * np.sqrt(np.linalg.inv(jacobian @ jacobian.T)[2, 2]))
 
 
 def _changed(elastica: FittedElastica, by: NDArray[np.float64]) -> FittedElastica:

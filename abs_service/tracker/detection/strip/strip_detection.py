@@ -25,13 +25,13 @@ from calib.camera import Camera
 from calib.pose import Pose
 
 #: Minimum number of pixels for a fit, and the maximum that are used.
-LEAST_PIXELS, MOST_PIXELS = 100, 1500
+MIN_PIXELS, MAX_PIXELS = 100, 1500
 
 #: Pixels farther beyond an end than this share of the length are outliers.
 LARGEST_OVERHANG = 0.08
 
 #: Minimum share of the pixels on one elastica for the object to be a strip.
-LEAST_SHARE = 0.7
+MIN_SHARE = 0.7
 
 #: Largest relative difference between the given and the detected length.
 LENGTH_TOLERANCE = 0.2
@@ -45,7 +45,7 @@ RIM_SHARE = 0.05
 #: Lower bound of the cosine of incidence by which a pixel's area on the strip is divided. Mixed pixels at an end lie on
 #: the curve's extrapolation, which may turn away from the camera: without the bound, their area lengthened the strip by
 #: a fifth.
-LEAST_COSINE = 0.5
+MIN_COSINE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +101,9 @@ def find_strip(detection: InitialDetection, gravity: Vector, towards_gripper: Ve
         DetectionError: too little is visible, or the object is not a strip.
     """
     seen = detection.points
-    if len(seen) < LEAST_PIXELS:
-        raise DetectionError(f"the strip is too small in the depth image: {len(seen)} pixels, {LEAST_PIXELS} needed")
-    seen = seen[:: -(-len(seen) // MOST_PIXELS)]
+    if len(seen) < MIN_PIXELS:
+        raise DetectionError(f"the strip is too small in the depth image: {len(seen)} pixels, {MIN_PIXELS} needed")
+    seen = seen[:: -(-len(seen) // MAX_PIXELS)]
     plane = find_plane(seen, gravity)
     elastica = first_guess(plane.coordinates(seen)[1], np.array([plane.ahead, plane.down]) @ towards_gripper)
     points = np.concatenate([seen, detection.beside(RIM_PX)])
@@ -167,9 +167,9 @@ def _check(size: tuple[float, float], length: float, share: float) -> None:
     Raises:
         DetectionError: it is wider than long, not of the given length [m] (0: not given), or not an elastica.
     """
-    if share < LEAST_SHARE:
+    if share < MIN_SHARE:
         raise DetectionError(
-            f"the object hangs like no strip: {share:.0%} of it lie on one curve, {LEAST_SHARE:.0%} needed"
+            f"the object hangs like no strip: {share:.0%} of it lie on one curve, {MIN_SHARE:.0%} needed"
         )
     if size[1] > size[0]:
         raise DetectionError(f"the object is no strip: it is {size[0]:.3f} m long, but {size[1]:.3f} m wide")
@@ -184,7 +184,7 @@ def _pixel_sizes(sight: NDArray[np.float64], normals: NDArray[np.float64], focal
     """Footprint (n,) of each pixel along and across the strip [m]; `sight` points from the camera to the points."""
     distance = np.linalg.norm(sight, axis=1)
     cosine = np.abs(np.sum(normals * sight, axis=1)) / distance
-    return distance / focal / np.maximum(cosine, LEAST_COSINE), distance / focal
+    return distance / focal / np.maximum(cosine, MIN_COSINE), distance / focal
 
 
 def _extent(coordinate: Vector, size: Vector, other_size: Vector) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""Templates: what is known of the object's shape before it is seen; one module each, named by `type`."""
+"""Templates: shapes that are known before the object is seen; one module each, named by `type`."""

@@ -45,7 +45,7 @@ class Sight(Protocol):
         ...
 
     def colors(self, mesh: Mesh) -> NDArray[np.float32]:
-        """Red, green and blue (n, 3) of the vertices by the template; NaN where it says nothing."""
+        """Red, green and blue (n, 3) of the vertices by the template; NaN where unknown."""
         ...
 
 
@@ -67,10 +67,10 @@ ALL_SEEN = AllSeen()
 
 
 class Template(Protocol):
-    """Makes the model of a detected object from what is known of its shape."""
+    """Makes the model of a detected object from its known shape."""
 
     def bind(self, model: ModelSettings[Model_co], detection: InitialDetection) -> tuple[Model_co, Sight]:
-        """The model, at rest where the object is in the detection, and what is known of its appearance.
+        """The model, at rest in the detected pose, and its known appearance.
 
         Raises:
             DetectionError: the object is not that of the template, or the model finds no object of its kind.

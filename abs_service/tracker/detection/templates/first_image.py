@@ -19,5 +19,5 @@ class FirstImage:
     """The model builds its mesh from the pixels of the object."""
 
     def bind(self, model: ModelSettings[Model_co], detection: InitialDetection) -> tuple[Model_co, Sight]:
-        """The model of what the detection shows."""
+        """The model of the detected surface."""
         return model.build(detection), ALL_SEEN

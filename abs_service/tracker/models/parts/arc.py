@@ -18,15 +18,15 @@ def arc(bend: ArrayLike) -> tuple[NDArray[np.complex128], NDArray[np.complex128]
     Both have the shape (…) of the bend [rad].
     """
     bends = np.asarray(bend, np.float64)
-    end, slope = np.empty(bends.shape, np.complex128), np.empty(bends.shape, np.complex128)
-    _ends(bends.reshape(-1), end.reshape(-1), slope.reshape(-1))
-    return end, slope
+    end, derivative = np.empty(bends.shape, np.complex128), np.empty(bends.shape, np.complex128)
+    _ends(bends.reshape(-1), end.reshape(-1), derivative.reshape(-1))
+    return end, derivative
 
 
 @kernel
-def _ends(bends: NDArray[np.float64], ends: NDArray[np.complex128], slopes: NDArray[np.complex128]) -> None:
+def _ends(bends: NDArray[np.float64], ends: NDArray[np.complex128], derivatives: NDArray[np.complex128]) -> None:
     for k in range(bends.size):
-        ends[k], slopes[k] = end_of(bends[k])
+        ends[k], derivatives[k] = end_of(bends[k])
 
 
 @kernel

@@ -40,23 +40,23 @@ class Series:
     scale: float
 
 
-def fit(reach: float, least_radius: float) -> Series:
+def fit(reach: float, minimum_radius: float) -> Series:
     """Polynomials that interpolate both functions over the range of possible bends.
 
     Args:
         reach: largest distance of a vertex from the centre [m].
-        least_radius: radius at a parameter of `FULL` [m].
+        minimum_radius: radius at a parameter of `FULL` [m].
 
     Raises:
         ModelError: the sheet would roll up by too many turns.
     """
-    turns = reach / least_radius / (2 * np.pi)
+    turns = reach / minimum_radius / (2 * np.pi)
     limit = next((limit for limit in DEGREES if turns <= limit), None)
     if limit is None:
         most = max(DEGREES)
         raise ModelError(
-            f"least_radius_m = {least_radius:g} would roll up a sheet that reaches {reach:.3g} m from its centre by "
-            f"{turns:.1f} turns; {most:g} are allowed, so least_radius_m must be at least {_above(reach, most):g}"
+            f"minimum_radius_m = {minimum_radius:g} would roll up a sheet that reaches {reach:.3g} m from its centre "
+            f"by {turns:.1f} turns; {most:g} are allowed, so minimum_radius_m must be at least {_above(reach, most):g}"
         )
     largest = 2 * np.pi * limit
     powers = [
@@ -133,7 +133,7 @@ def roll(
 
 
 @kernel
-def slopes(
+def bend_jacobian(
     parameters: NDArray[np.float64],
     height: float,
     full_height: float,

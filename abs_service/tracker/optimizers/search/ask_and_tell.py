@@ -85,7 +85,7 @@ class AskAndTellSettings:
         population: candidates per generation; 0: 4 + 3 ln dim, the default of CMA-ES.
         generations: maximum number of generations per frame.
         step: initial standard deviation of the candidates, in posterior deviations of the parameters.
-        least_step: minimum step size at the start of a frame, so that the search can follow motion.
+        minimum_step: minimum step size at the start of a frame, so that the search can follow motion.
         tolerance: the search has converged when costs differ by less than this [nats], within a generation and between
             the minima of five.
         restarts: maximum number of times that the population doubles in the first frame.
@@ -94,7 +94,7 @@ class AskAndTellSettings:
     population: Annotated[int, Ge(0)] = 0
     generations: Annotated[int, Ge(1)] = 20
     step: Annotated[float, Gt(0)] = 1.0
-    least_step: Annotated[float, Gt(0)] = 0.5
+    minimum_step: Annotated[float, Gt(0)] = 0.5
     tolerance: Annotated[float, Gt(0)] = 0.5
     restarts: Annotated[int, Ge(0)] = 3
 

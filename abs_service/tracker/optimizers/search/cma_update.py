@@ -124,12 +124,12 @@ def update_distribution(
         for j in range(n):
             mean[j] += by * axis[j]
     length = np.sqrt(square) / expected_length
-    usual = length / np.sqrt(1 - (1 - c_sigma) ** (2 * generation)) < 1.4 + 2 / (n + 1)
-    gain = np.sqrt(c_c * (2 - c_c) * mu_eff) if usual else 0.0
+    h_sigma = length / np.sqrt(1 - (1 - c_sigma) ** (2 * generation)) < 1.4 + 2 / (n + 1)
+    gain = np.sqrt(c_c * (2 - c_c) * mu_eff) if h_sigma else 0.0
     for i in range(n):
         p_c[i] = (1 - c_c) * p_c[i] + gain * z_mean[i]
         ranked[population, i] = p_c[i]
-    decay = 1 - c_1 - c_mu * weights.sum() + (0.0 if usual else c_1 * c_c * (2 - c_c))
+    decay = 1 - c_1 - c_mu * weights.sum() + (0.0 if h_sigma else c_1 * c_c * (2 - c_c))
     _learn(ranked, weights, decay, c_1, c_mu, learnt)
     return sigma * np.exp(min(1.0, c_sigma / d_sigma * (length - 1)))
 

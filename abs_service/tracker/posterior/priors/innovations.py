@@ -21,7 +21,7 @@ class Innovations:
     Attributes:
         variance: mean squared innovation [m²/s²].
         repeated: mean product of two successive innovations [m²/s²].
-        lasting: largest product of two successive innovations lately, at least 0 [m²/s²].
+        lasting: largest recent product of two successive innovations, at least 0 [m²/s²].
         squared_speed: mean squared speed [m²/s²].
     """
 

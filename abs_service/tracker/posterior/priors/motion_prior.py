@@ -73,12 +73,12 @@ class MotionPrior:
 
     @property
     def unpredicted(self) -> NDArray[np.float64]:
-        """Covariance (dim, dim) of the motion between two frames that was not predicted, lately."""
+        """Covariance (dim, dim) of the unpredicted motion between two frames, averaged over the last frames."""
         return self._elapsed_s**2 * self._innovations.motion_variance * self._metric.inverse
 
     @property
     def unseen(self) -> NDArray[np.float64]:
-        """Covariance (dim, dim) of a motion between two frames that nothing shows: wider than those seen lately."""
+        """Covariance (dim, dim) of an unobserved motion between two frames, wider than the mean observed one."""
         return (MARGIN * self._elapsed_s) ** 2 * self._innovations.squared_speed * self._metric.inverse
 
     @property

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from abs_service.tracker.synthesis.window import Window
 
 #: A connected area of missing returns is background if it shares so many pixels with that of the first image.
-LEAST_PIXELS = 10
+MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are a hole all the same: the object does not move as far between
 #: two frames [m].
@@ -61,8 +61,8 @@ class Background:
             near = cv2.dilate(expected.view(np.uint8), np.ones((2 * MARGIN_PX + 1, 2 * MARGIN_PX + 1)))
             self._empty = np.zeros(shape[:2], np.bool_)
             self._empty[window] = missing & (near == 0)
-        usual = self._empty[window]
+        empty = self._empty[window]
         count, labels = cv2.connectedComponents(missing.view(np.uint8), connectivity=4)
-        shared = np.bincount(labels[usual & missing], minlength=count)
+        shared = np.bincount(labels[empty & missing], minlength=count)
         shared[0] = 0
-        return (shared >= LEAST_PIXELS)[np.asarray(labels, np.intp)]
+        return (shared >= MIN_PIXELS)[np.asarray(labels, np.intp)]

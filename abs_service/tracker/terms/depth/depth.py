@@ -30,7 +30,7 @@ from calib.camera import Camera
 from calib.noise.base import DepthNoise, write_texture
 
 #: Nearer to the object than this, a sample in free space is pulled back no more stiffly [m].
-LEAST_FREE_M = 0.005
+MIN_FREE_M = 0.005
 
 
 #: A measurement that is farther from its vertex is no measurement of the object [m].
@@ -174,7 +174,7 @@ class DepthTerm:
             return PointLinearization(*NO_ROWS, samples, np.zeros((0, 3)))
         vertices = self._view.spread(surface, surface.vertices[0].T)
         distances = np.ascontiguousarray(self._free_m[1:-1, 1:-1, None])
-        weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], LEAST_FREE_M))
+        weight = 1 / np.sqrt(FREE_SCALE_M * np.maximum(away[out], MIN_FREE_M))
         rows = color_rows(distances, self._view.camera, vertices[out])[:, 0] * weight[:, None]
         return PointLinearization(away[out] * weight, rows, np.flatnonzero(out), samples, vertices)
 

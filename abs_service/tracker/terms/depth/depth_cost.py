@@ -113,7 +113,7 @@ def depth_cost(
 
     Args:
         pixel, distance: of the samples (population, n), see `Synthesis`.
-        missing: what a missing return costs each sample (population or 1, n).
+        missing: cost of a missing return for each sample (population or 1, n).
         texture: texels (pixels, 8).
         inlier, outlier: see `Bounds`.
         out: costs (population,).

@@ -1,4 +1,4 @@
-"""Classes of a mesh's rim in the first depth image, without a term: what the outline of a tracker begins with."""
+"""Classes of a mesh's rim in the first depth image, without a term: initial classes of a tracker's outline."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service.tracker.models.base import SparseJacobian, Surface
-from abs_service.tracker.synthesis.perspective import project_with_slopes
+from abs_service.tracker.synthesis.perspective import project_with_jacobian
 from abs_service.tracker.synthesis.projection import Projection
 from abs_service.tracker.synthesis.window import WHOLE, Window, corner
 from abs_service.tracker.terms.base import RimFit
@@ -145,8 +145,8 @@ class RimOutline:
         part, self._inwards = inwards(distance, seen, int(np.ceil(FARTHEST * self._deviation)) + 1)
         self._corner = np.add(corner(window), corner(part))[::-1].astype(np.float32)
         if not self._begun:
-            points, values, slopes = self._locate(predicted)
-            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, points, values, slopes)
+            points, values, gradients = self._locate(predicted)
+            self.classes, self._beyond = classify_rim(self._camera, self._rim, predicted, points, values, gradients)
             self._begun = True
         free = np.flatnonzero(self.classes == RimClass.FREE)
         visible = free[~self._is_hidden(free, expected, predicted, window)]
@@ -165,16 +165,16 @@ class RimOutline:
 
     def linearize(self, surface: Surface, sparse_jacobian: SparseJacobian) -> Linearization:
         """Normalised residuals of the free edges near the outline, and their derivatives with respect to theta."""
-        points, values, slopes = self._locate(surface)
+        points, values, gradients = self._locate(surface)
         residual = values / self._deviation
         use = np.flatnonzero(np.abs(residual) < FARTHEST)
-        by_place = project_with_slopes(self._camera, points[use].astype(np.float64))[1]
-        rows = np.einsum("vi,vij->vj", slopes[use] / self._deviation, by_place)
+        by_place = project_with_jacobian(self._camera, points[use].astype(np.float64))[1]
+        rows = np.einsum("vi,vij->vj", gradients[use] / self._deviation, by_place)
         outer, inner, beyond = self._ends
         jacobian = np.zeros((len(use), sparse_jacobian.dimension))
         of_points = sparse_jacobian.group, sparse_jacobian.parameters, sparse_jacobian.local
         chain(rows, outer[use], inner[use], beyond[use], *of_points, jacobian)
-        shared = shared_by_side(jacobian, residual[use], slopes[use])
+        shared = shared_by_side(jacobian, residual[use], gradients[use])
         return Linearization(residual[use], jacobian, positions=points[use], shared=shared)
 
     def fit(self, surface: Surface) -> RimFit:
@@ -201,7 +201,7 @@ class RimOutline:
 
     def _inside_at(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance inside the outline (k,) of points (k, 3) [px]: −∞ far outside, NaN if unknown."""
-        pixels = np.nan_to_num(project_with_slopes(self._camera, points)[0], nan=-1e6)
+        pixels = np.nan_to_num(project_with_jacobian(self._camera, points)[0], nan=-1e6)
         place = np.floor(pixels - self._corner + 0.5)
         rows, columns = self._inwards.shape
         near = np.all((place >= 0) & (place < (columns, rows)), axis=1)
@@ -219,16 +219,16 @@ class RimOutline:
     def _locate(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]:
         """Extrapolated rim (k, 3) [m], its distances inside the outline (k,) [px], and their image gradients (k, 2)."""
         k = len(self._ends[0])
-        points, values, slopes = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
-        locate(surface.vertices, *self._arguments, points, values, slopes)
-        return points[0].T, values, slopes
+        points, values, gradients = np.empty((1, 3, k), np.float32), np.empty(k), np.empty((k, 2))
+        locate(surface.vertices, *self._arguments, points, values, gradients)
+        return points[0].T, values, gradients
 
     def _is_hidden(
         self, which: NDArray[np.intp], expected: NDArray[np.float32], predicted: Surface, window: Window
     ) -> NDArray[np.bool_]:
         """True for outer vertices (m,) that lie behind the predicted surface (rows, columns) [m]."""
         points = predicted.vertices[0].T[self._rim.outer[which]].astype(np.float64)
-        pixels = np.nan_to_num(project_with_slopes(self._camera, points)[0], nan=-1.0)
+        pixels = np.nan_to_num(project_with_jacobian(self._camera, points)[0], nan=-1.0)
         place = np.floor(pixels + 0.5).astype(np.intp)
         column, row = (place - corner(window)[::-1]).T
         inside = (row >= 0) & (row < expected.shape[0]) & (column >= 0) & (column < expected.shape[1])

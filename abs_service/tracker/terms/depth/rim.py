@@ -26,7 +26,7 @@ class Rim:
 
     @classmethod
     def of(cls, mesh: Mesh) -> "Rim":
-        """The rim of a mesh: what is on an edge of one face only."""
+        """The rim of a mesh: vertices on an edge of one face only."""
         sides = np.sort(np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]), axis=1)
         edges, count = np.unique(sides, axis=0, return_counts=True)
         outside = np.zeros(len(mesh.vertices), np.bool_)
@@ -41,12 +41,15 @@ class Rim:
 
 @kernel
 def look_up(
-    image: NDArray[np.float32], places: NDArray[np.floating], values: NDArray[np.float64], slopes: NDArray[np.float64]
+    image: NDArray[np.float32],
+    places: NDArray[np.floating],
+    values: NDArray[np.float64],
+    gradients: NDArray[np.float64],
 ) -> None:
-    """Values (n,) and slopes (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and at NaN."""
+    """Values (n,) and gradients (n, 2) of an image at places (n, 2), bilinear; huge and level beyond it and at NaN."""
     height, width = image.shape
     for k in range(places.shape[0]):
-        values[k], slopes[k, 0], slopes[k, 1] = 1e9, 0.0, 0.0
+        values[k], gradients[k, 0], gradients[k, 1] = 1e9, 0.0, 0.0
         u, v = places[k, 0], places[k, 1]
         if not (u >= 0 and v >= 0 and u < width - 1 and v < height - 1):
             continue
@@ -57,8 +60,8 @@ def look_up(
         if np.isnan(a) or np.isnan(b) or np.isnan(c) or np.isnan(d):
             continue
         values[k] = (1 - g) * ((1 - f) * a + f * b) + g * ((1 - f) * c + f * d)
-        slopes[k, 0] = (1 - g) * (b - a) + g * (d - c)
-        slopes[k, 1] = (1 - f) * (c - a) + f * (d - b)
+        gradients[k, 0] = (1 - g) * (b - a) + g * (d - c)
+        gradients[k, 1] = (1 - f) * (c - a) + f * (d - b)
 
 
 @kernel
@@ -104,7 +107,7 @@ def locate(
     inwards: NDArray[np.float32],
     points: NDArray[np.float32],
     values: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    gradients: NDArray[np.float64],
 ) -> None:
     """Extrapolated rim of one candidate, and its distances inside the outline.
 
@@ -115,7 +118,7 @@ def locate(
         corner: column and row of the image's first pixel (2,).
         inwards: distances (rows, columns) [px].
         points: extrapolated rim (1, 3, k) [m].
-        values, slopes: as in `look_up`.
+        values, gradients: as in `look_up`.
     """
     k = outer.size
     places, inverse_z = np.empty((1, k, 2), np.float32), np.empty((1, k), np.float32)
@@ -129,11 +132,11 @@ def locate(
         unknown = np.isnan(inverse_z[0, v])
         for i in range(2):
             places[0, v, i] = np.float32(np.nan) if unknown else places[0, v, i] - corner[i]
-    look_up(inwards, places[0], values, slopes)
+    look_up(inwards, places[0], values, gradients)
 
 
 def shared_by_side(
-    jacobian: NDArray[np.float64], residual: NDArray[np.float64], slopes: NDArray[np.float64]
+    jacobian: NDArray[np.float64], residual: NDArray[np.float64], gradients: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Sums (4, dim) of the rows (k, dim) of edges that face one side of the image, times their shared deviation.
 
@@ -142,9 +145,9 @@ def shared_by_side(
 
     Args:
         jacobian, residual: of the free edges.
-        slopes: image gradients (k, 2) of their distances from the outline, which tell the side.
+        gradients: image gradients (k, 2) of their distances from the outline, which tell the side.
     """
-    quarter = np.floor(np.arctan2(slopes[:, 1], slopes[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
+    quarter = np.floor(np.arctan2(gradients[:, 1], gradients[:, 0]) / (np.pi / 2) + 0.5).astype(np.intp) % 4
     sides = quarter == np.arange(4)[:, None]
     mean_square = sides @ residual**2 / np.maximum(sides.sum(axis=1), 1)
     return np.sqrt(np.maximum(mean_square, 1.0))[:, None] * (sides @ jacobian)

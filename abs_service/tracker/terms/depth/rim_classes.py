@@ -14,7 +14,7 @@ LARGEST_GAP_STEPS = 2.0
 
 #: A surface that is seen at a smaller cosine at its rim turns away from the sensor: the outline is a silhouette, which
 #: wanders over a body as it turns, not the end of a sheet.
-LEAST_COSINE = 0.25
+MIN_COSINE = 0.25
 
 #: Vertices within so many pixels of the image's border may continue beyond it.
 BORDER_PX = 2.0
@@ -36,7 +36,7 @@ def classify_rim(
     surface: Surface,
     points: NDArray[np.float32],
     inside: NDArray[np.float64],
-    slopes: NDArray[np.float64],
+    gradients: NDArray[np.float64],
 ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     """`RimClass` (k,) of the outer vertices, and the gap (k,) between them and the end of the object.
 
@@ -49,18 +49,18 @@ def classify_rim(
         surface: the mesh in the first image, a population of one.
         points: outermost vertices (k, 3) [m].
         inside: their distances inside the outline (k,) [px], huge where unknown.
-        slopes: image gradients of these distances (k, 2).
+        gradients: image gradients of these distances (k, 2).
     """
     inner = surface.vertices[0].T[rim.inner].astype(np.float64)
     # Extrapolated to the end of the surface, which lies about as far outside the outer vertex as the inner one inside.
     end_cosine = 2 * _cosine(camera, surface, rim.outer) - _cosine(camera, surface, rim.inner)
     place = camera.project(points.astype(np.float64))
-    per_step = -np.einsum("ki,ki->k", slopes, place - camera.project(inner))
+    per_step = -np.einsum("ki,ki->k", gradients, place - camera.project(inner))
     with np.errstate(divide="ignore", invalid="ignore"):
         beyond = np.where(per_step > 0, inside / per_step, np.inf)
     classes = np.full(len(beyond), RimClass.FREE, np.uint8)
     classes[~(beyond <= LARGEST_GAP_STEPS)] = RimClass.CONTACT
-    classes[end_cosine < LEAST_COSINE] = RimClass.SILHOUETTE
+    classes[end_cosine < MIN_COSINE] = RimClass.SILHOUETTE
     classes[inside > camera.width + camera.height] = RimClass.OCCLUDED
     last = np.array([camera.width, camera.height]) - 1
     classes[~np.all((place >= BORDER_PX) & (place <= last - BORDER_PX), axis=1)] = RimClass.BORDER

@@ -39,7 +39,7 @@ def _rim_cost(
 ) -> None:
     """Half the sum of squared, bounded distances of the rim from the outline in units of σ.
 
-    The distance is that of `rim.locate`, without its slopes.
+    The distance is that of `rim.locate`, without its gradients.
 
     Args:
         vertices: (population, 3, n) [m].

@@ -22,9 +22,9 @@ AGREEMENT_M = 0.03
 LARGEST_STEP_M = 0.04
 
 #: A connected surface is the object if at least this share of what it has on the expected place agrees …
-LEAST_SHARE = 0.3
+MIN_SHARE = 0.3
 #: … and so many pixels do.
-LEAST_PIXELS = 10
+MIN_PIXELS = 10
 
 #: Missing returns deeper inside the expected outline are holes in the measurement, with what is missing around them up
 #: to twice as far away; elsewhere, the outline itself may have moved [m].
@@ -103,7 +103,7 @@ def _recognize(
                 inside[label] += 1
                 agreeing[label] += 1 if abs(distance[row, column] - expected) < AGREEMENT_M else 0
     for label in range(1, is_object.size):
-        is_object[label] = agreeing[label] >= max(LEAST_PIXELS, LEAST_SHARE * inside[label])
+        is_object[label] = agreeing[label] >= max(MIN_PIXELS, MIN_SHARE * inside[label])
 
 
 @kernel

@@ -10,7 +10,7 @@ from abs_service.tracker.models.base import SparseJacobian, Surface
 from abs_service.tracker.synthesis.base import Synthesizer
 from abs_service.tracker.synthesis.window import NOTHING_HAS, Bordered, corner, limits
 from abs_service.tracker.terms.base import Bounds, SensorFit, facing, summarize
-from abs_service.tracker.terms.gradients import channel_slopes
+from abs_service.tracker.terms.gradients import channel_gradients
 from abs_service.tracker.terms.linearization import PointLinearization
 from abs_service.tracker.terms.photometric.channel_cost import (
     CHANNEL,
@@ -51,7 +51,7 @@ class ChannelTerm:
         noise: ImageNoise,
         illumination: Illumination,
         bounds: Bounds,
-        misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
+        registration_noise: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer
@@ -60,7 +60,7 @@ class ChannelTerm:
         self._shadow = Shadow(self._view.camera)
         self._noise = noise
         self._bounds = bounds
-        self._misplacement = misplacement
+        self._registration_noise = registration_noise
         self._widening = NO_WIDENING
         self._image = np.zeros((1, 1, 4), np.float32)
         self._texels = np.zeros((0, 0, 4), np.float32)
@@ -85,7 +85,7 @@ class ChannelTerm:
         inverse = self._residuals(predicted)[1]
         with np.errstate(divide="ignore"):
             deviation = (1 / inverse)[:, None]
-        self._widening = self._misplacement.widening(self._view, predicted, deviation)
+        self._widening = self._registration_noise.widening(self._view, predicted, deviation)
 
     def foreground(self) -> NDArray[np.float64]:
         """No points: brightness carries no distance."""
@@ -116,8 +116,8 @@ class ChannelTerm:
         residual, inverse, normalizer = self._residuals(surface)
         use = 0.5 * residual**2 + normalizer < self._bounds.outlier
         vertices = self._view.spread(surface, surface.vertices[0].T)
-        slopes = self._slopes(surface)[use] * inverse[use, None]
-        rows = (slopes[:, None] @ self._view.camera.projection_jacobian(vertices[use]))[:, 0]
+        gradients = self._gradients(surface)[use] * inverse[use, None]
+        rows = (gradients[:, None] @ self._view.camera.projection_jacobian(vertices[use]))[:, 0]
         samples = self._view.follow(surface, sparse_jacobian)
         return PointLinearization(residual[use], rows, np.flatnonzero(use), samples, vertices)
 
@@ -136,7 +136,7 @@ class ChannelTerm:
         """Zero: brightness carries no distance."""
         return np.zeros((2, 1))
 
-    def _slopes(self, surface: Surface) -> NDArray[np.float64]:
+    def _gradients(self, surface: Surface) -> NDArray[np.float64]:
         """Image gradient of each sample in its pixel's channel, to the right and down (m, 2) [1/px].
 
         A mosaic shows each channel in every other pixel, too far apart to measure the slope of a fine texture. So it is
@@ -144,12 +144,14 @@ class ChannelTerm:
         """
         seen = self._view.synthesize(surface)
         channel = self._texture[seen.pixel[0], CHANNEL].astype(int)
-        own = self._view.slopes(surface)[np.arange(len(channel)), channel]
+        own = self._view.attribute_gradients(surface)[np.arange(len(channel)), channel]
         shining = self._illumination.shine(replace(seen, attributes=own.T[None]), surface, self._view)
-        slopes, unknown = shining.attributes[0].T.astype(np.float64), np.isnan(own).any(axis=1)
+        gradients, unknown = shining.attributes[0].T.astype(np.float64), np.isnan(own).any(axis=1)
         samples = self._view.spread(surface, surface.vertices[0].T.astype(np.float64))[unknown]
-        slopes[unknown] = channel_slopes(self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples)
-        return slopes
+        gradients[unknown] = channel_gradients(
+            self._image[..., VALUE], self._image[..., CHANNEL], self._view.camera, samples
+        )
+        return gradients
 
     def _residuals(self, surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Normalised residual, infinite without a measurement, inverse deviation, log of the normaliser, each (n,)."""

@@ -34,7 +34,7 @@ class ColorTerm:
         colors: NDArray[np.float32],
         noise: GaussianColor,
         bounds: Bounds,
-        misplacement: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
+        registration_noise: TextureRegistrationNoise = NO_REGISTRATION_NOISE,
     ):
         self.sensor = sensor
         self._synthesizer = synthesizer
@@ -43,7 +43,7 @@ class ColorTerm:
         self._bounds = bounds
         self._sigma = np.array([[noise.sigma]], np.float32)
         self._constant = bounds.inlier + 3 * (np.log(noise.sigma) + LOG_SQRT_2PI)
-        self._misplacement = misplacement
+        self._registration_noise = registration_noise
         self._inverse = np.zeros((0, 3), np.float32)
         self._normalizer = np.zeros(0, np.float32)
         self._texture = np.zeros((0, 3), np.float32)
@@ -64,7 +64,7 @@ class ColorTerm:
         self._bordered.inside[:] = self._image[window]
         self._texture = texture.reshape(-1, 3)
         self._view.look(predicted)
-        widening = self._misplacement.widening(self._view, predicted, self._sigma)
+        widening = self._registration_noise.widening(self._view, predicted, self._sigma)
         self._inverse = np.repeat(
             np.float32(1) / (self._sigma * widening.factor), 3 // widening.factor.shape[1], axis=1
         )

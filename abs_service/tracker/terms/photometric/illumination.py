@@ -55,7 +55,7 @@ def lambert(surface: Surface, center: NDArray[np.floating]) -> NDArray[np.float3
 def _lambert(
     vertices: NDArray[np.float32], normals: NDArray[np.float32], center: NDArray[np.float32], shade: NDArray[np.float32]
 ) -> None:
-    """Lambert's law with the lamp at the centre; what faces away is dark."""
+    """Lambert's law with the lamp at the centre; surfaces that face away are dark."""
     x, y, z = center
     for k in range(vertices.shape[0]):
         for v in range(vertices.shape[2]):

@@ -44,10 +44,10 @@ class TextureRegistrationNoise:
             predicted: the predicted mesh, a population of one.
             deviation: the sensor's own standard deviation of every sample, broadcastable to (m, channels).
         """
-        slopes = view.slopes(predicted)
-        if self.px == 0 or np.isnan(slopes).all():  # the samples of a dense view differ from candidate to candidate
+        gradients = view.attribute_gradients(predicted)
+        if self.px == 0 or np.isnan(gradients).all():  # the samples of a dense view differ from candidate to candidate
             return NO_WIDENING
-        square = np.nan_to_num(np.einsum("nci,nci->nc", slopes, slopes))
+        square = np.nan_to_num(np.einsum("nci,nci->nc", gradients, gradients))
         variance = 1 + square * np.float32(self.px**2) / np.square(deviation, dtype=np.float32)
         return Widening(np.sqrt(variance), np.float32(0.5) * np.log(variance))
 

@@ -66,7 +66,7 @@ def known(values: Values, others: Values) -> Values:
 
 
 def mean_of_known(parts: Sequence[Values], shape: tuple[int, int]) -> Values:
-    """Mean of what is known; NaN where nothing is."""
+    """Mean of the known values; NaN without any."""
     total, count = np.zeros(shape), np.zeros(shape)
     for part in parts:
         there = np.isfinite(part)

@@ -1,4 +1,4 @@
-"""What the name of a certificate allows, on real sessions with mutual TLS."""
+"""Access rights by the name of a certificate, on real sessions with mutual TLS."""
 
 import logging
 import time
@@ -12,10 +12,11 @@ from abs_service.bus import keys as topics
 from abs_service.bus.contract import EVENTS, STATE
 from abs_service.bus.health import Health
 from abs_service.bus.security import roles
-from abs_service.bus.session import Role
+from abs_service.bus.session import Role, open_session
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.wire import commands
 from tests.abs_service.bus.loopback import LoopbackBus
+from tests.conftest import encrypted, mutual_tls
 from tests.waiting import eventually
 
 CLIENTS = sorted(roles.PUBLISHES)
@@ -93,12 +94,12 @@ def test_all_but_capture_read_everything(name, rig, secured):
     sender.answer_queries("config", "m", lambda: b"toml")
     assert eventually(lambda: bool(rig.query("config", 1.0)))
 
-    def heard():
+    def complete():
         for publisher in publishers:
             publisher.put(b"")
         return {sample.topic for sample in (arrived if name in roles.READERS else control)} == set(PUBLISHERS)
 
-    assert eventually(heard)
+    assert eventually(complete)
     assert bool(arrived) == bool(client.query("config", 1.0)) == (name in roles.READERS)
 
 
@@ -116,19 +117,20 @@ def test_of_fifty_forged_estimates_none_arrives(rig, secured):
     assert {sample.payload[:4] for sample in arrived} == {b"true"}
 
 
-def test_late_joiners_get_the_history_of_estimates(rig, secured):
-    tracker, reader = secured("tracker"), secured("viewer")
-    publisher = tracker.publisher("sheet/state", "m", STATE)
+def test_late_joiners_get_the_history_of_estimates(rig, secured, keys, endpoint):
+    publisher = secured("tracker").publisher("sheet/state", "m", STATE)
     publisher.put(b"before")
     arrived = []
+    session = open_session(encrypted(endpoint), Role.CLIENT, security=mutual_tls(keys, "viewer"))
     subscriber = ext.declare_advanced_subscriber(
-        reader._session,
+        session,
         "abs/demo/sheet/state",
         lambda sample: arrived.append(sample.payload.to_bytes()),
         history=ext.HistoryConfig(detect_late_publishers=True),
     )
     assert eventually(lambda: arrived == [b"before"])
     subscriber.undeclare()
+    session.close()
 
 
 def test_liveliness_tokens_are_those_of_the_names(rig, secured):

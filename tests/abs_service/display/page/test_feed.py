@@ -1,4 +1,4 @@
-"""What the page knows of a rig."""
+"""The page's copy of a rig's state, fed from the bus."""
 
 import numpy as np
 from absmsg.v1.deformation_state_pb2 import DeformationState

@@ -22,8 +22,12 @@ def test_a_mistake_is_explained(tmp_path):
 
 @pytest.mark.parametrize("number", [errno.EROFS, errno.ENOSPC, errno.EIO])
 def test_a_disk_that_has_a_problem_does_not_keep_a_rig_from_tracking(number, tmp_path, monkeypatch):
+    tried = []
+
     def refuse(dir):  # noqa: A002 - the library's name
+        tried.append(dir)
         raise OSError(number, "of the disk")
 
     monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
     folder.check(tmp_path)
+    assert tried == [tmp_path]

@@ -1,4 +1,4 @@
-"""What is deleted of a folder of recordings, and what never is."""
+"""Retention deletes the oldest recordings of a folder, and some files never."""
 
 import math
 import os

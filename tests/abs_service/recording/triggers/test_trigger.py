@@ -33,13 +33,18 @@ class Clock:
 class Waiting(Rig):
     """A rig whose recorder waits for a trigger and holds 2 s."""
 
-    def __init__(self, directory, monkeypatch, watches_status=False, post_roll_s=3.0, pre_roll_bytes=MANY, **settings):
+    def __init__(self, directory, watches_status=False, post_roll_s=3.0, pre_roll_bytes=MANY, **settings):
         self.time = Clock()
         trigger = Asked(watches_status, post_roll_s, self.time)
         super().__init__(
-            directory, trigger=trigger, pre_roll_s=2.0, pre_roll_bytes=pre_roll_bytes, flush_s=0.005, **settings
+            directory,
+            trigger=trigger,
+            monotonic=self.time,
+            pre_roll_s=2.0,
+            pre_roll_bytes=pre_roll_bytes,
+            flush_s=0.005,
+            **settings,
         )
-        monkeypatch.setattr(self.recorder._pre_roll, "_clock", self.time)
         commands.answer_record(self.bus, self.headers, self.health, self.recorder.ask)
         self.recorder.start()
 
@@ -57,17 +62,17 @@ class Waiting(Rig):
         self.bus.deliver(Sample(keys.state("sheet"), state.DESCRIPTOR.full_name, state.SerializeToString()))
 
     @property
-    def told(self):
+    def reported(self):
         self.recorder.report()
         return self.said
 
 
 @pytest.fixture
-def waiting(tmp_path, monkeypatch):
+def waiting(tmp_path):
     made = []
 
     def make(**settings):
-        rig = Waiting(tmp_path, monkeypatch, **settings)
+        rig = Waiting(tmp_path, **settings)
         made.append(rig)
         return rig
 
@@ -79,15 +84,15 @@ def waiting(tmp_path, monkeypatch):
 def test_nothing_is_written_until_it_is_asked_for_and_then_the_seconds_before_as_well(waiting, tmp_path):
     rig = waiting()
     rig.images(range(10))
-    assert rig.told.labels["trigger"] == "waits, and holds the last 2 s"
+    assert rig.reported.labels["trigger"] == "waits, and holds the last 2 s"
     assert not list(tmp_path.iterdir())
     assert rig.ask(True).accepted
     rig.images(range(10, 13))
-    assert rig.told.labels["trigger"] == "asked for"
+    assert rig.reported.labels["trigger"] == "asked for"
     assert rig.ask(False).accepted
     rig.images(range(13, 20))
     assert eventually(lambda: recordings(tmp_path))
-    assert rig.told.labels["file"] == ""
+    assert rig.reported.labels["file"] == ""
     assert sequences(tmp_path) == [7, 8, 9, 10, 11, 12]
     said = metadata(recordings(tmp_path)[0])
     assert said["ended"] == "trigger"
@@ -103,7 +108,7 @@ def test_pauses_between_recordings_are_no_losses(waiting, tmp_path):
         assert rig.ask(False).accepted
         assert eventually(lambda begin=begin: len(recordings(tmp_path)) == 1 + bool(begin))
     assert sequences(tmp_path) == [2, 3, 4, 5, 6, 102, 103, 104, 105, 106]
-    assert not any(name.startswith("missing") for name in rig.told.counters)
+    assert not any(name.startswith("missing") for name in rig.reported.counters)
 
 
 def test_what_was_announced_long_before_is_in_each_recording(waiting, tmp_path):
@@ -126,7 +131,7 @@ def test_a_tracker_that_leaves_tracking_is_recorded_for_some_time(waiting, tmp_p
     rig.images(range(5, 10))
     assert not list(tmp_path.iterdir())
     rig.track(status)
-    assert rig.told.labels["trigger"] == f"sheet was {DeformationState.Status.Name(status)[7:]}"
+    assert rig.reported.labels["trigger"] == f"sheet was {DeformationState.Status.Name(status)[7:]}"
     rig.images(range(10, 13))  # the last of them as late as the end
     assert eventually(lambda: recordings(tmp_path))
     assert sequences(tmp_path) == [7, 8, 9, 10, 11]
@@ -146,16 +151,16 @@ def test_what_memory_does_not_hold_is_counted_and_said(waiting, tmp_path):
     rig = waiting(pre_roll_bytes=room)
     for seq in range(8):
         rig.publish_image(depth(seq))  # all at once
-    told = rig.told
-    assert told.counters["pre_roll_dropped"] == 6
-    assert told.gauges["pre_roll_bytes"] <= room
-    assert (told.level, told.message[:25]) == (Health.LEVEL_WARNING, "record.pre_roll_bytes hol")
+    reported = rig.reported
+    assert reported.counters["pre_roll_dropped"] == 6
+    assert reported.gauges["pre_roll_bytes"] <= room
+    assert (reported.level, reported.message[:25]) == (Health.LEVEL_WARNING, "record.pre_roll_bytes hol")
     rig.ask(True)
     rig.ask(False)
     assert eventually(lambda: recordings(tmp_path))
     assert sequences(tmp_path) in ([6, 7], [7])  # health takes room, too
     rig.recorder.report()  # once more, of what health has pushed out
-    assert rig.told.level == Health.LEVEL_OK
+    assert rig.reported.level == Health.LEVEL_OK
 
 
 def test_a_long_pre_roll_fits_into_the_queue(waiting, tmp_path):

@@ -6,7 +6,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from abs_service.pairing.images import ColorImage
-from abs_service.tracker.detection.grid_mesh import LEAST_VERTICES, grid_mesh
+from abs_service.tracker.detection.grid_mesh import MIN_VERTICES, grid_mesh
 from abs_service.tracker.detection.initial_detection import DetectionError, InitialDetection
 from abs_service.tracker.detection.regions import nearest
 from abs_service.tracker.detection.segmentation import detect_object
@@ -149,7 +149,7 @@ def test_a_hole_in_the_object_is_a_hole_in_the_mesh():
 def test_too_little_of_an_object_is_an_error():
     distance = np.full((144, 176), np.nan, np.float32)
     distance[70, 60:100] = 1.0
-    with pytest.raises(DetectionError, match=rf"too small in the depth image: \d+ vertices, {LEAST_VERTICES} needed"):
+    with pytest.raises(DetectionError, match=rf"too small in the depth image: \d+ vertices, {MIN_VERTICES} needed"):
         grid_mesh(InitialDetection(distance, TOF, 100))
 
 

@@ -107,7 +107,7 @@ def test_a_disc_is_no_sheet():
     distance, x, y = on_plane(placed(0.2, 0.3))
     message = refused(np.where(np.hypot(x, y) < 0.12, distance, np.nan))
     assert "no rectangle" in message
-    assert "a sheet least_overlap = 0.93 at least" in message
+    assert "a sheet minimum_overlap = 0.93 at least" in message
 
 
 def test_a_sheet_behind_an_arm_is_not_taken_for_a_smaller_one():
@@ -127,7 +127,7 @@ def test_a_bent_sheet_is_not_yet_one(direction):
 def test_a_few_pixels_are_no_sheet():
     distance = np.full((240, 320), np.nan)
     distance[100:110, 100:115] = 1.0
-    assert f"has 150 pixels, a sheet needs least_pixels = {LIMITS.least_pixels}" in refused(distance)
+    assert f"has 150 pixels, a sheet needs minimum_pixels = {LIMITS.minimum_pixels}" in refused(distance)
 
 
 def test_nothing_is_no_sheet():

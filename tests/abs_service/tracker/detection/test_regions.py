@@ -57,10 +57,10 @@ def test_noise_neither_cuts_nor_connects():
 
 def test_small_surfaces_are_noise():
     speck = (slice(36, 44), slice(2, 10), 0.5)
-    inside = selected(nearest.Settings(least_pixels=100), scene(NEAR, speck))
+    inside = selected(nearest.Settings(minimum_pixels=100), scene(NEAR, speck))
     assert inside[20, 15]
     assert not inside[40, 6]
-    assert selected(nearest.Settings(least_pixels=16), scene(NEAR, speck))[40, 6]
+    assert selected(nearest.Settings(minimum_pixels=16), scene(NEAR, speck))[40, 6]
 
 
 def test_the_largest_step_decides_what_is_connected():
@@ -90,7 +90,7 @@ def test_a_large_object_is_no_scene(part, background):
 
 
 def test_an_empty_image_has_no_surface():
-    with pytest.raises(DetectionError, match="least_pixels = 200"):
+    with pytest.raises(DetectionError, match="minimum_pixels = 200"):
         selected(nearest.Settings(), np.full(SHAPE, np.nan, np.float32))
 
 

@@ -142,11 +142,11 @@ def test_the_largest_surface_in_a_range_of_distances_is_selected():
     view = before_a_wall(NEAR, FAR, speck)
     assert_is(distance.Settings(farthest_m=1.3).build().select(view), NEAR)
     assert_is(distance.Settings(farthest_m=1.8, nearest_m=1.1).build().select(view), FAR)
-    assert_is(distance.Settings(farthest_m=1.3, nearest_m=1.1, least_pixels=16).build().select(view), speck)
+    assert_is(distance.Settings(farthest_m=1.3, nearest_m=1.1, minimum_pixels=16).build().select(view), speck)
 
 
 def test_an_empty_range_of_distances_is_named():
-    with pytest.raises(DetectionError, match=r"from 0\.2 to 0\.9 m: no connected surface of .* least_pixels = 200"):
+    with pytest.raises(DetectionError, match=r"from 0\.2 to 0\.9 m: no connected surface of .* minimum_pixels = 200"):
         distance.Settings(farthest_m=0.9, nearest_m=0.2).build().select(before_a_wall(NEAR))
 
 

@@ -1,4 +1,4 @@
-"""What a region selects has the size of an object, or the distances have the wrong unit."""
+"""A selected region has the size of an object, or the distances have the wrong unit."""
 
 import numpy as np
 import pytest

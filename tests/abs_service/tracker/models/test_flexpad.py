@@ -111,7 +111,7 @@ def test_a_sheet_that_rolls_up_several_times_is_exact_to_a_few_micrometres(turns
 
 def test_a_sheet_that_would_roll_up_more_often_is_refused_with_what_is_allowed():
     least, most = turns_up_to(3.5), turns_up_to(3.0)
-    message = rf"least_radius_m = {least:g} would roll up .* by 3.5 turns; 3 are allowed, .* at least 0.009"
+    message = rf"minimum_radius_m = {least:g} would roll up .* by 3.5 turns; 3 are allowed, .* at least 0.009"
     with pytest.raises(ModelError, match=message):
         FlexPad(Sheet(T_RP, *A4), 150, least, 1.0)
     FlexPad(Sheet(T_RP, *A4), 150, most * (1 + 1e-9), 1.0)

@@ -68,10 +68,10 @@ def test_a_generation_teaches_what_the_tutorial_says(seed):
     best = np.maximum(w, 0) @ ranked
     p_sigma = (1 - c_sigma) * paths[0] + np.sqrt(c_sigma * (2 - c_sigma) * mu_eff) * best
     length = np.linalg.norm(p_sigma) / expected_length
-    usual = length / np.sqrt(1 - (1 - c_sigma) ** (2 * g)) < 1.4 + 2 / (n + 1)
-    p_c = (1 - c_c) * paths[1] + usual * np.sqrt(c_c * (2 - c_c) * mu_eff) * best
+    h_sigma = length / np.sqrt(1 - (1 - c_sigma) ** (2 * g)) < 1.4 + 2 / (n + 1)
+    p_c = (1 - c_c) * paths[1] + h_sigma * np.sqrt(c_c * (2 - c_c) * mu_eff) * best
     shares = np.where(w < 0, w * n / np.sum(ranked**2, axis=1), w)
-    kept = 1 - c_1 - c_mu * w.sum() + (not usual) * c_1 * c_c * (2 - c_c)
+    kept = 1 - c_1 - c_mu * w.sum() + (not h_sigma) * c_1 * c_c * (2 - c_c)
     wanted = kept * learnt + c_1 * np.outer(p_c, p_c) + c_mu * (ranked.T * shares) @ ranked
     mean_wanted = mean + 0.3 * best @ axes
     taught = learnt.copy()

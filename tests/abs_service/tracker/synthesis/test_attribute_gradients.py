@@ -85,7 +85,7 @@ def test_the_kernels_are_their_equation(seed, camera):
     vertices = mesh.vertices + generator.normal(0, 0.01, mesh.vertices.shape)
     surface = as_surface((vertices, mesh.normals), (vertices + 0.5, mesh.normals))
     seen = view.synthesize(surface)
-    per_pixel, at_vertices = view.slopes(surface), canvas_values(mesh)
+    per_pixel, at_vertices = view.attribute_gradients(surface), canvas_values(mesh)
     for k, attributes in enumerate(seen.attributes):
         for v, found in enumerate(attributes.T):
             expected = at_vertices[v].astype(float)

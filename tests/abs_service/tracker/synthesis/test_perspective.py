@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from abs_service.tracker.synthesis.perspective import SHORT_EDGE_PX, metres_per_pixel, project_with_slopes
+from abs_service.tracker.synthesis.perspective import SHORT_EDGE_PX, metres_per_pixel, project_with_jacobian
 from calib.camera import Camera
 from calib.lenses.lens import Lens
 from tests.abs_service.tracker.scenes import CAMERA, FISHEYE, sheet
@@ -17,15 +17,15 @@ RATIONAL = Camera(
 
 @pytest.mark.parametrize("camera", [CAMERA, RATIONAL, FISHEYE], ids=["brown", "rational", "fisheye"])
 @given(st.integers(0, 2**32 - 1))
-def test_places_and_slopes_are_the_camera_s(camera, seed):
+def test_places_and_jacobian_are_the_camera_s(camera, seed):
     points = np.random.default_rng(seed).uniform([-0.2, -0.15, 0.8], [0.2, 0.15, 1.2], (9, 3))
-    places, slopes = project_with_slopes(camera, points)
+    places, jacobian = project_with_jacobian(camera, points)
     np.testing.assert_allclose(places, camera.project(points), rtol=0, atol=1e-9)
-    np.testing.assert_allclose(slopes, camera.projection_jacobian(points), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(jacobian, camera.projection_jacobian(points), rtol=0, atol=1e-8)
 
 
 def test_what_is_behind_the_camera_has_no_place():
-    places, _ = project_with_slopes(CAMERA, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]))
+    places, _ = project_with_jacobian(CAMERA, np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]))
     assert np.isnan(places[0]).all()
     assert np.isfinite(places[1]).all()
 

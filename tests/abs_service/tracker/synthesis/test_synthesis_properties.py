@@ -38,12 +38,12 @@ DEPTH, LEVELS = Constant(0.01), 10.0
 BOUNDS = Bounds(0.0, 5.0, 20.0)
 #: Colours at the sheet's centre and their gradients over it [levels/m], two levels per pixel: the same in all channels,
 #: so that a pixel's colour filter has no effect on a gradient, with offsets between the channels.
-TINTS, SLOPES = np.array([100.0, 128.0, 160.0]), np.array([450.0, -350.0])
+TINTS, GRADIENTS = np.array([100.0, 128.0, 160.0]), np.array([450.0, -350.0])
 
 
 def tints(points: np.ndarray) -> np.ndarray:
     """Red, green and blue of material points (…, 3) at rest."""
-    return np.clip(TINTS + (points[..., :2] @ SLOPES)[..., None], 0, 255).astype(np.float32)
+    return np.clip(TINTS + (points[..., :2] @ GRADIENTS)[..., None], 0, 255).astype(np.float32)
 
 
 class Scene:
@@ -109,7 +109,7 @@ def test_a_plane_is_found_where_it_is(kind, turn, shift):
         assert np.abs(residuals(term, scene)).max() * LEVELS < 6
 
 
-def slopes(term: ChannelTerm, parameter: int) -> tuple[float, float]:
+def gradients(term: ChannelTerm, parameter: int) -> tuple[float, float]:
     """Derivative of the cost with respect to a shift, 1 cm from the truth: by finite differences and linearisation."""
     model, step = Rigid(MESH), 0.01
     theta = 0.01 * np.eye(6)[parameter]
@@ -127,7 +127,7 @@ def test_the_gradient_of_one_number_per_pixel_is_that_of_the_cost(kind, name):
     pattern = ONE_CHANNEL if grey else BAYER_ORDERS[name]
     term = scene.channel(GaussianGrey(LEVELS) if grey else GaussianBayer(LEVELS), pattern)
     for parameter in (3, 4):
-        numerical, linear = slopes(term, parameter)
+        numerical, linear = gradients(term, parameter)
         assert linear == pytest.approx(numerical, rel=0.1)
         assert abs(linear) > 100
 

@@ -15,7 +15,7 @@ from calib.lenses.lens import Lens
 from calib.noise.gaussian_polynomial import GaussianPolynomial
 from calib.noise.images.color import GaussianColor
 from calib.rig import Rig, Sensor
-from calib.warp.pinhole import MOST_GROWTH, pinhole_of, resampling
+from calib.warp.pinhole import MAX_GROWTH, pinhole_of, resampling
 from tests.abs_service.tracker.scenes import CAMERA, depth_image, observation, plane_distance, sheet
 
 NORMAL = np.array([-0.2, 0.1, 1.0])
@@ -57,7 +57,7 @@ def test_without_distortion_nothing_is_resampled():
 def test_a_wide_lens_loses_its_rim_rather_than_growing_without_bounds():
     fish = Camera(96, 72, 25.0, 25.0, 47.5, 35.5, Lens(np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.6])))
     pinhole = pinhole_of(fish)
-    assert pinhole.width <= MOST_GROWTH * 96 + 2
+    assert pinhole.width <= MAX_GROWTH * 96 + 2
     assert np.count_nonzero(resampling(pinhole, fish)) > 0.5 * 96 * 72
 
 

@@ -10,56 +10,22 @@ from scipy.ndimage import map_coordinates
 
 from abs_service.tracker.measurements import measurement
 from abs_service.tracker.measurements.base import Comparison
-from abs_service.tracker.mesh import Mesh
-from abs_service.tracker.models.base import SparseJacobian, Surface
+from abs_service.tracker.models.base import SparseJacobian
 from abs_service.tracker.models.rigid import Rigid
 from abs_service.tracker.objectives import likelihood
 from abs_service.tracker.synthesis.projection import optics
 from abs_service.tracker.terms.base import Bounds
-from abs_service.tracker.terms.depth.outline import RimOutline
 from abs_service.tracker.terms.depth.outline_distance import inwards
 from abs_service.tracker.terms.depth.rim import Rim, look_up
-from abs_service.tracker.terms.depth.rim_classes import RimClass
 from abs_service.tracker.terms.depth.rim_cost import FARTHEST, rim_cost
 from abs_service.tracker.terms.depth.visibility import classify
-from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
 from calib.lenses.lens import Lens
 from calib.noise.constant import Constant
 from calib.rig import Sensor
 from tests import reference
-from tests.abs_service.tracker.scenes import as_surface, depth_image, flat, sheet, sparse
-
-#: Sees a sheet of 0.3 × 0.2 m at z = 1 m with room around it, its rim between pixels.
-CAMERA = Camera(120, 90, 200.0, 200.0, 59.3, 44.2)
-MESH = sheet(13, 19, flat)
-BESIDE_M = 1.6
-
-
-def picture(mesh: Mesh = MESH, by: float = 0.0) -> np.ndarray:
-    """A flat sheet as large as the mesh, moved to the right, before a wall [m]."""
-    rays = CAMERA.unproject(np.ones((CAMERA.height, CAMERA.width)))
-    x, y = rays[..., 0] / rays[..., 2], rays[..., 1] / rays[..., 2]
-    (left, top), (right, bottom) = mesh.vertices[:, :2].min(axis=0), mesh.vertices[:, :2].max(axis=0)
-    on = (x > left + by) & (x < right + by) & (y > top) & (y < bottom)
-    return (np.where(on, 1.0, BESIDE_M) / rays[..., 2]).astype(np.float32)
-
-
-def moved(mesh: Mesh, x: float, y: float = 0.0) -> Surface:
-    return as_surface((mesh.vertices + np.array([x, y, 0.0]), mesh.normals))
-
-
-def outline(distance: np.ndarray, mesh: Mesh = MESH, deviation: float = 0.5) -> RimOutline:
-    result = RimOutline(CAMERA, Rim.of(mesh), deviation)
-    look(result, distance, mesh)
-    return result
-
-
-def look(at: RimOutline, distance: np.ndarray, mesh: Mesh = MESH) -> np.ndarray:
-    view = sparse(CAMERA, mesh).view("tof", np.zeros((len(mesh.vertices), 0), np.float32))
-    predicted = moved(mesh, 0.0)
-    expected = view.render(predicted)
-    return at.observe(distance, classify(distance, expected, CAMERA.fx), expected, predicted)
+from tests.abs_service.tracker.scenes import depth_image, sparse
+from tests.abs_service.tracker.terms.outline_scene import CAMERA, MESH, look, moved, outline, picture
 
 
 @settings(max_examples=50, deadline=None)
@@ -69,22 +35,22 @@ def test_look_up_is_bilinear_interpolation(seed: int):
     image = generator.normal(size=(7, 9)).astype(np.float32)
     image[generator.random(image.shape) < 0.05] = np.nan
     places = generator.uniform(-1, 10, (40, 2))
-    values, slopes = np.empty(40), np.empty((40, 2))
-    look_up(image, places, values, slopes)
+    values, gradients = np.empty(40), np.empty((40, 2))
+    look_up(image, places, values, gradients)
     inside = np.all((places >= 0) & (places < (8, 6)), axis=1)
     expected = map_coordinates(image.astype(float), places[:, ::-1].T, order=1, cval=np.nan)
     known = inside & np.isfinite(expected)
     np.testing.assert_allclose(values[known], expected[known], atol=1e-5)
     assert np.all(values[~inside] > 1e8)
-    assert not slopes[~inside].any()
-    # Within a cell, the value changes as the slopes say where the other coordinate stays.
+    assert not gradients[~inside].any()
+    # Within a cell, the value changes as the gradients say where the other coordinate stays.
     for axis in range(2):
         step = np.zeros(2)
         step[axis] = 1e-4
         there, ignored = np.empty(40), np.empty((40, 2))
         look_up(image, places + step, there, ignored)
         same = known & np.all(np.floor(places) == np.floor(places + step), axis=1)
-        np.testing.assert_allclose((there - values)[same] / 1e-4, slopes[same, axis], atol=1e-4)
+        np.testing.assert_allclose((there - values)[same] / 1e-4, gradients[same, axis], atol=1e-4)
 
 
 @pytest.mark.parametrize("lens", [Lens(), Lens(np.array([-0.2, 0.05])), KannalaBrandt(np.array([0.05, -0.01]))])
@@ -226,76 +192,3 @@ def test_distances_near_the_outline_do_not_depend_on_how_far_the_image_goes_on()
     beyond = everywhere.copy()
     beyond[part] = -3
     assert np.nanmax(beyond) <= -3
-
-
-def classes(distance: np.ndarray, mesh: Mesh = MESH) -> dict[RimClass, int]:
-    found = outline(distance, mesh).classes
-    return {one: int(np.count_nonzero(found == one)) for one in RimClass}
-
-
-def test_the_rim_is_free_before_a_wall_and_before_no_return():
-    empty = picture()
-    empty[empty > 1.3] = np.nan
-    for distance in (picture(), empty):
-        found = classes(distance)
-        assert found[RimClass.FREE] == sum(found.values())
-
-
-def test_an_edge_on_a_table_or_cut_by_a_mask_is_in_contact():
-    """The measured surface goes on to the right, where the mesh ends."""
-    table = picture()
-    rays = CAMERA.unproject(np.ones_like(table))
-    right = (rays[..., 0] / rays[..., 2] > 0.1) & (np.abs(rays[..., 1] / rays[..., 2]) < 0.12)
-    table[right] = (1.0 / rays[..., 2])[right]
-    found = outline(table)
-    x = MESH.vertices[Rim.of(MESH).outer, 0]
-    assert np.mean(found.classes[x > 0.14] == RimClass.CONTACT) > 0.9  # but for a corner
-    assert np.all(found.classes[x < 0.0] == RimClass.FREE)
-    here = found.fit(moved(MESH, 0.0))
-    assert here.visible == np.count_nonzero(found.classes == RimClass.FREE)
-
-
-def test_an_edge_at_the_border_of_the_image_may_continue_beyond_it():
-    wide = sheet(13, 19, flat, (0.62, 0.2))
-    found = classes(picture(wide), wide)
-    assert found[RimClass.BORDER] >= 2 * 11
-    assert found[RimClass.FREE] >= 2 * 15
-
-
-def test_the_edge_of_a_body_that_turns_away_is_a_silhouette():
-    """A roll: its mesh ends where its surface is seen at a grazing angle."""
-    roll = sheet(13, 19, lambda x, y: 1.15 - np.sqrt(0.15**2 - np.clip(x, -0.1495, 0.1495) ** 2) + 0 * y)
-    found = outline(picture(), roll).classes
-    x = np.abs(roll.vertices[Rim.of(roll).outer, 0])
-    assert np.mean(found[x > 0.14] == RimClass.SILHOUETTE) > 0.9
-
-
-def test_a_sheet_that_hangs_over_the_outline_or_ends_inside_it_is_told():
-    found = outline(picture())
-    assert (found.fit(moved(MESH, 0.0)).outside, found.fit(moved(MESH, 0.0)).inside) == (0, 0)
-    off = found.fit(moved(MESH, 0.03))
-    assert off.outside >= 9
-    assert off.inside >= 9
-    assert off.visible > off.outside + off.inside
-
-
-def test_the_distance_of_the_edges_from_the_outline_is_told_in_metres():
-    """The sheet is 40 mm longer to the right than when the mesh was made; above and below, the edges are on it."""
-    found = outline(picture())
-    look(found, np.minimum(picture(), picture(by=0.04)))
-    here, y = found.fit(moved(MESH, 0.0)), np.linspace(-0.1, 0.1, 13)[1:-1]
-    nearest = np.minimum(0.04, 0.1 - np.abs(y))
-    off = nearest > FARTHEST * 0.5 / CAMERA.fx  # beyond the bound of the cost
-    assert (here.outside, here.inside) == (0, np.count_nonzero(off))
-    assert here.off_m == pytest.approx(nearest[off].sum() / here.visible, rel=0.1)
-
-
-def test_the_surface_hides_its_own_edge():
-    """A sheet that is rolled up: the vertices of the far end lie behind the near one."""
-    rolled = replace(MESH, vertices=MESH.vertices * (1.0, 1.0, 1.0) + (MESH.vertices[:, :1] > 0.1) * (0.0, 0.0, 0.05))
-    result = outline(picture())
-    view = sparse(CAMERA, MESH).view("tof", np.zeros((len(MESH.vertices), 0), np.float32))
-    expected = view.render(moved(MESH, 0.0))
-    distance = picture()
-    result.observe(distance, classify(distance, expected, CAMERA.fx), expected, moved(rolled, 0.0))
-    assert result.fit(moved(rolled, 0.0)).occluded >= 11

@@ -37,7 +37,7 @@ SHAPE = (CAMERA.height, CAMERA.width)
 
 @dataclass(frozen=True, slots=True)
 class Given(TextureRegistrationNoise):
-    """A misplacement that makes of the noise what a test says."""
+    """Texture registration noise that widens the noise by a given factor."""
 
     factor: np.ndarray
 
@@ -93,7 +93,7 @@ def test_the_channel_cost_is_the_likelihood_of_widened_noise(seed, order):
     assert term.cost(as_surface((vertices, normals)))[0] == pytest.approx(expected, rel=2e-5, abs=1e-2)
 
 
-def test_the_variance_grows_by_what_the_print_changes_over_the_misplacement():
+def test_the_variance_grows_by_the_change_of_the_print_over_its_sigma():
     """A print whose red changes by 4000 levels per metre along x, seen from straight before it."""
     mesh = sheet()
     synthesizer = sparse(CAMERA, mesh)
@@ -129,11 +129,11 @@ def test_where_every_candidate_has_samples_of_its_own_the_noise_is_the_sensor_s(
 
 @pytest.mark.slow
 def test_a_board_with_sharp_edges_does_not_slide():
-    """Told that every edge is where it seems to be to a fraction of a level, a rigid board slides from edge to edge."""
+    """Without registration noise, a rigid board slides from edge to edge of its print."""
     errors = []
     for px in (0.0, 0.2):
         board = simulate("simulated://board?seed=1")
-        plan = default_plan(model=rigid.Settings(), objective=likelihood.Settings(misplacement_px=px))
+        plan = default_plan(model=rigid.Settings(), objective=likelihood.Settings(texture_registration_px=px))
         errors.append(mean_errors(list(drive(TrackingSession(rig_of(board), plan), board, range(150))))[0])
-    print(f"vertex error {errors[0]:.2f} mm without and {errors[1]:.2f} mm with misplacement")
+    print(f"vertex error {errors[0]:.2f} mm without and {errors[1]:.2f} mm with registration noise")
     assert errors[1] < min(2, 0.9 * errors[0])

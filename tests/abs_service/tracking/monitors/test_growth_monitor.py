@@ -1,4 +1,4 @@
-"""When a mesh that began partly covered is made anew."""
+"""A mesh of a partly occluded object is made anew once more of the object is in view."""
 
 from abs_service.tracker.terms.base import RimFit, SensorFit
 from abs_service.tracking.monitors.growth_monitor import GrowthMonitor

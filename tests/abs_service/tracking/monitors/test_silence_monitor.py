@@ -17,7 +17,7 @@ class Tracker:
         self.monitor = SilenceMonitor(lambda: self.now_ns, **given)
 
     def silent(self, ns):
-        """What is said after so much time."""
+        """The monitor's message after so much time [ns]."""
         said = ""
         for _ in range(ns // (100 * MS)):
             self.now_ns += 100 * MS

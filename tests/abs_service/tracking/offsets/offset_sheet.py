@@ -57,9 +57,9 @@ def image(z: np.ndarray | float) -> DepthImage:
     return DepthImage(distance, np.full_like(distance, np.nan))
 
 
-def relief_z(relief: np.ndarray) -> np.ndarray:
+def offset_z(offsets: np.ndarray) -> np.ndarray:
     """z (height, width) [m] of a sheet whose vertices stand off by lengths (n,) [m], linear in between."""
-    heights = relief.reshape(ROWS, COLUMNS)
+    heights = offsets.reshape(ROWS, COLUMNS)
     of_row = [np.interp(np.arange(CAMERA.width), 6 + STEP * np.arange(COLUMNS), row) for row in heights]
     places = 6 + STEP * np.arange(ROWS)
     return 1 - np.transpose([np.interp(np.arange(CAMERA.height), places, column) for column in np.transpose(of_row)])

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from abs_service.tracking.offsets.offset_field import OffsetField, Prior, change_prior, relief_prior
+from abs_service.tracking.offsets.offset_field import OffsetField, Prior, change_prior, offset_prior
 from tests.abs_service.tracking.offsets.offset_sheet import flat_mesh
 
 MESH = flat_mesh()
@@ -54,12 +54,12 @@ def test_a_relief_is_as_large_and_as_smooth_as_it_shows_beyond_its_noise():
     noise = 1e-3 * generator.standard_normal(N)
     waves = 3e-3 * np.sin(MESH.chart[:, 0])
     size = {
-        name: relief_prior(offset, deviation, MESH, 0) for name, offset in (("flat", noise), ("wavy", noise + waves))
+        name: offset_prior(offset, deviation, MESH, 0) for name, offset in (("flat", noise), ("wavy", noise + waves))
     }
     assert size["flat"].precision[0] ** -0.5 < 0.6e-3
     np.testing.assert_allclose(size["wavy"].precision[0] ** -0.5, np.std(waves), rtol=0.15)
     assert size["wavy"].coupling > 0
-    assert relief_prior(3e-3 * generator.standard_normal(N), deviation, MESH, 0).coupling < size["wavy"].coupling / 3
+    assert offset_prior(3e-3 * generator.standard_normal(N), deviation, MESH, 0).coupling < size["wavy"].coupling / 3
 
 
 def test_changes_that_neighbours_need_not_share_are_not_coupled():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from abs_service.tracking.offsets import vertex_offsets
 from abs_service.tracking.offsets.heights import HeightSensor
-from abs_service.tracking.offsets.offset_field import change_prior, relief_prior
+from abs_service.tracking.offsets.offset_field import change_prior, offset_prior
 from abs_service.tracking.offsets.vertex_offsets import FixedOffsets, LearntOffsets, Settings, folded
 from tests.abs_service.tracking.offsets.offset_sheet import (
     CAMERA,
@@ -19,7 +19,7 @@ from tests.abs_service.tracking.offsets.offset_sheet import (
     Flat,
     flat_mesh,
     image,
-    relief_z,
+    offset_z,
 )
 from tests.abs_service.tracking.offsets.test_offset_field import dense
 
@@ -38,12 +38,12 @@ def learnt(model: Flat, random_walk: float = 0.0) -> LearntOffsets:
 @given(st.sampled_from([0.0, 1e-4, 1.6e-3]), st.floats(1e-3, 4e-3), st.integers(0, 2**32))
 def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
     generator = np.random.default_rng(seed)
-    relief = size * np.sin(flat_mesh().chart[:, 0])
-    first = relief + 1e-3 * generator.standard_normal(N)
+    true_offsets = size * np.sin(flat_mesh().chart[:, 0])
+    first = true_offsets + 1e-3 * generator.standard_normal(N)
     model = Flat(first)
     offsets, sensor = learnt(model, random_walk), HeightSensor(CAMERA, NOISE, model.mesh)
     mean, precision = first, np.full(N, 1e6)
-    prior = relief_prior(first, np.full(N, 1e-3), model.mesh, 0)
+    prior = offset_prior(first, np.full(N, 1e-3), model.mesh, 0)
     matrix = dense(precision, prior)
     offset = np.linalg.solve(matrix, precision * mean)
     if random_walk:
@@ -51,7 +51,7 @@ def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
         prior = change_prior(offset, change, 0.2 * np.median(vertex_offsets.edges_around(model.mesh)))
     for k in range(1, 6):
         np.testing.assert_allclose(model.offset, offset, atol=3e-6)
-        picture = image(relief_z(relief) + SIGMA * generator.standard_normal(SHAPE))
+        picture = image(offset_z(true_offsets) + SIGMA * generator.standard_normal(SHAPE))
         vertices, normals = (part[0].T.astype(float) for part in (model.surface.vertices, model.surface.normals))
         precision = precision / (1 + precision * random_walk**2 * FRAME_NS * 1e-9)
         heights = sensor.measure(picture, vertices, normals, offsets.variance)
@@ -67,25 +67,27 @@ def test_updates_are_those_of_the_dense_equations(random_walk, size, seed):
 @pytest.mark.parametrize("random_walk", [0.0, 1e-4])
 def test_the_noise_of_the_first_frame_is_averaged_away_and_known_to_be(random_walk):
     generator = np.random.default_rng(3)
-    relief = 2e-3 * np.cos(flat_mesh().chart[:, 1] / 4)
-    first = relief + 1e-3 * generator.standard_normal(N)
+    true_offsets = 2e-3 * np.cos(flat_mesh().chart[:, 1] / 4)
+    first = true_offsets + 1e-3 * generator.standard_normal(N)
     model = Flat(first)
     offsets = learnt(model, random_walk)
     for k in range(1, 60):
-        offsets.update(image(relief_z(relief) + SIGMA * generator.standard_normal(SHAPE)), model.surface, k * FRAME_NS)
-    error = np.sqrt(np.mean((model.offset - relief) ** 2))
-    assert error < 0.2 * np.sqrt(np.mean((first - relief) ** 2))
+        offsets.update(
+            image(offset_z(true_offsets) + SIGMA * generator.standard_normal(SHAPE)), model.surface, k * FRAME_NS
+        )
+    error = np.sqrt(np.mean((model.offset - true_offsets) ** 2))
+    assert error < 0.2 * np.sqrt(np.mean((first - true_offsets) ** 2))
     assert 0.7 * error < np.sqrt(offsets.variance.mean()) < 1.5 * error
 
 
 @pytest.mark.parametrize("random_walk", [0.0, 1.6e-3])
 def test_hidden_vertices_stay(random_walk):
     generator = np.random.default_rng(4)
-    relief = 3e-3 * np.sin(flat_mesh().chart[:, 0])
-    model = Flat(relief + 0.5e-3 * generator.standard_normal(N), 0.5e-3)
+    true_offsets = 3e-3 * np.sin(flat_mesh().chart[:, 0])
+    model = Flat(true_offsets + 0.5e-3 * generator.standard_normal(N), 0.5e-3)
     offsets = learnt(model, random_walk)
     before, known = model.offset, offsets.variance
-    z = relief_z(relief)
+    z = offset_z(true_offsets)
     z[:, :32] = 0.7  # something in front
     hidden = CAMERA.project(model.mesh.vertices)[:, 0] < 26
     for k in range(1, 30):
@@ -98,13 +100,13 @@ def test_hidden_vertices_stay(random_walk):
 @pytest.mark.parametrize("random_walk", [0.0, 1.6e-3])
 @pytest.mark.parametrize(("beyond", "frames", "most"), [(0.005, 1, 1.8e-3), (0.03, 15, 1.2e-3), (0.1, 15, 1.2e-3)])
 def test_a_wild_measurement_makes_no_spike(random_walk, beyond, frames, most):
-    """What is no outlier by the sensor's σ moves the vertex a little, and is forgotten."""
+    """A measurement that the sensor's σ does not reject moves the vertex a little, and its effect decays."""
     model = Flat(np.zeros(N), 0.5e-3)
     offsets = learnt(model, random_walk)
     wild = np.zeros(N)
     wild[N // 2] = beyond
     for k in range(1, 30):
-        offsets.update(image(relief_z(wild if k <= frames else 0 * wild)), model.surface, k * FRAME_NS)
+        offsets.update(image(offset_z(wild if k <= frames else 0 * wild)), model.surface, k * FRAME_NS)
         assert np.abs(model.offset).max() < most
     assert np.abs(model.offset).max() < 0.03 * beyond
 

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from math import inf
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +12,7 @@ from typing import Any, cast
 import pytest
 
 from abs_service.tracking.warmup.ahead import Progress
-from abs_service.tracking.warmup.pool import Pool
+from abs_service.tracking.warmup.kernel_queue import KernelQueue
 from calib.jit import Kernel
 
 KERNELS = """
@@ -106,15 +105,17 @@ def test_progress_says_how_many_and_how_long() -> None:
     assert str(Progress(30, 31, 0.2)) == "30 of 31, about 1 s"
 
 
-def test_the_largest_kernel_is_compiled_first_and_the_rest_is_judged_by_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Pool, "_work", lambda self: None)  # nobody takes them but we
-    with Pool(1) as pool:
-        for size in (1, 4, 15):
-            pool.submit(cast(Kernel, SimpleNamespace(size=size, digest=str(size))), ())
-        assert pool.left_s == inf
-        taken = [cast(Any, pool._take())[0] for _ in range(3)]
-        assert [kernel.size for kernel in taken] == [15, 4, 1]
-        monkeypatch.setattr(pool, "_began_s", time.monotonic() - 30)
-        pool._finish(taken[0])
-        assert pool.left_s == pytest.approx(10, abs=1)
-        assert (pool.done, pool.total) == (1, 3)
+def test_the_largest_kernel_is_compiled_first_and_the_rest_is_judged_by_size() -> None:
+    now_s = 100.0
+    queue = KernelQueue(lambda: now_s)
+    for size in (1, 4, 15):
+        queue.put((cast(Kernel, SimpleNamespace(size=size, digest=str(size))), ()))
+    assert queue.left_s == inf
+    taken = [cast(Any, queue.take())[0] for _ in range(3)]
+    assert [kernel.size for kernel in taken] == [15, 4, 1]
+    now_s += 30
+    queue.finish(taken[0])
+    assert queue.left_s == pytest.approx(10)
+    assert (queue.done, queue.total) == (1, 3)
+    queue.close()
+    assert queue.take() is None

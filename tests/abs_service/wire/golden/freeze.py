@@ -44,7 +44,7 @@ def schema() -> FileDescriptorSet:
 
 
 def breaks(old: FileDescriptorSet, new: FileDescriptorSet) -> list[str]:
-    """What a reader of the old schema would misread in the new one, one line each; fields may only be added.
+    """Fields that a reader of the old schema would misread in the new one, one line each; fields may only be added.
 
     A field that is gone is fine where its number is reserved, because then nothing else can ever mean it.
     """

@@ -164,7 +164,7 @@ class FakeReader:
     MICROFRAMES = 64
 
     def __init__(self, device: usb.core.Device, endpoints: Sequence[int], clock: Callable[[], int]) -> None:
-        self._fake: FakeDevice = device._ctx.dev
+        self._fake: FakeDevice = device._ctx.dev  # noqa: SLF001 - pyusb has no public way to it
         self._clock = clock
         self._endpoints = endpoints
         self._begin, self._begin_ns = self._fake.now, clock()

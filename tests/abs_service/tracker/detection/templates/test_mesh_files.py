@@ -1,4 +1,4 @@
-"""What is read of mesh files, and what is refused, by `bind`, the face of a template."""
+"""Mesh files that `bind`, the interface of a template, reads or refuses."""
 
 import sys
 

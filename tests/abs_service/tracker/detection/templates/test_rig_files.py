@@ -1,4 +1,4 @@
-"""A rig file whose template cannot be used is refused by `abs-service check`: file, key, value, what is allowed."""
+"""A rig file whose template cannot be used is refused by `abs-service check`: file, key, value, the allowed values."""
 
 import pytest
 

@@ -84,12 +84,12 @@ def test_stretch_rows_are_the_derivatives_of_the_edges_lengths(seed):
     (i, j), now = mesh.edges.T, surface.vertices[0].T.astype(float)
     rest = np.linalg.norm(mesh.vertices[i] - mesh.vertices[j], axis=1)
     length = np.linalg.norm(now[i] - now[j], axis=1)
-    slopes = np.einsum(
+    jacobian = np.einsum(
         "ei,eid->ed", (now[i] - now[j]) / length[:, None], sparse_jacobian.dense[i] - sparse_jacobian.dense[j]
     )
     order = np.argsort(np.where(group[i] == group[j], group[i], 3), kind="stable")
     np.testing.assert_allclose(linear.residual, ((length / rest - 1) / 0.02)[order], rtol=0, atol=1e-4)
-    np.testing.assert_allclose(linear.jacobian, (slopes / rest[:, None] / 0.02)[order], rtol=1e-5, atol=1e-2)
+    np.testing.assert_allclose(linear.jacobian, (jacobian / rest[:, None] / 0.02)[order], rtol=1e-5, atol=1e-2)
 
 
 def test_the_cost_is_that_of_a_speed():

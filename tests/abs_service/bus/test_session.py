@@ -1,0 +1,37 @@
+"""Sessions of the bus: endpoints, and errors in opening one that are understood."""
+
+import pytest
+
+from abs_service.bus.session import BusError, Role, check_endpoint, open_session
+
+
+@pytest.mark.parametrize(
+    "endpoint", ["", "7447", "tcp/127.0.0.1", "tcp/127.0.0.1:99999", "tcp/127.0.0.1:0", "ftp/127.0.0.1:1", "tcp/a b:1"]
+)
+@pytest.mark.parametrize("role", Role)
+def test_a_malformed_endpoint_is_explained(endpoint, role):
+    with pytest.raises(BusError, match=r'bus\.endpoint = ".*": not an endpoint; write PROTOCOL/HOST:PORT'):
+        open_session(endpoint, role)
+
+
+@pytest.mark.parametrize("endpoint", ["tcp/127.0.0.1:7447", "tls/host.example:1", "tcp/[::1]:65535", "ws/a:1?x=1#y"])
+def test_endpoints_that_are_fine(endpoint):
+    assert check_endpoint(endpoint) == endpoint
+
+
+def test_a_port_in_use_is_explained(open_bus, endpoint):
+    open_bus()
+    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": the address is in use'):
+        open_session(endpoint, Role.ROUTER)
+
+
+def test_a_router_that_is_not_there_is_explained(endpoint, monkeypatch):
+    monkeypatch.setattr("abs_service.bus.session.CONNECT_TIMEOUT_MS", 200)
+    with pytest.raises(BusError, match=f'bus.endpoint = "{endpoint}": nothing answers there'):
+        open_session(endpoint, Role.CLIENT)
+
+
+def test_an_unknown_host_is_explained_without_the_source_of_zenoh():
+    with pytest.raises(BusError, match="cannot listen there") as error:
+        open_session("tcp/no-such-host.invalid:7447", Role.ROUTER)
+    assert ".rs" not in str(error.value)

@@ -1,0 +1,35 @@
+"""The house's language: docstrings that state, and a glossary whose rows are complete."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("abs_service", "calib", "drivers", "evaluation", "examples", "tests")
+QUESTION = re.compile(r'^ *"""(What|How|Where|Whether|Which|Why|When|Who)(ever|se)?\b.*', re.MULTILINE)
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_docstring_says_what_a_thing_is_or_returns(folder):
+    asking = [
+        f"{path.relative_to(ROOT)}: {found[0].strip()}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for found in QUESTION.finditer(path.read_text(encoding="utf-8"))
+    ]
+    assert asking == []
+
+
+def test_every_row_of_the_glossary_has_all_columns():
+    page = (ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")
+    rows = [line for line in page.partition("## Glossary")[2].partition("\n## ")[0].splitlines() if line[:1] == "|"]
+    assert [row for row in rows if row.count("|") != rows[0].count("|")] == []
+    assert len(rows) > 50
+
+
+def test_every_place_in_the_glossary_exists():
+    page = (ROOT / "CONVENTIONS.md").read_text(encoding="utf-8")
+    places = re.findall(r"`([\w/]+(?:/|\.py)[\w/]*)`", page.partition("## Glossary")[2].partition("\n## ")[0])
+    rooms = [ROOT, ROOT / "abs_service", ROOT / "abs_service" / "tracker"]  # the glossary abbreviates paths
+    assert [place for place in places if not any((room / place).exists() for room in rooms)] == []
+    assert len(places) > 30
