@@ -137,7 +137,7 @@ def texture(settings: Any) -> ImageNoise:
     made = settings.build()
     if not isinstance(made, ImageNoise):
         kind = plugins.table(settings)["type"]
-        raise PlanError(f'type "{kind}" is no texture: intensity, color, grey and bayer are')
+        raise PlanError(f'texture.type = "{kind}": must be intensity, color, grey or bayer')
     return made
 
 

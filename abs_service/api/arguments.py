@@ -5,6 +5,8 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from abs_service import config
 from abs_service.api.errors import ArgumentError
 from abs_service.tracking.plan import ModelSettings
@@ -88,6 +90,9 @@ def _plain(name: str, value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         table = {field.name: getattr(value, field.name) for field in fields(value)}
         return {"type": type(value).__module__.rpartition(".")[2]} | _keys(table)
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
     if isinstance(value, type) or callable(value):
-        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = a.Nurbs(4, 4), or a table")
+        example = "a.Nurbs(4, 4)" if name == "model" else "a.noise.Constant(0.001)"
+        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = {example}, or a table")
     return value

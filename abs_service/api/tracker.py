@@ -3,13 +3,14 @@
 import time
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, Self
+from pathlib import Path
+from typing import Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from abs_service import config, wiring
-from abs_service.api import arguments
+from abs_service.api import arguments, checks
 from abs_service.api import noise as noise_models
 from abs_service.api.arguments import ModelPart, NoisePart, Table
 from abs_service.api.arrays import FrameBuilder, object_mask
@@ -20,15 +21,34 @@ from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
+from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import TrackingSession
 from abs_service.tracking.session import streams as streams_of
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
-from drivers.contract.frame import FrameSet
+from calib.rig import Sensor
+from drivers.contract.frame import Frame, FrameSet, Kind
 
-if TYPE_CHECKING:
-    from abs_service.api.recording import Recording
+
+@runtime_checkable
+class Replayable(Protocol):
+    """Images in the order of their times, as a `Recording` has them.
+
+    Attributes:
+        path: of the file, for messages.
+    """
+
+    path: Path
+
+    @property
+    def streams(self) -> Mapping[str, int]:
+        """Number of images by "sensor/stream"."""
+        ...
+
+    def frames(self) -> Iterator[Frame]:
+        """The images as devices deliver them."""
+        ...
 
 
 class Tracker:
@@ -92,17 +112,23 @@ class Tracker:
     ):
         if color is None and color_noise is not None:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
-        sensor = {"noise": noise or noise_models.StructuredLight(), "texture": texture, "range_m": range_m}
+        sensor = {
+            "noise": noise_models.StructuredLight() if noise is None else noise,
+            "texture": texture,
+            "range_m": range_m,
+        }
         sensor |= {"outlier_share": outlier_share, "no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}
-        cameras = {arguments.DEPTH: depth}
+        cameras = {arguments.DEPTH: checks.camera("depth", depth)}
         if color is not None:
-            cameras[arguments.COLOR] = color
+            cameras[arguments.COLOR] = checks.camera("color", color)
             color_noise = noise_models.Color() if color_noise is None else color_noise
         settings = arguments.configuration(sensor, color_noise, parts, vertices)
         self._configure(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
+        if color is not None and not _takes_pictures(self._rig.sensors[arguments.COLOR]):
+            raise ArgumentError(f"color_noise = {color_noise}: must be noise.Color(), noise.Grey() or noise.Bayer()")
 
     @classmethod
     def configured(
@@ -139,10 +165,8 @@ class Tracker:
             self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from error
-        if budget_ms is not None and not budget_ms > 0:
-            raise ArgumentError(f"budget_ms = {budget_ms}: must be more than 0, or None for no limit")
+        self._budget_ns = np.inf if budget_ms is None else _positive_ms(budget_ms) * 1e6
         self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
-        self._budget_ns = np.inf if budget_ms is None else budget_ms * 1e6
         self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
 
     def track(
@@ -174,22 +198,28 @@ class Tracker:
         """
         given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
         self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
-        return self._track(self._frames.frame_set(time_s, given | dict(streams or {})))
+        further = {} if streams is None else checks.mapping("streams", streams, '{"left/depth": array}')
+        return self._track(self._frames.frame_set(time_s, given | dict(further)))
 
-    def replay(self, recording: "Recording") -> Iterator[Estimate]:
+    def replay(self, recording: Replayable) -> Iterator[Estimate]:
         """The estimates for a recording, frame set by frame set, as `abs-service replay` makes them.
 
+        Args:
+            recording: what `open_recording` opens.
+
         Raises:
-            ArgumentError: the recording lacks images that the tracker uses.
+            ArgumentError: no recording, or one that lacks images that the tracker uses.
             RecordingError: a part of the file is damaged.
         """
+        if not isinstance(recording, Replayable):
+            raise ArgumentError(f"recording = {recording!r}: must be a recording, open_recording(path)")
         needed = [f"{head}/{stream}" for head, stream in streams_of(self._rig.sensors.values())]
         missing = [stream for stream in needed if stream not in recording.streams]
         if missing:
             raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
-        self._region.mask = None
         synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
-        yield from map(self._track, synchroniser.group(recording.frames()))
+        self._region.mask = None
+        return map(self._track, synchroniser.group(recording.frames()))
 
     def reinitialize(self) -> None:
         """Looks for the object anew in the next frame; safe from any thread."""
@@ -206,6 +236,17 @@ class Tracker:
         except ObservationError as error:
             raise ArgumentError(str(error)) from error
         return with_mesh(found, self._session.mesh, self._session.mesh_version)
+
+
+def _takes_pictures(sensor: Sensor) -> bool:
+    return measurement(sensor.noise).frames[0] in (Kind.COLOR, Kind.BAYER)
+
+
+def _positive_ms(budget_ms: float) -> float:
+    allowed = "more than 0, or None for no limit"
+    if not checks.number("budget_ms", budget_ms, allowed) > 0:
+        raise ArgumentError(f"budget_ms = {budget_ms}: must be {allowed}")
+    return float(budget_ms)
 
 
 class _RegionOrMask:
