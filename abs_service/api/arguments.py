@@ -57,7 +57,7 @@ def configuration(
     sensors = {DEPTH: _keys(sensor)}
     if color_noise is not None:
         sensors[COLOR] = _keys({"noise": color_noise})
-    mesh = {} if vertices is None else {"mesh": {"vertices": vertices}}
+    mesh = {} if vertices is None else {"mesh": _keys({"vertices": vertices})}
     tables = {
         "version": 1,
         "name": "arrays",

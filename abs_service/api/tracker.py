@@ -1,7 +1,7 @@
 """A tracker of arrays: one call per frame, no process, no file, no thread."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Protocol, Self, runtime_checkable
@@ -22,8 +22,8 @@ from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.regions.base import Region
 from abs_service.tracker.detection.regions.mask import Mask
 from abs_service.tracker.measurements import measurement
-from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.session import streams as streams_of
+from abs_service.tracking.session import TrackingSession, missing_streams
+from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
@@ -199,7 +199,7 @@ class Tracker:
         given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
         self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
         further = {} if streams is None else checks.mapping("streams", streams, '{"left/depth": array}')
-        return self._track(self._frames.frame_set(time_s, given | dict(further)))
+        return next(self._track([self._frames.frame_set(time_s, given | dict(further))]))
 
     def replay(self, recording: Replayable) -> Iterator[Estimate]:
         """The estimates for a recording, frame set by frame set, as `abs-service replay` makes them.
@@ -213,13 +213,11 @@ class Tracker:
         """
         if not isinstance(recording, Replayable):
             raise ArgumentError(f"recording = {recording!r}: must be a recording, open_recording(path)")
-        needed = [f"{head}/{stream}" for head, stream in streams_of(self._rig.sensors.values())]
-        missing = [stream for stream in needed if stream not in recording.streams]
-        if missing:
+        if missing := missing_streams(self._rig.sensors.values(), recording.streams):
             raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
         synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
         self._region.mask = None
-        return map(self._track, synchroniser.group(recording.frames()))
+        return self._track(synchroniser.group(recording.frames()))
 
     def reinitialize(self) -> None:
         """Looks for the object anew in the next frame; safe from any thread."""
@@ -229,13 +227,12 @@ class Tracker:
         """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
         warm_up(self._rig, self._plan)
 
-    def _track(self, frames: FrameSet) -> Estimate:
-        begin_ns = time.monotonic_ns()
+    def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[Estimate]:
         try:
-            found = self._session.track(frames, lambda: time.monotonic_ns() - begin_ns < self._budget_ns)
+            for _, found, _ in track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns):
+                yield with_mesh(found, self._session.mesh, self._session.mesh_version)
         except ObservationError as error:
             raise ArgumentError(str(error)) from error
-        return with_mesh(found, self._session.mesh, self._session.mesh_version)
 
 
 def _takes_pictures(sensor: Sensor) -> bool:
