@@ -8,9 +8,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from abs_service import config
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
+from abs_service.tracker.measurements import measurement
 from abs_service.tracking.plan import ModelSettings
+from calib.noise.base import NoiseError
 from calib.rig import Noise
+from drivers.contract.frame import Kind
 
 #: What a rig file holds for a part of a tracker, `{"type": "hybrid", "steps": 4}`.
 Table = Mapping[str, Any]
@@ -67,9 +70,13 @@ def configuration(
         "trackers": {TRACKER: {"sensors": list(sensors), **_keys(tracker), **mesh}},
     }
     try:
-        return config.from_tables(tables, "Tracker", Path.cwd())
-    except config.ConfigError as error:
+        settings = config.from_tables(tables, "Tracker", Path.cwd())
+        pictures = [table.noise.build() for name, table in settings.sensors.items() if name == COLOR and table.noise]
+    except (config.ConfigError, NoiseError) as error:
         raise ArgumentError(in_arguments(str(error))) from error
+    if any(measurement(noise).frames[0] not in (Kind.COLOR, Kind.BAYER) for noise in pictures):
+        raise ArgumentError(f"color_noise = {color_noise}: must be noise.Color(), noise.Grey() or noise.Bayer()")
+    return settings
 
 
 def in_arguments(message: str) -> str:

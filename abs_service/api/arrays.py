@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from abs_service.api import checks
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.pairing.images import BAYER_ORDERS
 from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import streams

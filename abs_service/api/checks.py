@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from abs_service.api.errors import ArgumentError
 from calib.camera import Camera
+
+
+class ArgumentError(ValueError):
+    """An argument that cannot be used; the message names it, its value and the allowed values."""
 
 
 def number(name: str, value: Any, allowed: str) -> float:
@@ -23,6 +26,16 @@ def number(name: str, value: Any, allowed: str) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
         raise ArgumentError(f"{name} = {value!r}: must be {allowed}")
     return float(value)
+
+
+def positive(name: str, value: Any, allowed: str) -> None:
+    """Refuses all but numbers above 0.
+
+    Raises:
+        ArgumentError: anything else.
+    """
+    if not number(name, value, allowed) > 0:
+        raise ArgumentError(f"{name} = {value}: must be {allowed}")
 
 
 def camera(name: str, value: Any) -> Camera:

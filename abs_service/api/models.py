@@ -1,6 +1,6 @@
 """Deformation models by their public names; docs/explanation/models.md describes them."""
 
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.flexpad import Settings as FlexPad
 from abs_service.tracker.models.gravity import Settings as Gravity

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from abs_service import config
 from abs_service.api import checks
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recorded_estimates import estimates, trackers
 from abs_service.api.rig import Rig

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from abs_service import config, wiring
 from abs_service.api import checks
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.api.tracker import Tracker
 from calib.camera import Camera
 

@@ -3,52 +3,28 @@
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Literal, Protocol, Self, runtime_checkable
+from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from abs_service import config, wiring
 from abs_service.api import arguments, checks
 from abs_service.api import noise as noise_models
 from abs_service.api.arguments import ModelPart, NoisePart, Table
 from abs_service.api.arrays import FrameBuilder, object_mask
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
+from abs_service.api.region_or_mask import RegionOrMask
+from abs_service.api.replayable import Replayable
 from abs_service.pairing.observation import ObservationError
-from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.regions.base import Region
-from abs_service.tracker.detection.regions.mask import Mask
-from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import TrackingSession, missing_streams
 from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
-from calib.rig import Sensor
-from drivers.contract.frame import Frame, FrameSet, Kind
-
-
-@runtime_checkable
-class Replayable(Protocol):
-    """Images in the order of their times, as a `Recording` has them.
-
-    Attributes:
-        path: of the file, for messages.
-    """
-
-    path: Path
-
-    @property
-    def streams(self) -> Mapping[str, int]:
-        """Number of images by "sensor/stream"."""
-        ...
-
-    def frames(self) -> Iterator[Frame]:
-        """The images as devices deliver them."""
-        ...
+from drivers.contract.frame import FrameSet
 
 
 class Tracker:
@@ -112,11 +88,8 @@ class Tracker:
     ):
         if color is None and color_noise is not None:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
-        sensor = {
-            "noise": noise_models.StructuredLight() if noise is None else noise,
-            "texture": texture,
-            "range_m": range_m,
-        }
+        noise = noise_models.StructuredLight() if noise is None else noise
+        sensor = {"noise": noise, "texture": texture, "range_m": range_m}
         sensor |= {"outlier_share": outlier_share, "no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
@@ -127,8 +100,6 @@ class Tracker:
             color_noise = noise_models.Color() if color_noise is None else color_noise
         settings = arguments.configuration(sensor, color_noise, parts, vertices)
         self._configure(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
-        if color is not None and not _takes_pictures(self._rig.sensors[arguments.COLOR]):
-            raise ArgumentError(f"color_noise = {color_noise}: must be noise.Color(), noise.Grey() or noise.Bayer()")
 
     @classmethod
     def configured(
@@ -161,11 +132,13 @@ class Tracker:
         try:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
-            self._region = _RegionOrMask(plan.region.build())
+            self._region = RegionOrMask(plan.region.build())
             self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from error
-        self._budget_ns = np.inf if budget_ms is None else _positive_ms(budget_ms) * 1e6
+        if budget_ms is not None:
+            checks.positive("budget_ms", budget_ms, "more than 0, or None for no limit")
+        self._budget_ns = np.inf if budget_ms is None else float(budget_ms) * 1e6
         self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
         self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
 
@@ -233,29 +206,3 @@ class Tracker:
                 yield with_mesh(found, self._session.mesh, self._session.mesh_version)
         except ObservationError as error:
             raise ArgumentError(str(error)) from error
-
-
-def _takes_pictures(sensor: Sensor) -> bool:
-    return measurement(sensor.noise).frames[0] in (Kind.COLOR, Kind.BAYER)
-
-
-def _positive_ms(budget_ms: float) -> float:
-    allowed = "more than 0, or None for no limit"
-    if not checks.number("budget_ms", budget_ms, allowed) > 0:
-        raise ArgumentError(f"budget_ms = {budget_ms}: must be {allowed}")
-    return float(budget_ms)
-
-
-class _RegionOrMask:
-    """The pixels of a mask while there is one, else of the region. It is its own settings."""
-
-    def __init__(self, region: Region):
-        self.mask: NDArray[np.bool_] | None = None
-        self._region = region
-
-    def build(self) -> Region:
-        return self
-
-    def select(self, view: DepthView) -> NDArray[np.bool_]:
-        region = self._region if self.mask is None else Mask(self.mask)
-        return region.select(view)
