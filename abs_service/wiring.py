@@ -9,15 +9,11 @@ from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.detection.templates import first_image
 from abs_service.tracker.detection.templates.base import BindsToMesh
 from abs_service.tracker.measurements import measurement
-from abs_service.tracker.models import nurbs, posed
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import streams
 from calib.camera import Camera
 from calib.no_return import CAUTIOUS, NoReturn
-from calib.noise.base import DepthNoise, ImageNoise
-from calib.noise.per_pixel import PerPixel
-from calib.noise.pixel_polynomial import PixelPolynomial
-from calib.noise.region_polynomial import RegionPolynomial
+from calib.noise.base import DepthNoise, ImageNoise, Mapped
 from calib.rig import Noise, Rig, Sensor
 
 
@@ -42,11 +38,11 @@ def plan(config: ServiceConfig, tracker: str) -> Plan:
             f"trackers.{tracker}.sensors = {list(table.sensors)} must contain "
             f'the sensor of the tracker\'s reference, "{reference}"'
         )
-    if table.vertex_offsets.random_walk and not isinstance(table.model, nurbs.Settings):
+    if table.vertex_offsets.random_walk and not getattr(table.model, "has_offsets", False):
         raise PlanError(
             f"trackers.{tracker}.vertex_offsets.random_walk = {table.vertex_offsets.random_walk:g} "
-            f"needs a model whose vertices have offsets: "
-            f'"nurbs", not "{model_name(config, tracker)}"; leave it out or set it to 0'
+            f'needs a model whose vertices have offsets, such as "nurbs", not "{model_name(config, tracker)}"; '
+            "leave it out or set it to 0"
         )
     _check_template(tracker, table)
     return Plan(
@@ -70,13 +66,12 @@ def _check_template(tracker: str, table: TrackerTable) -> None:
     """PlanError if a tracker's template does not go with its other parts."""
     if isinstance(table.template, first_image.Settings):
         return
-    kind, model = plugins.table(table.template)["type"], table.model
-    while isinstance(model, posed.Settings):
-        model = model.shape
-    if not isinstance(model, BindsToMesh):
+    kind = plugins.table(table.template)["type"]
+    unbound = next((one for one in plugins.with_parts(table.model) if not isinstance(one, BindsToMesh)), None)
+    if unbound is not None:
         raise PlanError(
-            f'trackers.{tracker}.template.type = "{kind}": the model "{plugins.table(model)["type"]}" finds its object '
-            'by itself and cannot be bound to a mesh; "rigid", "nurbs" and "flexpad" can, or leave template out'
+            f'trackers.{tracker}.template.type = "{kind}": the model "{plugins.table(unbound)["type"]}" finds its '
+            'object by itself and cannot be bound to a mesh; "rigid", "nurbs" and "flexpad" can, or leave template out'
         )
     if table.reinitialization.keep_s:
         raise PlanError(
@@ -137,7 +132,7 @@ def texture(settings: Any) -> ImageNoise:
     made = settings.build()
     if not isinstance(made, ImageNoise):
         kind = plugins.table(settings)["type"]
-        raise PlanError(f'type "{kind}" is no texture: intensity, color, grey and bayer are')
+        raise PlanError(f'texture.type = "{kind}": must be intensity, color, grey or bayer')
     return made
 
 
@@ -180,10 +175,7 @@ def synchroniser(config: ServiceConfig, tracker: str, sensors: Iterable[Sensor])
 
 
 def _check_size(sensor: str, noise: Noise, camera: Camera) -> None:
-    if isinstance(noise, (PerPixel, PixelPolynomial, RegionPolynomial)) and noise.shape != (
-        camera.height,
-        camera.width,
-    ):
+    if isinstance(noise, Mapped) and noise.shape != (camera.height, camera.width):
         height, width = noise.shape
         raise PlanError(
             f"sensors.{sensor}.noise.file: its maps are for {width} × {height} pixels, "

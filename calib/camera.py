@@ -3,6 +3,7 @@
 import functools
 import hashlib
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from calib.pose import Pose
 
 
 class CameraError(ValueError):
-    """Invalid camera parameters."""
+    """Invalid camera parameters; names parameter, value and what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +41,15 @@ class Camera:
     T_rs: Pose = field(default_factory=pose.identity)
 
     def __post_init__(self) -> None:
-        if self.width < 1 or self.height < 1:
-            raise CameraError(f"an image of {self.width} × {self.height} pixels has no content")
-        if not (self.fx > 0 and self.fy > 0 and np.all(np.isfinite([self.fx, self.fy, self.cx, self.cy]))):
-            raise CameraError(f"fx and fy must be positive and all finite, not {self.fx, self.fy, self.cx, self.cy}")
-        if not pose.is_pose(self.T_rs):
-            raise CameraError("T_rs must be a rigid 4 × 4 pose (orthonormal rotation, last row 0 0 0 1)")
+        for name in ("width", "height"):
+            size = getattr(self, name)
+            if not isinstance(size, Integral) or size < 1:
+                raise CameraError(f"{name} = {size!r}: must be a whole number of pixels, at least 1")
+        for name in ("fx", "fy", "cx", "cy"):
+            _check_number(name, getattr(self, name), positive=name in ("fx", "fy"))
+        if not isinstance(self.lens, LensModel):
+            raise CameraError(f"lens = {self.lens!r}: must be a lens model, such as Lens(…) or Fisheye(…)")
+        object.__setattr__(self, "T_rs", _pose(self.T_rs))
 
     @property
     def center(self) -> NDArray[np.float64]:
@@ -132,3 +136,21 @@ class Camera:
     def unproject(self, distance: NDArray[np.floating]) -> NDArray[np.float64]:
         """Rig points (height, width, 3) [m] of a radial distance image [m]; NaN stays NaN."""
         return pose.transform(self.T_rs, self.lookup.rays * np.asarray(distance, np.float64)[..., None])
+
+
+def _check_number(name: str, value: object, *, positive: bool) -> None:
+    number = float(value) if isinstance(value, Real) else np.nan
+    if not np.isfinite(number) or (positive and number <= 0):
+        raise CameraError(f"{name} = {value!r}: must be {'positive and ' if positive else ''}finite")
+
+
+def _pose(given: object) -> Pose:
+    """The pose as an array; CameraError if it is none."""
+    try:
+        T_rs = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        T_rs = np.zeros(0)
+    if not pose.is_pose(T_rs):
+        shown = np.array2string(T_rs, separator=", ") if T_rs.ndim == 2 else repr(given)
+        raise CameraError(f"T_rs = {shown}: must be a rigid 4 × 4 pose (orthonormal rotation, last row 0 0 0 1)")
+    return T_rs

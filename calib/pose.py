@@ -107,10 +107,11 @@ def transform(T_ab: Pose, points_b: NDArray[np.floating]) -> NDArray[np.float64]
 
 def is_pose(T_ab: NDArray[np.float64], tolerance: float = 1e-6) -> bool:
     """True if a (4, 4) matrix is a rigid pose: orthonormal rotation of determinant one, last row (0, 0, 0, 1)."""
+    if T_ab.shape != (4, 4):
+        return False
     rotation = T_ab[:3, :3]
     return bool(
-        T_ab.shape == (4, 4)
-        and np.all(np.isfinite(T_ab))
+        np.all(np.isfinite(T_ab))
         and np.allclose(rotation @ rotation.T, np.eye(3), atol=tolerance)
         and np.linalg.det(rotation) > 0
         and np.allclose(T_ab[3], (0, 0, 0, 1), atol=tolerance)

@@ -18,6 +18,7 @@ from abs_service.tracker.objectives import euclidean, likelihood
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import ModelSettings, Plan
 from abs_service.tracking.session import TrackingSession
+from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.truth import Errors, TruthComparison
 from calib.noise.base import DepthNoise, pixels_where
 from calib.rig import Noise, Rig
@@ -199,10 +200,10 @@ def track(rig: Rig, plan: Plan, exposures: Sequence[LabeledExposure]) -> Tracked
     tracking = TrackingSession(rig, plan)
     evaluator = TruthEvaluator(tracking)
     models, estimates, errors, material, cpu_ms = [], [], [], [], []
-    for exposure in exposures:
-        start = time.process_time()
-        estimate = tracking.track(exposure.frames, lambda: True)
-        cpu_ms.append((time.process_time() - start) * 1e3)
+    frame_sets = (exposure.frames for exposure in exposures)
+    tracked = track_sets(tracking, frame_sets, time.process_time_ns)
+    for exposure, (_, estimate, took_ns) in zip(exposures, tracked, strict=True):
+        cpu_ms.append(took_ns * 1e-6)
         error, points = evaluator.errors(estimate, exposure.points), evaluator.material_points(estimate)
         if error is None or points is None or tracking.model is None:
             raise UntrackedError(f"exposure {exposure.frames.seq}: {', '.join(estimate.reasons)}")

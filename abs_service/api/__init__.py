@@ -1,7 +1,7 @@
 """The public face of the package, for programs that have arrays and no running service; `abs_service` re-exports it."""
 
 from abs_service.api import noise
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.models import FlexPad, Gravity, Nurbs, Posed, Rigid
 from abs_service.api.recording import Image, Recording, open_recording

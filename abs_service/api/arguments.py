@@ -5,10 +5,15 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from abs_service import config
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
+from abs_service.tracker.measurements import measurement
 from abs_service.tracking.plan import ModelSettings
+from calib.noise.base import NoiseError
 from calib.rig import Noise
+from drivers.contract.frame import Kind
 
 #: What a rig file holds for a part of a tracker, `{"type": "hybrid", "steps": 4}`.
 Table = Mapping[str, Any]
@@ -55,7 +60,7 @@ def configuration(
     sensors = {DEPTH: _keys(sensor)}
     if color_noise is not None:
         sensors[COLOR] = _keys({"noise": color_noise})
-    mesh = {} if vertices is None else {"mesh": {"vertices": vertices}}
+    mesh = {} if vertices is None else {"mesh": _keys({"vertices": vertices})}
     tables = {
         "version": 1,
         "name": "arrays",
@@ -65,9 +70,13 @@ def configuration(
         "trackers": {TRACKER: {"sensors": list(sensors), **_keys(tracker), **mesh}},
     }
     try:
-        return config.from_tables(tables, "Tracker", Path.cwd())
-    except config.ConfigError as error:
+        settings = config.from_tables(tables, "Tracker", Path.cwd())
+        pictures = [table.noise.build() for name, table in settings.sensors.items() if name == COLOR and table.noise]
+    except (config.ConfigError, NoiseError) as error:
         raise ArgumentError(in_arguments(str(error))) from error
+    if any(measurement(noise).frames[0] not in (Kind.COLOR, Kind.BAYER) for noise in pictures):
+        raise ArgumentError(f"color_noise = {color_noise}: must be noise.Color(), noise.Grey() or noise.Bayer()")
+    return settings
 
 
 def in_arguments(message: str) -> str:
@@ -88,6 +97,9 @@ def _plain(name: str, value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         table = {field.name: getattr(value, field.name) for field in fields(value)}
         return {"type": type(value).__module__.rpartition(".")[2]} | _keys(table)
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
     if isinstance(value, type) or callable(value):
-        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = a.Nurbs(4, 4), or a table")
+        example = "a.Nurbs(4, 4)" if name == "model" else "a.noise.Constant(0.001)"
+        raise ArgumentError(f"{name} = {value!r}: must be settings, such as {name} = {example}, or a table")
     return value

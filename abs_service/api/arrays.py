@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from abs_service.api.errors import ArgumentError
+from abs_service.api import checks
+from abs_service.api.checks import ArgumentError
 from abs_service.pairing.images import BAYER_ORDERS
 from abs_service.tracker.measurements import measurement
 from abs_service.tracking.session import streams
@@ -18,6 +19,9 @@ from drivers.contract.frame import Frame, FrameSet, Geometry, Kind
 
 #: A depth image whose median is larger [m] is one in millimetres.
 FARTHEST_M = 100.0
+
+#: Times beyond it do not fit 64 bits of nanoseconds [s].
+LATEST_S = 9e9
 
 #: Encodings of 8- and 16-bit images of the brightness.
 _GREY = {"u1": "mono8", "u2": "mono16"}
@@ -39,7 +43,7 @@ class FrameBuilder:
     def __init__(self, rig: Rig, reference: str, geometry: str, bayer: str):
         if geometry not in ("z", "radial"):
             raise ArgumentError(f'geometry = {geometry!r}: must be "z" or "radial"')
-        if bayer not in BAYER_ORDERS:
+        if bayer not in list(BAYER_ORDERS):
             raise ArgumentError(f"bayer = {bayer!r}: must be one of {', '.join(BAYER_ORDERS)}")
         self._rig = rig
         self._geometry = Geometry(geometry)
@@ -80,7 +84,9 @@ class FrameBuilder:
                 raise ArgumentError(f"{name} is given, but the tracker uses no such image; it uses {self._uses()}")
             head, _, kind = stream.partition("/")
             label = labels.get(stream, f"streams[{stream!r}]")
-            frames[head, kind] = self._frame(head, Kind(kind), np.asarray(array), label, t_ns)
+            if (head, kind) in frames:
+                raise ArgumentError(f"{name} is given, and {label} too, which is the same image: leave one out")
+            frames[head, kind] = self._frame(head, Kind(kind), checks.array(label, array), label, t_ns)
         self._check_complete(frames, labels)
         self._last_ns, self._seq = t_ns, self._seq + 1
         return FrameSet(self._seq - 1, t_ns, frames)
@@ -90,9 +96,10 @@ class FrameBuilder:
         return ", ".join(labels.get(stream, f"streams[{stream!r}]") for stream in self._streams)
 
     def _time_ns(self, time_s: float) -> int:
-        if not np.isfinite(time_s):
-            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds")
-        t_ns = round(float(time_s) * 1e9)
+        seconds = checks.number("time_s", time_s, "a time in seconds")
+        if not abs(seconds) < LATEST_S:
+            raise ArgumentError(f"time_s = {time_s}: must be a time in seconds, less than {LATEST_S:g}")
+        t_ns = round(seconds * 1e9)
         if self._last_ns is not None and t_ns <= self._last_ns:
             raise ArgumentError(f"time_s = {time_s}: must be later than the frame before, {self._last_ns * 1e-9:g}")
         return t_ns
@@ -152,6 +159,8 @@ class FrameBuilder:
             )
         if array.dtype.kind not in "uif":
             raise ArgumentError(f"{label} holds {array.dtype}, must be numbers")
+        if (array < 0).any():
+            raise ArgumentError(f"{label} holds {np.nanmin(array):g}: must be positive; NaN means no return")
         return np.ascontiguousarray(array, "<f4"), "32FC1"
 
 
@@ -159,11 +168,14 @@ def object_mask(mask: ArrayLike, camera: Camera) -> NDArray[np.bool_]:
     """Pixels of an object, where a mask is not zero.
 
     Raises:
-        ArgumentError: a mask of another size than the camera's.
+        ArgumentError: a mask of another size than the camera's, or of something else than numbers.
     """
-    pixels = np.asarray(mask)
+    pixels = checks.array("mask", mask)
     if pixels.shape != (camera.height, camera.width):
         raise ArgumentError(f"mask has shape {pixels.shape}, the depth camera has {camera.height} × {camera.width}")
+    if pixels.dtype.kind not in "buif" or np.isnan(pixels).any():
+        content = "NaN" if pixels.dtype.kind == "f" else pixels.dtype
+        raise ArgumentError(f"mask holds {content}, must be boolean, or numbers that are 0 beside the object")
     return pixels != 0
 
 
@@ -171,15 +183,16 @@ def _metres(array: NDArray[Any], label: str) -> NDArray[np.float32]:
     """Lengths [m], NaN where there is none: where they are not finite."""
     if array.dtype.kind != "f":
         raise ArgumentError(f"{label} holds {array.dtype}, must be floating-point metres: millimetres * 0.001")
-    metres = array.astype("<f4")
-    metres[~np.isfinite(metres)] = np.nan
-    some = metres[::4, ::4]
-    returns = some[np.abs(some) > 0]
-    if returns.size and np.median(returns) > FARTHEST_M:
+    some = array[::4, ::4]
+    returns = some[np.isfinite(some) & (some != 0)]
+    if returns.size and np.median(np.abs(returns)) > FARTHEST_M:
         raise ArgumentError(
             f"{label} has a median of {np.median(returns):g}, must be metres, less than {FARTHEST_M:g}: "
             "millimetres * 0.001"
         )
+    with np.errstate(over="ignore"):
+        metres = array.astype("<f4")
+    metres[~np.isfinite(metres)] = np.nan
     if (metres < 0).any():
         raise ArgumentError(f"{label} holds {np.nanmin(metres):g}: must be positive; NaN or 0 means no return")
     return metres

@@ -1,5 +1,6 @@
 """Deformation models by their public names; docs/explanation/models.md describes them."""
 
+from abs_service.api.checks import ArgumentError
 from abs_service.tracker.models import nurbs
 from abs_service.tracker.models.flexpad import Settings as FlexPad
 from abs_service.tracker.models.gravity import Settings as Gravity
@@ -31,10 +32,13 @@ def Nurbs(
         smoothing: weight of the bending of the rest surface when it is fitted to the vertices.
 
     Raises:
-        ValueError: weights of another shape, or one of `long` and `short` without the other.
+        ArgumentError: weights of another shape, or one of `long` and `short` without the other.
     """
-    if long is None and short is None:
-        return nurbs.Settings("auto", degree, weights, margin, smoothing)
-    if long is None or short is None:
-        raise ValueError("long and short belong together: give both, or neither")
-    return nurbs.Settings((long, short), degree, weights, margin, smoothing)
+    if (long is None) != (short is None):
+        raise ArgumentError(f"long = {long}, short = {short}: give both, or neither")
+    try:
+        return nurbs.Settings(
+            "auto" if long is None or short is None else (long, short), degree, weights, margin, smoothing
+        )
+    except ValueError as error:
+        raise ArgumentError(f"Nurbs: {error}") from error

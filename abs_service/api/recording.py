@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from abs_service import config
-from abs_service.api.errors import ArgumentError
+from abs_service.api import checks
+from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate
 from abs_service.api.recorded_estimates import estimates, trackers
 from abs_service.api.rig import Rig
@@ -139,9 +140,10 @@ def open_recording(path: str | Path) -> Recording:
     """Opens a recording; nothing but its index is read before it is asked for.
 
     Raises:
+        ArgumentError: no path.
         RecordingError: no such file, or no MCAP file.
     """
-    return Recording(Path(path))
+    return Recording(checks.path(path))
 
 
 def _image(frame: Frame) -> Image:

@@ -6,7 +6,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from abs_service import config, wiring
-from abs_service.api.errors import ArgumentError
+from abs_service.api import checks
+from abs_service.api.checks import ArgumentError
 from abs_service.api.tracker import Tracker
 from calib.camera import Camera
 
@@ -56,11 +57,13 @@ class Rig:
         Raises:
             ArgumentError: no such tracker, or several; a sensor without a camera.
         """
-        if not name and len(self.trackers) == 1:
+        given = checks.mapping("cameras", cameras, '{"tof": Camera(…)}')
+        given = {sensor: checks.camera(f"cameras[{sensor!r}]", camera) for sensor, camera in given.items()}
+        if name == "" and len(self.trackers) == 1:
             name = self.trackers[0]
         if name not in self.trackers:
             raise ArgumentError(f"name = {name!r}: the rig has {', '.join(self.trackers) or 'no trackers'}")
-        known = wiring.cameras(self._settings, {**self.cameras, **cameras})
+        known = wiring.cameras(self._settings, {**self.cameras, **given})
         for sensor in self._settings.trackers[name].sensors:
             if sensor not in known:
                 raise ArgumentError(
@@ -74,6 +77,7 @@ def load_rig(path: str | Path) -> Rig:
     """Reads a rig file; no device is opened.
 
     Raises:
+        ArgumentError: no path.
         ConfigError: names file, key, value and the allowed values, for all that is wrong with it.
     """
-    return Rig(config.load(Path(path)))
+    return Rig(config.load(checks.path(path)))

@@ -1,34 +1,30 @@
 """A tracker of arrays: one call per frame, no process, no file, no thread."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from abs_service import config, wiring
-from abs_service.api import arguments
+from abs_service.api import arguments, checks
 from abs_service.api import noise as noise_models
 from abs_service.api.arguments import ModelPart, NoisePart, Table
 from abs_service.api.arrays import FrameBuilder, object_mask
-from abs_service.api.errors import ArgumentError
+from abs_service.api.checks import ArgumentError
 from abs_service.api.estimate import Estimate, with_mesh
+from abs_service.api.region_or_mask import RegionOrMask
+from abs_service.api.replayable import Replayable
 from abs_service.pairing.observation import ObservationError
-from abs_service.tracker.detection.depth_view import DepthView
 from abs_service.tracker.detection.initial_detection import DetectionError
-from abs_service.tracker.detection.regions.base import Region
-from abs_service.tracker.detection.regions.mask import Mask
-from abs_service.tracking.session import TrackingSession
-from abs_service.tracking.session import streams as streams_of
+from abs_service.tracking.session import TrackingSession, missing_streams
+from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.warmup.board import warm_up
 from calib.camera import Camera
 from calib.noise.base import NoiseError
 from drivers.contract.frame import FrameSet
-
-if TYPE_CHECKING:
-    from abs_service.api.recording import Recording
 
 
 class Tracker:
@@ -92,14 +88,15 @@ class Tracker:
     ):
         if color is None and color_noise is not None:
             raise ArgumentError("color_noise is given without the camera: color=Camera(…)")
-        sensor = {"noise": noise or noise_models.StructuredLight(), "texture": texture, "range_m": range_m}
+        noise = noise_models.StructuredLight() if noise is None else noise
+        sensor = {"noise": noise, "texture": texture, "range_m": range_m}
         sensor |= {"outlier_share": outlier_share, "no_return": no_return}
         parts = {"model": model, "region": region, "template": template, "synthesis": synthesis, "objective": objective}
         parts |= {"optimizer": optimizer, "priors": priors, "vertex_offsets": vertex_offsets, "status": status}
         parts |= {"reinitialization": reinitialization, "budget_evaluations": budget_evaluations}
-        cameras = {arguments.DEPTH: depth}
+        cameras = {arguments.DEPTH: checks.camera("depth", depth)}
         if color is not None:
-            cameras[arguments.COLOR] = color
+            cameras[arguments.COLOR] = checks.camera("color", color)
             color_noise = noise_models.Color() if color_noise is None else color_noise
         settings = arguments.configuration(sensor, color_noise, parts, vertices)
         self._configure(settings, arguments.TRACKER, cameras, geometry, bayer, budget_ms)
@@ -135,14 +132,14 @@ class Tracker:
         try:
             plan = wiring.plan(settings, name)
             rig = wiring.rig(settings, name, cameras)
-            self._region = _RegionOrMask(plan.region.build())
+            self._region = RegionOrMask(plan.region.build())
             self._session = TrackingSession(rig, replace(plan, region=self._region))
         except (wiring.PlanError, NoiseError, DetectionError) as error:
             raise ArgumentError(arguments.in_arguments(str(error))) from error
-        if budget_ms is not None and not budget_ms > 0:
-            raise ArgumentError(f"budget_ms = {budget_ms}: must be more than 0, or None for no limit")
+        if budget_ms is not None:
+            checks.positive("budget_ms", budget_ms, "more than 0, or None for no limit")
+        self._budget_ns = np.inf if budget_ms is None else float(budget_ms) * 1e6
         self._settings, self._name, self._rig, self._plan = settings, name, rig, plan
-        self._budget_ns = np.inf if budget_ms is None else budget_ms * 1e6
         self._frames = FrameBuilder(rig, plan.reference, geometry, bayer)
 
     def track(
@@ -174,22 +171,26 @@ class Tracker:
         """
         given = {"depth_m": depth_m, "image": image, "amplitude": amplitude, "deviation_m": deviation_m}
         self._region.mask = None if mask is None else object_mask(mask, self._rig.sensors[self._plan.reference].camera)
-        return self._track(self._frames.frame_set(time_s, given | dict(streams or {})))
+        further = {} if streams is None else checks.mapping("streams", streams, '{"left/depth": array}')
+        return next(self._track([self._frames.frame_set(time_s, given | dict(further))]))
 
-    def replay(self, recording: "Recording") -> Iterator[Estimate]:
+    def replay(self, recording: Replayable) -> Iterator[Estimate]:
         """The estimates for a recording, frame set by frame set, as `abs-service replay` makes them.
 
+        Args:
+            recording: what `open_recording` opens.
+
         Raises:
-            ArgumentError: the recording lacks images that the tracker uses.
+            ArgumentError: no recording, or one that lacks images that the tracker uses.
             RecordingError: a part of the file is damaged.
         """
-        needed = [f"{head}/{stream}" for head, stream in streams_of(self._rig.sensors.values())]
-        missing = [stream for stream in needed if stream not in recording.streams]
-        if missing:
+        if not isinstance(recording, Replayable):
+            raise ArgumentError(f"recording = {recording!r}: must be a recording, open_recording(path)")
+        if missing := missing_streams(self._rig.sensors.values(), recording.streams):
             raise ArgumentError(f"{recording.path} has no {', '.join(missing)}; it has {', '.join(recording.streams)}")
-        self._region.mask = None
         synchroniser = wiring.synchroniser(self._settings, self._name, self._rig.sensors.values())
-        yield from map(self._track, synchroniser.group(recording.frames()))
+        self._region.mask = None
+        return self._track(synchroniser.group(recording.frames()))
 
     def reinitialize(self) -> None:
         """Looks for the object anew in the next frame; safe from any thread."""
@@ -199,25 +200,9 @@ class Tracker:
         """Compiles the kernels on all cores: up to a minute once per installation, then about a second per process."""
         warm_up(self._rig, self._plan)
 
-    def _track(self, frames: FrameSet) -> Estimate:
-        begin_ns = time.monotonic_ns()
+    def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[Estimate]:
         try:
-            found = self._session.track(frames, lambda: time.monotonic_ns() - begin_ns < self._budget_ns)
+            for _, found, _ in track_sets(self._session, frame_sets, time.monotonic_ns, self._budget_ns):
+                yield with_mesh(found, self._session.mesh, self._session.mesh_version)
         except ObservationError as error:
             raise ArgumentError(str(error)) from error
-        return with_mesh(found, self._session.mesh, self._session.mesh_version)
-
-
-class _RegionOrMask:
-    """The pixels of a mask while there is one, else of the region. It is its own settings."""
-
-    def __init__(self, region: Region):
-        self.mask: NDArray[np.bool_] | None = None
-        self._region = region
-
-    def build(self) -> Region:
-        return self
-
-    def select(self, view: DepthView) -> NDArray[np.bool_]:
-        region = self._region if self.mask is None else Mask(self.mask)
-        return region.select(view)

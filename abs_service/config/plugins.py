@@ -6,6 +6,7 @@ as entry points of the group of that name (docs/how-to/extending.md).
 
 import json
 import pkgutil
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from importlib import import_module
 from importlib.metadata import distributions, entry_points
@@ -77,6 +78,13 @@ def settings(module: str, table: Any, base: Path) -> Any:
     values = {field.name: getattr(made, field.name) for field in fields(Settings)}
     paths = {name: base / value for name, value in values.items() if isinstance(value, Path)}
     return replace(made, **paths, **nested)
+
+
+def with_parts(made: Any) -> Iterator[Any]:
+    """Settings, and those of the parts that they contain, at any depth."""
+    yield made
+    for name in _nested(made):
+        yield from with_parts(getattr(made, name))
 
 
 def _nested(Settings: Any) -> dict[str, str]:

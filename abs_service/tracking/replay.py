@@ -1,6 +1,6 @@
 """Offline tracking of a recording: every frame set, no clock, deterministic."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import chain, count
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from abs_service.bus.stamps import HeaderFactory
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.tracker.estimate import Estimate
 from abs_service.tracking.session import TrackingSession
+from abs_service.tracking.tracked_sets import track_sets
 from abs_service.tracking.tracker_log import EstimateReport, TrackerLog
 from abs_service.wire import estimate_messages
 from abs_service.wire.estimate_messages import Effort, Identity
@@ -66,19 +67,18 @@ class OfflineTracker:
         self.log.truth.add_truth(truth.t_host_ns, truth.points_r, truth.surface)
 
     def add_frame(self, frame: Frame) -> Iterator[EstimateReport]:
-        """Adds a frame and yields the estimates of the frame sets that it completes."""
-        for frames in self.synchroniser.add(frame):
-            yield from self._track(frames)
+        """Adds a frame; yields the estimates of the frame sets that it completes."""
+        return self._track(self.synchroniser.add(frame))
 
     def finish(self) -> Iterator[EstimateReport]:
         """Yields the estimates of the remaining frame sets."""
-        for frames in self.synchroniser.flush():
-            yield from self._track(frames)
+        return self._track(self.synchroniser.flush())
 
-    def _track(self, frames: FrameSet) -> Iterator[EstimateReport]:
-        begin_ns = self._clock()
-        estimate = self._tracking.track(frames, _always)
-        solve_ms = (self._clock() - begin_ns) * 1e-6
+    def _track(self, frame_sets: Iterable[FrameSet]) -> Iterator[EstimateReport]:
+        for _, estimate, took_ns in track_sets(self._tracking, frame_sets, self._clock):
+            yield from self._report(estimate, took_ns * 1e-6)
+
+    def _report(self, estimate: Estimate, solve_ms: float) -> Iterator[EstimateReport]:
         self._write_new_topology()
         header = self._headers.at(estimate.t_host_ns, estimate.seq, keys.RIG_FRAME)
         state = estimate_messages.state(
@@ -132,7 +132,3 @@ def free_path(recording: Path) -> Path:
     suffixes = chain(["_replay"], (f"_replay_{number}" for number in count(2)))
     paths = (recording.with_name(f"{recording.stem}{suffix}.mcap") for suffix in suffixes)
     return next(path for path in paths if not path.exists())
-
-
-def _always() -> bool:
-    return True

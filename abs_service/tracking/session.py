@@ -1,6 +1,6 @@
 """A tracker over time: initial detection, tracking, loss and renewed detection."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -175,6 +175,11 @@ def streams(sensors: Iterable[Sensor]) -> list[tuple[str, str]]:
     """The (head, stream) of every image that the sensors' noise models require; streams are named after their kind."""
     needed = ((sensor.head, kind.value) for sensor in sensors for kind in measurement(sensor.noise).frames)
     return list(dict.fromkeys(needed))
+
+
+def missing_streams(sensors: Iterable[Sensor], there: Collection[str]) -> list[str]:
+    """What the sensors need of a recording and is not there, as "sensor/stream"."""
+    return [name for head, stream in streams(sensors) if (name := f"{head}/{stream}") not in there]
 
 
 def _initializing(observation: Observation, reasons: tuple[str, ...], warnings: tuple[str, ...]) -> Estimate:

@@ -15,9 +15,9 @@ from calib.solve.bundle.parameters.layout import DEPTH_TERMS, FreeParameters, La
 from calib.solve.bundle.parameters.lens_parameters import kind_of
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import SensorTask, Task
+from calib.solve.diagnoses import unlike_the_rest
 from calib.solve.solution import Solution
 from calib.solve.start.board_poses import pose_candidates
-from calib.solve.validation.diagnoses import unlike_the_rest
 
 
 def solve(stored: Stored, views: Views, moving: Collection[str]) -> Solution:

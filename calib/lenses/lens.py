@@ -1,7 +1,7 @@
 """Lens distortion `D_s` of eq. 10 in normalised image coordinates (x/z, y/z), and its inverse."""
 
 from dataclasses import dataclass, field
-from typing import ClassVar, Protocol
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,7 @@ class LensError(ValueError):
     """Invalid coefficients, or a point at which the distortion has no inverse."""
 
 
+@runtime_checkable
 class LensModel(Protocol):
     """Lens model as used by cameras, calibration and warping.
 
@@ -68,9 +69,12 @@ def padded(given: ArrayLike, names: tuple[str, ...]) -> NDArray[np.float64]:
     """Coefficients padded with zeros, read-only.
 
     Raises:
-        LensError: too many, or not finite.
+        LensError: too many, or not finite numbers.
     """
-    numbers = np.atleast_1d(np.asarray(given, np.float64))
+    try:
+        numbers = np.atleast_1d(np.asarray(given, np.float64))
+    except (TypeError, ValueError):
+        raise LensError(f"a lens has at most {len(names)} finite coefficients {names}, not {given!r}") from None
     if numbers.ndim != 1 or numbers.size > len(names) or not np.all(np.isfinite(numbers)):
         raise LensError(f"a lens has at most {len(names)} finite coefficients {names}, not {numbers.tolist()}")
     full = np.zeros(len(names))

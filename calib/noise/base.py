@@ -60,6 +60,16 @@ class DepthNoise(Protocol):
 
 
 @runtime_checkable
+class Mapped(Protocol):
+    """A noise model with numbers of its own for every pixel, so that it is for images of one size only."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the images."""
+        ...
+
+
+@runtime_checkable
 class ImageNoise(Protocol):
     """Gaussian noise of a pixel's colour, grey value or intensity, in the sensor's unit."""
 

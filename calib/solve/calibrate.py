@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 
+from calib.solve import diagnoses
 from calib.solve.bundle.adjustment import NotSolvedError, adjust
 from calib.solve.bundle.formulation import formulate, groups_of
 from calib.solve.bundle.parameters.state import State
 from calib.solve.bundle.tasks import Task
 from calib.solve.solution import Solution
 from calib.solve.start.start import start
-from calib.solve.validation import diagnoses
 
 
 def calibrate(task: Task, note: Callable[[str], None] = lambda _: None) -> Solution:

@@ -12,7 +12,7 @@ from drivers.contract.device import AddressError
 from drivers.simulated import faults, values
 from drivers.simulated.faults import FaultSchedule
 from drivers.simulated.scene.excursion import Excursion
-from drivers.simulated.scene.scenes import SCENES, SceneSettings
+from drivers.simulated.scenes import SCENES, SceneSettings
 from drivers.simulated.sensors.bayer import ORDERS, Mosaic
 from drivers.simulated.sensors.heads import HeadFactory
 from drivers.simulated.sensors.optics import BEAMS, OPTICS

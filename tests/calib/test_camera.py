@@ -109,17 +109,29 @@ def test_equal_cameras_have_equal_calib_ids():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"width": 0}, "0 × 24 pixels"),
-        ({"height": -1}, "32 × -1 pixels"),
-        ({"fx": 0.0}, "fx and fy must be positive"),
-        ({"fy": -3.0}, "fx and fy must be positive"),
-        ({"cx": np.nan}, "all finite"),
-        ({"fx": np.inf}, "all finite"),
-        ({"T_rs": 2 * np.eye(4)}, "T_rs must be a rigid"),
-        ({"T_rs": np.diag([1.0, 1.0, -1.0, 1.0])}, "T_rs must be a rigid"),
-        ({"T_rs": np.eye(3)}, "T_rs must be a rigid"),
+        ({"width": 0}, r"width = 0: must be a whole number of pixels"),
+        ({"height": -1}, r"height = -1: must be"),
+        ({"fx": 0.0}, r"fx = 0\.0: must be positive and finite"),
+        ({"fy": -3.0}, r"fy = -3\.0: must be positive"),
+        ({"cx": np.nan}, "cx = nan: must be finite"),
+        ({"fx": np.inf}, "fx = inf: must be positive and finite"),
+        ({"T_rs": 2 * np.eye(4)}, r"T_rs = \[\[2\., 0\., .*: must be a rigid"),
+        ({"T_rs": np.diag([1.0, 1.0, -1.0, 1.0])}, r"T_rs = \[\[ 1\., .*: must be a rigid"),
+        ({"T_rs": np.eye(3)}, r"T_rs = \[\[1\., 0\., 0\.\],\n.*: must be a rigid 4 × 4 pose"),
+        ({"width": "32"}, r"width = '32': must be a whole number of pixels, at least 1"),
+        ({"width": 32.5}, r"width = 32\.5: must be a whole number"),
+        ({"fx": "40"}, r"fx = '40': must be positive and finite"),
+        ({"cy": None}, r"cy = None: must be finite"),
+        ({"T_rs": None}, r"T_rs = None: must be a rigid"),
+        ({"T_rs": [[1.0], [1.0, 2.0]]}, r"T_rs = \[\[1\.0\], \[1\.0, 2\.0\]\]: must be a rigid"),
+        ({"lens": [0.1]}, r"lens = \[0\.1\]: must be a lens model"),
     ],
 )
 def test_numbers_that_describe_no_camera_are_named(change, message):
-    with pytest.raises(CameraError, match=message):
+    with pytest.raises(CameraError, match=f"(?s)^{message}"):
         dataclasses.replace(CAMERA, **change)
+
+
+def test_a_pose_may_be_nested_lists():
+    camera = dataclasses.replace(CAMERA, T_rs=CAMERA.T_rs.tolist())
+    assert camera.calib_id == CAMERA.calib_id

@@ -28,7 +28,7 @@ from abs_service.commands.parts import logs, preview_option, progress
 from abs_service.pairing.synchroniser import Synchroniser
 from abs_service.supervision.exit_codes import Exit
 from abs_service.tracking.replay import OfflineTracker, free_path, replay
-from abs_service.tracking.session import TrackingSession, streams
+from abs_service.tracking.session import TrackingSession, missing_streams
 from calib.rig import Rig
 from drivers.contract.frame import Frame
 from drivers.encoding.mcap_file import McapFile
@@ -122,9 +122,8 @@ def recorded_rig(settings: config.ServiceConfig, name: str, recording: Recording
             f"the recording has: {', '.join(there)}"
         )
     rig = wiring.rig(settings, name, wiring.cameras(settings, recording.cameras))
-    members = streams(rig.sensors.values())
-    missing = [f"{sensor}/{stream}" for sensor, stream in members if (sensor, stream) not in recording.counts]
-    if missing:
+    there = [f"{sensor}/{stream}" for sensor, stream in recording.counts]
+    if missing := missing_streams(rig.sensors.values(), there):
         raise ReplayOptionError(f'{recording.path}: tracker "{name}" needs {", ".join(missing)}, which is not there')
     return rig, wiring.synchroniser(settings, name, rig.sensors.values())
 

@@ -1,7 +1,7 @@
 """NURBS deformation: vertices bound to a spline surface whose control points are the parameters (eqs. 2–8)."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Interval
@@ -39,6 +39,9 @@ class Settings:
         smoothing: weight of the bending of the rest surface relative to the squared distances to the vertices in its
             fit; it has an effect only where the object has no vertices.
     """
+
+    #: The vertices of the model have offsets, which can be learnt (`vertex_offsets` of a tracker).
+    has_offsets: ClassVar[bool] = True
 
     control_points: Literal["auto"] | tuple[ControlPoints, ControlPoints] = "auto"
     degree: Annotated[int, Interval(ge=1, le=4)] = 3

@@ -1,5 +1,6 @@
 """Tracking of a recorded strip that hangs from a gripper, for the estimate of its stiffness."""
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ from abs_service.tracking.bending_stiffness.stiffness import (
 from abs_service.tracking.observer import Observer
 from abs_service.tracking.plan import Plan
 from abs_service.tracking.session import TrackingSession
+from abs_service.tracking.tracked_sets import track_sets
 from calib.rig import Rig
 from drivers.contract.frame import Frame, FrameSet
 from drivers.replay import Recording
@@ -103,9 +105,9 @@ def track_strip(
     tracking, observer = TrackingSession(rig, plan), Observer(rig)
     tracked: dict[int, list[tuple[Gravity, Estimate, FrameSet]]] = {}
     sets = 0
-    for frames in synchroniser.group(_counted(recording, on_image)):
-        sets += 1
-        estimate, model = tracking.track(frames, lambda: True), tracking.model
+    frame_sets = synchroniser.group(_counted(recording, on_image))
+    for frames, estimate, _ in track_sets(tracking, frame_sets, time.monotonic_ns):
+        sets, model = sets + 1, tracking.model
         if isinstance(model, Gravity) and estimate.status == Status.TRACKING:
             tracked.setdefault(tracking.mesh_version, []).append((model, estimate, frames))
     if not tracked:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from drivers.simulated.shapes.raycast import lookup
+from drivers.simulated.scene.raycast import lookup
 
 Range = tuple[float, float]
 

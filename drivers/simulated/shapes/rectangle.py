@@ -11,9 +11,9 @@ from calib.pose import Pose
 from drivers.simulated.scene.body import RayImage
 from drivers.simulated.scene.excursion import Excursion
 from drivers.simulated.scene.motion import Placement
+from drivers.simulated.scene.raycast import antialias_edges, cast, shadowed
 from drivers.simulated.scene.surface import surface_points
 from drivers.simulated.scene.texture import Texture
-from drivers.simulated.shapes.raycast import antialias_edges, cast, shadowed
 
 #: Points per side of the grid that bounds the rectangle in images.
 _OUTLINE_POINTS = 13

@@ -1,11 +1,15 @@
 """Arguments that cannot be used: the message names argument, value and the allowed values."""
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
 import abs_service as a
 from tests.abs_service.api.scenes import CAMERA, NOISE, Sheet
 
+SAMPLE = Path(__file__).parents[3] / "recordings" / "sample.mcap"
 DEPTH, IMAGE = Sheet().depth(), Sheet().image(CAMERA)
 
 
@@ -26,6 +30,22 @@ DEPTH, IMAGE = Sheet().depth(), Sheet().image(CAMERA)
         ),
         ({"depth_m": DEPTH, "time_s": -1}, r"time_s = -1: must be later than the frame before, 0"),
         ({"depth_m": DEPTH, "time_s": float("nan")}, r"time_s = nan: must be a time in seconds"),
+        ({"depth_m": DEPTH, "time_s": "x"}, r"time_s = 'x': must be a time in seconds"),
+        ({"depth_m": DEPTH, "time_s": None}, r"time_s = None: must be a time in seconds"),
+        ({"depth_m": DEPTH, "time_s": np.array([1, 2])}, r"time_s = array\(\[1, 2\]\): must be a time in seconds"),
+        ({"depth_m": DEPTH, "time_s": 1.7e18}, r"time_s = 1\.7e\+18: must be a time in seconds, less than 9e\+09"),
+        ({"depth_m": np.full_like(DEPTH, 1e300)}, r"depth_m has a median of 1e\+300, must be metres"),
+        ({"depth_m": [[1.0], [1.0, 2.0]]}, r"depth_m is no array: .*inhomogeneous"),
+        ({"depth_m": np.ma.masked_greater(DEPTH, 1)}, r"depth_m is a masked array: must be a plain one"),
+        ({"depth_m": DEPTH[..., None]}, r"depth_m has shape \(120, 160, 1\), the camera has 120 × 160"),
+        ({"depth_m": DEPTH, "image": IMAGE / 255}, r"image holds float64 of shape .*, must be uint8, 0…255"),
+        ({"depth_m": DEPTH, "mask": np.full_like(DEPTH, np.nan)}, r"mask holds NaN, must be boolean, or numbers"),
+        ({"depth_m": DEPTH, "mask": np.full(DEPTH.shape, "a")}, r"mask holds <U1, must be boolean, or numbers"),
+        ({"depth_m": DEPTH, "streams": 5}, r"streams = 5: must be a dict such as"),
+        (
+            {"depth_m": DEPTH, "streams": {"depth/depth": DEPTH}},
+            r"depth/depth is given, and depth_m too, .* same image",
+        ),
     ],
 )
 def test_an_array_that_does_not_fit_is_refused(arrays, message):
@@ -34,6 +54,17 @@ def test_an_array_that_does_not_fit_is_refused(arrays, message):
     with pytest.raises(a.ArgumentError, match=message):
         tracker.track(**({"time_s": 1} | arrays))
     assert tracker.track(DEPTH, time_s=0.5, image=IMAGE).status == "TRACKING"  # nothing of the refused call remains
+
+
+def test_lists_and_other_floats_are_arrays_too():
+    for depth in (DEPTH.tolist(), DEPTH.astype(">f4"), DEPTH.astype(np.float16)):
+        assert a.Tracker(CAMERA, a.Rigid(), noise=NOISE).track(depth, time_s=0).status == "TRACKING"
+
+
+def test_amplitudes_are_not_negative():
+    tracker = a.Tracker(CAMERA, a.Rigid(), noise=a.noise.TofAmplitude((0.001,), 1.0))
+    with pytest.raises(a.ArgumentError, match=r"amplitude holds -1\..*: must be positive"):
+        tracker.track(DEPTH, time_s=0, amplitude=-DEPTH)
 
 
 @pytest.mark.parametrize(
@@ -63,6 +94,27 @@ def test_what_a_noise_model_depends_on_must_be_given(noise, missing):
         ({"geometry": "euclidean"}, r"geometry = 'euclidean': must be \"z\" or \"radial\""),
         ({"bayer": "rgbg"}, r"bayer = 'rgbg': must be one of rggb, bggr, grbg, gbrg"),
         ({"budget_ms": 0}, r"budget_ms = 0: must be more than 0, or None"),
+        ({"budget_ms": "5"}, r"budget_ms = '5': must be more than 0, or None"),
+        ({"budget_ms": True}, r"budget_ms = True: must be more than 0, or None"),
+        ({"depth": None}, r"depth = None: must be a camera, such as Camera\(640, 480"),
+        ({"depth": 5}, r"depth = 5: must be a camera"),
+        ({"color": 4}, r"color = 4: must be a camera"),
+        (
+            {"color": CAMERA, "color_noise": a.noise.StructuredLight()},
+            r"color_noise = Structured.*: must be noise\.Color",
+        ),
+        (
+            {"color": CAMERA, "color_noise": a.noise.Intensity("amplitude", 5)},
+            r"color_noise = .*: must be noise\.Color",
+        ),
+        ({"noise": 0}, r"^Tracker: noise = 0: must be a table"),
+        (
+            {"noise": a.noise.Constant},
+            r"noise = <class .*must be settings, such as noise = a\.noise\.Constant\(0\.001\)",
+        ),
+        ({"texture": a.noise.Constant(0.001)}, r'texture\.type = "constant": must be intensity, color, grey or bayer'),
+        ({"region": np.ones((3, 3))}, r"^Tracker: region = .*: must be a table"),
+        ({"bayer": ["rggb"]}, r"bayer = \['rggb'\]: must be one of rggb"),
     ],
 )
 def test_a_tracker_that_cannot_be_made_is_refused(arguments, message):
@@ -73,5 +125,43 @@ def test_a_tracker_that_cannot_be_made_is_refused(arguments, message):
 def test_every_error_of_an_argument_is_a_value_error():
     for error in (a.ArgumentError, a.CameraError, a.LensError):
         assert issubclass(error, ValueError)
-    with pytest.raises(a.CameraError, match="fx and fy must be positive"):
+    with pytest.raises(a.CameraError, match="fx = 0: must be positive"):
         a.Camera(640, 480, fx=0, fy=528, cx=320, cy=240)
+
+
+def test_numbers_of_numpy_are_numbers():
+    sigma: Any = np.float32(0.001)
+    numbers: dict[str, Any] = {"vertices": np.int64(200), "budget_ms": np.float32(500)}
+    tracker = a.Tracker(CAMERA, a.Rigid(), noise=a.noise.Constant(sigma), **numbers)
+    assert 100 < len(tracker.track(DEPTH, time_s=0).vertices) < 400
+
+
+@pytest.mark.parametrize(
+    ("call", "argument", "message"),
+    [
+        (a.Tracker(CAMERA, a.Rigid()).replay, 5, r"recording = 5: must be a recording, open_recording\(path\)"),
+        (a.Tracker(CAMERA, a.Rigid()).replay, "x.mcap", r"recording = 'x\.mcap': must be a recording"),
+        (a.open_recording, 5, r"path = 5: must be the path of a file"),
+        (a.load_rig, None, r"path = None: must be the path of a file"),
+        (a.Nurbs, 4, r"long = 4, short = None: give both, or neither"),
+        (lambda weights: a.Nurbs(4, 4, weights=weights), ((1.0, 2.0),), r"Nurbs: weights must be 4 rows of 4"),
+    ],
+)
+def test_a_call_with_something_else_is_refused(call, argument, message):
+    with pytest.raises(a.ArgumentError, match=message):
+        call(argument)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"name": 5}, r"name = 5: the rig has sheet"),
+        ({"cameras": 5}, r"cameras = 5: must be a dict such as"),
+        ({"cameras": {"tof": 5}}, r"cameras\['tof'\] = 5: must be a camera"),
+        ({"budget_ms": "x"}, r"budget_ms = 'x': must be more than 0"),
+    ],
+)
+def test_a_tracker_of_a_rig_that_cannot_be_made_is_refused(arguments, message):
+    rig = a.open_recording(SAMPLE).rig
+    with pytest.raises(a.ArgumentError, match=message):
+        rig.tracker(**arguments)

@@ -1,10 +1,13 @@
 """A rig file for every exchangeable part: what its table says, and what else of the rig it needs.
 
-A new module of one of the packages needs an entry here, and `test_options.py` fails until it has one.
+A new module of one of the packages is found, and tested in the usual rig with the defaults of its keys. It needs
+an entry here only if a key has none, or if it needs another rig.
 """
 
 from dataclasses import dataclass
 from string import Template
+
+from abs_service.config import plugins
 
 #: The packages whose modules a rig file names with `type`, by the key of the table.
 PACKAGES = {
@@ -110,7 +113,8 @@ def _option(part: str, keys: str = "", **others: str) -> Option:
     return Option(part, keys, others)
 
 
-OPTIONS = {
+#: Parts that are not tested with their defaults in the usual rig.
+SPECIAL = {
     option.part: option
     for option in (
         _option("model.nurbs", "control_points = [5, 4], degree = 3"),
@@ -118,7 +122,6 @@ OPTIONS = {
         _option("model.flexpad", "width_m = 0.3, height_m = 0.2"),
         _option("model.gravity", "segments = 3, length_m = 0.3", scene="strip", size="tof=176x144&color=160x120"),
         _option("model.posed", 'shape = { type = "nurbs", control_points = [3, 3], degree = 2 }'),
-        _option("synthesis.sparse"),
         _option("synthesis.undistorted", **LENS),
         _option("synthesis.warped", 'sensor = "tof"', size="tof=176x144&color=160x120&lens=-0.25,0.06"),
         _option("synthesis.dense", "step = 2", **LENS),
@@ -126,14 +129,12 @@ OPTIONS = {
         _option("optimizer.cma_es", "generations = 5, population = 12"),
         _option("optimizer.hybrid", "steps = 2, fallback_above = 0.05"),
         _option("objective.likelihood", "outlier_share = 0.1"),
-        _option("objective.euclidean"),
         _option("region.nearest", "largest_step_m = 0.05"),
         _option("region.box", "lowest = [-0.3, -0.3, 0.7], highest = [0.3, 0.3, 1.3]"),
         _option("region.mask", 'file = "mask.png"'),
         _option("region.seed", 'pixel = [44, 36], within = "mask.png"'),
         _option("region.above_plane", "clearance_m = 0.03"),
         _option("region.distance", "farthest_m = 1.2"),
-        _option("template.first_image"),
         _option("template.sheet", "size = [0.2, 0.3]"),
         _option("template.mesh", 'path = "sheet.ply", unit = "mm"'),
         _option("depth.constant", "sigma = 0.0045"),
@@ -151,3 +152,8 @@ OPTIONS = {
         _option("picture.binary", "length_m = 0.8485", **BARRIER),
     )
 }
+
+_FOUND = [f"{key}.{name}" for key, package in PACKAGES.items() for name in plugins.available(package)]
+
+#: By part, "model.rigid".
+OPTIONS = {part: _option(part) for part in _FOUND} | SPECIAL

@@ -6,9 +6,11 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import abs_service as a
 from abs_service import config
 
 ROOT = Path(__file__).parents[3]
@@ -73,6 +75,49 @@ print(json.dumps([off, dict(found["warm"].residuals)]))
 """
 
 
+#: Tracks a disc before a wall with the page's template; prints status, centre [m] and largest radius [m].
+DISC = """
+import json
+import numpy as np
+import abs_service as a
+
+camera = a.Camera(160, 120, fx=200, fy=200, cx=79.5, cy=59.5)
+u, v = np.meshgrid(np.arange(160), np.arange(120))
+x, y = (u - 79.5) / 200 * 0.6, (v - 59.5) / 200 * 0.6
+on = np.hypot(x - 0.02, y + 0.01) < 0.1
+depth = np.where(on, 0.6, 1.2) + np.random.default_rng(1).normal(0, 0.001, on.shape)
+template = {"type": "disc", "radius": 0.1}
+tracker = a.Tracker(camera, {"type": "translation"}, noise=a.noise.Constant(0.001), template=template, vertices=200)
+found = tracker.track(depth, time_s=0)
+center = found.vertices.mean(axis=0)
+print(json.dumps([found.status, center.tolist(), float(np.linalg.norm(found.vertices - center, axis=1).max())]))
+"""
+
+#: Opens the page's device and reads from it for a while; prints frames, drops, the depth in the middle [m] and states.
+READING = """
+import json, time
+from drivers import opening
+
+class Reader:
+    frames, states = [], []
+    def on_frame(self, frame): self.frames.append(frame)
+    def on_state(self, state, reason): self.states.append(state)
+    def on_truth(self, truth): ...
+    def on_warning(self, condition, message): ...
+
+device, reader = opening.open_device("plate://", time.monotonic_ns), Reader()
+device.start(reader)
+deadline = time.monotonic() + 20
+while len(reader.frames) < 10 and time.monotonic() < deadline:
+    time.sleep(0.01)
+device.close()
+count = len(reader.frames)
+time.sleep(0.1)
+depth = float(reader.frames[-1].si()[36, 48])
+late = len(reader.frames) - count
+print(json.dumps([dict(device.counters), count, late, [f.seq for f in reader.frames[:10]], depth, reader.states]))
+"""
+
 #: A kind of measurement whose noise model is derived from one of ours, and a program that asks for the kinds of both.
 DERIVED = """
 from abs_service.tracker.measurements import grey
@@ -115,11 +160,17 @@ def rig_file(folder: Path) -> Path:
     text = re.sub(r"(?s)(\[trackers\.sheet\.model\]\n).*?\n(?=\[)", r'\1type = "translation"\n\n', text)
     text = re.sub(r"(?s)(\[trackers\.sheet\.optimizer\]\n).*?(\n\[|\Z)", r'\1type = "random_search"\n\2', text)
     text = re.sub(r"(?s)(\[trackers\.sheet\.region\]\n).*?\n(?=\[)", r'\1type = "left_half"\n\n', text)
+    text = re.sub(r"(?s)(\[trackers\.sheet\.objective\]\n).*?\n(?=\[)", r'\1type = "depth_only"\n\n', text)
     noise = r'\1type = "linear"\nper_metre = 0.004\n\n'
     text = re.sub(r"(?s)(\[sensors\.tof\.noise\]\n).*?\n(?=\[)", noise, text)
     path = folder / "rig.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def estimates_of(recording: Path) -> list[a.Estimate]:
+    """What was recorded."""
+    return list(a.open_recording(recording).estimates())
 
 
 def run(environment: dict[str, str], *arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -128,7 +179,9 @@ def run(environment: dict[str, str], *arguments: str | Path) -> subprocess.Compl
 
 
 def test_the_page_has_an_example_for_each_entry_point() -> None:
-    assert set(PARTS) == {"translation", "random_search", "left_half", "linear", "thermal"}
+    assert set(PARTS) == {
+        *("translation", "random_search", "left_half", "disc", "depth_only", "linear", "thermal", "plate"),
+    }
 
 
 def test_parts_of_another_distribution_track_a_recording(installed, tmp_path) -> None:
@@ -140,6 +193,8 @@ def test_parts_of_another_distribution_track_a_recording(installed, tmp_path) ->
     estimates = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(estimates) == 15
     assert {len(estimate["theta"]) for estimate in estimates} == {3}
+    fits = estimates_of(tmp_path / "out.mcap")
+    assert {sensor for estimate in fits for sensor in estimate.residuals} == {"tof"}  # the objective of the page
     assert {estimate["status"] for estimate in estimates} <= {"TRACKING", "DEGRADED", "LOST"}
 
 
@@ -156,6 +211,42 @@ def test_a_measurement_of_another_distribution_counts(installed, tmp_path) -> No
     assert off["warm"] < 5e-4
     assert off["cold"] > 5e-3  # distances alone do not show that a wall slides along itself
     assert residuals["thermal"] == pytest.approx(1, abs=0.3)
+
+
+def test_a_template_of_another_distribution_finds_its_object(installed) -> None:
+    status, center, radius = printed(installed, DISC)
+    assert status == "TRACKING"
+    assert center == pytest.approx([0.02, -0.01, 0.6], abs=0.003)
+    assert radius == pytest.approx(0.1, abs=0.003)
+
+
+def test_a_device_of_another_distribution_delivers(installed) -> None:
+    counters, count, late, numbers, depth, states = printed(installed, READING)
+    assert counters == {"frames": count}
+    assert count >= 10
+    assert late == 0  # nothing comes after the device is closed
+    assert numbers == list(range(10))
+    assert 0.58 <= depth <= 0.62
+    assert states == ["opening", "streaming", "closed"]
+
+
+def test_a_device_of_another_distribution_is_listed_and_its_addresses_checked(installed, tmp_path) -> None:
+    listed = run(installed, "devices", "--json")
+    assert "plate://1" in listed.stdout
+    rig = tmp_path / "plate.toml"
+    text = THERMAL.partition("[sensors.thermal]")[0].replace("simulated://sheet?sensors=tof,ir", "plate://2")
+    rig.write_text(text + '[synchronisation]\nreference = "tof/depth"\n', encoding="utf-8")
+    refused = run(installed, "check", rig)
+    assert refused.returncode == 2
+    assert "must be plate:// or plate://1" in refused.stderr
+
+
+def printed(environment: dict[str, str], program: str) -> list[Any]:
+    """What a program prints as JSON."""
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 def test_a_declared_measurement_may_have_a_derived_noise_and_a_broken_one_disturbs_nobody(tmp_path) -> None:

@@ -102,7 +102,9 @@ def test_missing_coefficients_are_zero():
     np.testing.assert_array_equal(Lens().distort(GRID), GRID)
 
 
-@pytest.mark.parametrize("given", [np.zeros(9), np.zeros((2, 2)), np.array([np.nan]), np.array([np.inf, 0.0])])
+@pytest.mark.parametrize(
+    "given", [np.zeros(9), np.zeros((2, 2)), np.array([np.nan]), np.array([np.inf, 0.0]), "k1", [[1.0], []]]
+)
 def test_what_is_no_lens_is_refused(given):
     with pytest.raises(LensError, match="at most 8 finite coefficients"):
         Lens(given)

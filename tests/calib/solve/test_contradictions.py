@@ -10,11 +10,11 @@ from calib.board.views import CornerView
 from calib.pose import Pose
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
+from calib.solve.diagnoses import unlike_the_rest
 from calib.solve.solution import Solution
 from calib.solve.start.extrinsics_graph import ContradictionError
 from calib.solve.start.start import start
 from calib.solve.validation.contradictions import contradictions, scatter
-from calib.solve.validation.diagnoses import unlike_the_rest
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 

@@ -9,9 +9,9 @@ from calib.board.views import CornerView, PlaneView
 from calib.solve.bundle.observability import UndeterminedError, require_determined
 from calib.solve.bundle.tasks import SensorTask, Task, TaskError
 from calib.solve.calibrate import calibrate
+from calib.solve.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from calib.solve.start import extrinsics_graph
 from calib.solve.start.extrinsics_graph import ContradictionError, NotConnectedError
-from calib.solve.validation.diagnoses import MixedUpError, SquareSizeError, ViewsError
 from tests.calib.solve import board_views
 from tests.calib.solve.board_views import Head
 

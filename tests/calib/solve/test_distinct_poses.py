@@ -10,9 +10,9 @@ import pytest
 from calib.board.views import CornerView
 from calib.solve.bundle.tasks import SensorTask, Task
 from calib.solve.calibrate import calibrate
+from calib.solve.diagnoses import ViewsError
 from calib.solve.solution import Solution
 from calib.solve.validation.cross_validation import TooFewToSplitError, cross_validate
-from calib.solve.validation.diagnoses import ViewsError
 from calib.solve.validation.verdict import assess
 from tests.calib.solve import board_views
 from tests.calib.solve.bent import bent

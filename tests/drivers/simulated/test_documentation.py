@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from drivers.simulated.address import KEYS, Address
-from drivers.simulated.scene.scenes import SCENES
+from drivers.simulated.scenes import SCENES
 from drivers.simulated.sensors.optics import BEAMS, OPTICS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "reference" / "simulation.md").read_text(encoding="utf-8")

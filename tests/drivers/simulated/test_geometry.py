@@ -9,13 +9,13 @@ from scipy.optimize import root_scalar
 from calib import pose
 from calib.camera import Camera
 from calib.lenses.lens import Lens
-from drivers.simulated.scene import scenes
+from drivers.simulated import scenes
 from drivers.simulated.scene.motion import Placement
+from drivers.simulated.scene.raycast import cast, lookup, shadowed
 from drivers.simulated.scene.scene import REST_Z, WALL_Z, Moment, Scene
-from drivers.simulated.scene.scenes import SceneSettings
 from drivers.simulated.scene.surface import surface_points
+from drivers.simulated.scenes import SceneSettings
 from drivers.simulated.sensors.view import View
-from drivers.simulated.shapes.raycast import cast, lookup, shadowed
 from drivers.simulated.shapes.rectangle import PlacedRectangle, Rectangle
 
 CURVATURES = st.sampled_from([0.0, 1e-12, -1e-9, 1e-7, -1e-5]) | st.floats(-4, 4)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from abs_service.tracker.detection.shapes import mesh_file
-from abs_service.tracker.detection.shapes.known_object import KnownObject
+from abs_service.tracker.detection.templates import mesh_file
+from abs_service.tracker.detection.templates.known_object import KnownObject
 
 #: Length of the units [m].
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}

@@ -6,9 +6,9 @@ from typing import Annotated
 import numpy as np
 from annotated_types import Interval
 
-from abs_service.tracker.detection.shapes.known_object import KnownObject
 from abs_service.tracker.detection.shapes.samples import Samples, farthest_first
 from abs_service.tracker.detection.shapes.sheet_mesh import Sheet
+from abs_service.tracker.detection.templates.known_object import KnownObject
 from calib import pose
 
 Side = Annotated[float, Interval(gt=0, le=20)]

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from abs_service.tracker.detection.initial_detection import DetectionError
 from abs_service.tracker.detection.principal_axes import extents, principal_axes
-from abs_service.tracker.detection.shapes.known_object import KnownObject
 from abs_service.tracker.detection.shapes.paint import NO_PAINT, PointPaint
 from abs_service.tracker.detection.shapes.resampling import evenly_spread, triangulated
 from abs_service.tracker.detection.shapes.samples import Samples
+from abs_service.tracker.detection.templates.known_object import KnownObject
 from abs_service.tracker.mesh import Mesh, edge_lengths
 
 #: Formats that are read, by the ending of the name.
