@@ -153,7 +153,8 @@ class OakDevice:
         if stamp.stepped:
             self._gate.begin_epoch()
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch))
+        modulation = self._connection.modulation(role, stamp.t_host_ns)
+        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch, modulation=modulation))
 
 
 def _join(threads: Sequence[threading.Thread]) -> None:
