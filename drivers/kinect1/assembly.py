@@ -95,8 +95,7 @@ def assemble(packets, lengths, begin, state, image, gone, base, payload, longest
             earlier call.
         image: (bytes of an image,) uint8; places of lost packets keep what they had.
         gone: (packets of an image,) uint8, 1 for a lost packet.
-        base, payload: see `PacketFormat`.
-        longest_gap: the most packets lost in a row that do not drop the image.
+        base, payload, longest_gap: see `PacketFormat` and `Assembler`.
 
     Returns:
         The next row; COMPLETE of the state is 1 if an image is complete.

@@ -19,7 +19,6 @@ from drivers.contract.frame import Geometry, Kind
 from drivers.kinect1 import udev
 from drivers.kinect1.address import Address, parse
 from drivers.kinect1.camera import Stream
-from drivers.kinect1.color_settings import CONDITION
 from drivers.kinect1.device import Kinect1Device
 from drivers.kinect1.opening import find, open_camera
 from drivers.kinect1.reference_plane import ReferencePlane
@@ -103,28 +102,6 @@ def test_controls_reach_the_camera(fake: FakeDevice) -> None:
     device.close()
     with pytest.raises(DeviceError, match="closed"):
         device.controls.get("infrared_gain")
-
-
-def test_automatic_colours_warn_until_they_are_off_and_exposures_are_told_then(fake: FakeDevice) -> None:
-    fake.kinect.color_sensor[0x106] = 1 << 14 | 1 << 1
-    device, sink = opened(fake, (Stream.COLOR,)), RecordingSink()
-    device.start(sink)
-    sink.wait(lambda: len(sink.frames) >= 1)
-    condition, message = sink.warnings[-1]
-    assert condition == CONDITION
-    assert message.startswith("auto_exposure and auto_white_balance on")
-    device.controls.set("auto_white_balance", False)
-    assert sink.warnings[-1][1].startswith("auto_exposure on")
-    device.controls.set("exposure_s", 0.02)
-    device.controls.set("auto_exposure", False)
-    assert sink.warnings[-1] == (CONDITION, "")
-    count = len(sink.frames)
-    sink.wait(lambda: len(sink.frames) >= count + 2)
-    device.close()
-    first, last = sink.frames[0], sink.frames[-1]
-    assert math.isnan(first.exposure_s)
-    assert last.exposure_s == pytest.approx(0.02, abs=1e-4)
-    assert last.at_middle().t_host_ns == last.t_host_ns - round(0.5e9 * last.exposure_s)
 
 
 def test_closing_in_the_sink_releases_the_camera(fake: FakeDevice) -> None:

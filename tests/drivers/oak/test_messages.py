@@ -15,21 +15,17 @@ from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses
-from drivers.oak.cameras.heads import cameras
-from drivers.oak.images.picture import Picture, PictureError, camera, frame, pixels
+from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak.images.picture import PictureError, camera, frame, pixels
 from drivers.oak.images.recording import OakRecording
 from drivers.oak.roles import ROLES
 from drivers.simulated.address import parse
+from tests.drivers.oak.pictures import DEPTH
 from tests.sample.sample import DEVICE, EXPOSURES
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "sample_oak"
 TYPES = ["RAW16", "RAW8", "GRAY8", "BGR888i", "RGB888i", "BGR888p", "RGB888p", "NV12", "YUV420p", "RAW10", ""]
 COLORS = np.random.default_rng(3).integers(256, size=(6, 8, 3), dtype=np.uint8)
-MATRIX = np.array([[9.0, 0, 4], [0, 8, 3], [0, 0, 1]])
-DEPTH = Picture(
-    "RAW16", 8, 6, 16, np.arange(96, dtype=np.uint8), 5, 10**9, 7 * 10**8, 2e-3, 1.5, 40.0, 0, MATRIX, "PERSPECTIVE", ()
-)
 
 
 def test_depth_is_in_millimetres_along_z_and_stamped_in_the_middle_of_its_exposure() -> None:
@@ -101,99 +97,6 @@ def test_arbitrary_parameters_are_a_camera_or_rejected(
     with contextlib.suppress(PictureError):
         made = camera(replace(DEPTH, coefficients=tuple(coefficients), matrix=numbers, model=model), pose.identity())
         assert made.fx > 0
-
-
-WIDE = np.array([[560.0, 0, 318], [0, 561, 203], [0, 0, 1]])
-PRISM = (1e-3, -5e-4, 8e-4, 2e-4, 0.005, -0.003)
-COLOR = replace(DEPTH, type="BGR888i", width=640, height=400, matrix=WIDE, socket=2)
-
-
-@pytest.mark.parametrize(
-    "coefficients",
-    [
-        (-0.1, 0.05, 1e-3, -5e-4, -0.02, 0, 0, 0, *PRISM),
-        (-4.2, 14.1, 4e-4, -7e-4, 2.3, -4.3, 14.2, 2.5, *PRISM),
-        (-0.1, 0.05, 1e-3, -5e-4, -0.02, 0, 0, 0, 0, 0, 0, 0, 0.02, -0.01),
-        (-0.1, 0.05, 1e-3, -5e-4, -0.02, 0, 0, 0, 0, 0, 0, 0, 0, 0),
-    ],
-)
-def test_thin_prisms_and_tilted_sensors_are_projected_to_a_tenth_of_a_pixel(coefficients: tuple[float, ...]) -> None:
-    """Reference: OpenCV's model of 14 coefficients, which is depthai's."""
-    made = camera(replace(COLOR, coefficients=coefficients), pose.identity())
-    pixels = np.random.default_rng(5).uniform((-0.5, -0.5), (639.5, 399.5), (400, 2))
-    full = np.array(coefficients)
-    rays = np.insert(cv2.undistortPoints(pixels[:, None], WIDE, full)[:, 0], 2, 1.0, axis=1)
-    theirs = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), WIDE, full)[0][:, 0]
-    ours = np.array([made.project(ray) for ray in rays])
-    assert np.hypot(*(ours - theirs).T).max() < 0.1
-
-
-def test_lenses_beyond_that_are_rejected_with_the_remedy() -> None:
-    with pytest.raises(
-        PictureError, match=r"an error of .* px, more than 0.1 px; let the device undistort: undistort=1"
-    ):
-        camera(replace(COLOR, coefficients=(*[0.1] * 8, 0.1, 0.1, 0.1, 0, 0.1, 0)), pose.identity())
-
-
-def test_depth_behind_a_tilted_lens_is_rejected() -> None:
-    depth = replace(DEPTH, width=640, height=400, matrix=WIDE, coefficients=(0,) * 8 + PRISM)
-    with pytest.raises(PictureError, match="tof/depth: depth behind a lens with thin-prism"):
-        cameras({ROLES["tof_depth"]: depth}, Poses())
-
-
-def test_stereo_images_have_rectified_poses() -> None:
-    """The rectified cameras are parallel, with the right one on the x axis of the left one."""
-    R1 = pose.from_rotation_vector([0, 0.02, 0.01], [0, 0, 0])
-    T_rect_left_right = pose.from_rotation_vector([0, 0, 0], [0.075, 0, 0])
-    R2 = pose.from_rotation_vector([0.01, -0.01, 0], [0, 0, 0])
-    T_left_right = pose.inverse(R1) @ T_rect_left_right @ R2
-    poses = Poses({1: Extrinsics(-1, pose.identity()), 2: Extrinsics(1, T_left_right)}, {1: R1, 2: R2})
-    gray = replace(DEPTH, type="GRAY8", stride=8, socket=1)
-    found = cameras(
-        {ROLES["depth"]: replace(DEPTH, socket=1), ROLES["left"]: gray, ROLES["right"]: replace(gray, socket=2)}, poses
-    )
-    assert set(found) == {"depth", "right"}
-    np.testing.assert_allclose(found["right"].T_rs, T_rect_left_right, atol=1e-12)
-
-
-TURN = pose.from_rotation_vector([0.01, -0.02, 0.005], [0, 0, 0])
-T_LEFT_RIGHT = pose.from_rotation_vector([0.004, 0.01, -0.003], [0.075, 0.001, -0.002])
-T_COLOR_LEFT = pose.from_rotation_vector([0.003, 0, 0.002], [0.0375, 0, 0])
-#: Sockets: left 1, right 2, colour 0, which is the root.
-EXTRINSICS = {0: Extrinsics(-1, pose.identity()), 1: Extrinsics(0, T_COLOR_LEFT), 2: Extrinsics(1, T_LEFT_RIGHT)}
-GRAY = replace(DEPTH, type="GRAY8", stride=8)
-
-
-def test_the_pose_of_aligned_depth_is_that_of_its_view_and_not_of_the_camera_whose_number_it_has() -> None:
-    """Depth is computed from the right camera's image, whose number it may have, and aligned to the left one's."""
-    poses = Poses(EXTRINSICS, {1: TURN, 2: TURN}, (1, 2))
-    T_color_view = T_COLOR_LEFT @ pose.inverse(TURN)
-    depth = replace(DEPTH, socket=2, extrinsics=Extrinsics(0, T_color_view))
-    found = cameras({ROLES["depth"]: depth, ROLES["color"]: replace(GRAY, socket=0)}, poses)
-    np.testing.assert_allclose(found["color"].T_rs, pose.inverse(T_color_view), atol=1e-12)
-
-
-def test_rectification_is_computed_where_the_device_stores_none() -> None:
-    """The rectified cameras are parallel, with the right one on the x axis of the left one, at its distance."""
-    left, right, color = (replace(GRAY, socket=socket) for socket in (1, 2, 0))
-    pictures = {ROLES["depth"]: replace(DEPTH, socket=1), ROLES["left"]: left, ROLES["right"]: right}
-    found = cameras({**pictures, ROLES["color"]: color}, Poses(EXTRINSICS, {}, (1, 2)))
-    expected = pose.from_rotation_vector([0, 0, 0], [float(np.linalg.norm(T_LEFT_RIGHT[:3, 3])), 0.0, 0.0])
-    np.testing.assert_allclose(found["right"].T_rs, expected, atol=1e-9)
-    # Half of the turn between the cameras is the left one's, so the colour camera is turned by a few hundredths.
-    assert np.linalg.norm(pose.to_rotation_vector(found["color"].T_rs)[0]) < 0.05
-    distance = np.linalg.norm(found["color"].T_rs[:3, 3])
-    assert distance == pytest.approx(np.linalg.norm(T_COLOR_LEFT[:3, 3]))
-    with pytest.raises(EepromError, match="camera 1 is none of the stereo pair"):
-        cameras({**pictures, ROLES["color"]: color}, Poses(EXTRINSICS))
-
-
-def test_unconnected_and_circular_extrinsics_are_rejected() -> None:
-    with pytest.raises(EepromError, match="nothing is known of where camera 1 is relative to camera 0"):
-        Poses({}).between(0, 1)
-    circle = Poses({0: Extrinsics(1, pose.identity()), 1: Extrinsics(0, pose.identity())})
-    with pytest.raises(EepromError, match="circle"):
-        circle.between(0, 1)
 
 
 CALIBRATION = (SAMPLE / "calibration.json").read_bytes()
