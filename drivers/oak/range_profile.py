@@ -1,7 +1,6 @@
 """Range profile of a time-of-flight camera over time, for the frames' `modulation`.
 
-An image does not say with which profile it was made, and a change takes effect some exposures after it was sent. Images
-of that time are labelled with both profiles, so that a noise calibration takes none of them for one of either.
+An image does not say with which profile it was made, and a change takes effect some exposures after it was sent.
 """
 
 import threading
@@ -22,9 +21,8 @@ class RangeProfile:
     def __init__(self, first: str, clock: Callable[[], int]) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self._labels = [first]  # in force from the time of the same index on
-        self._times_ns = [0]
-        self._current = first
+        self._current = self._before = first
+        self._changed_ns, self._settled_ns = 0, 0
 
     @property
     def current(self) -> str:
@@ -37,18 +35,13 @@ class RangeProfile:
             if profile == self._current:
                 return
             now_ns = self._clock()
-            while self._times_ns[-1] > now_ns:  # the previous change has not taken effect yet
-                self._times_ns.pop()
-                self._labels.pop()
-            self._labels += [f"{self._labels[-1]} to {profile}", profile]
-            self._times_ns += [now_ns, now_ns + SETTLING_NS]
-            self._labels, self._times_ns = self._labels[-4:], self._times_ns[-4:]
-            self._current = profile
+            if now_ns >= self._settled_ns:  # else the last change still takes effect, and this one goes on with it
+                self._before, self._changed_ns = self._current, now_ns
+            self._current, self._settled_ns = profile, now_ns + SETTLING_NS
 
-    def at(self, t_host_ns: int) -> str:
-        """The profile of an exposure; "low to high" while a change takes effect."""
+    def at(self, t_host_ns: int) -> str | None:
+        """The profile of an exposure; None while a change takes effect."""
         with self._lock:
-            for label, begin_ns in zip(reversed(self._labels), reversed(self._times_ns)):
-                if begin_ns <= t_host_ns:
-                    return label
-            return self._labels[0]
+            if t_host_ns >= self._settled_ns:
+                return self._current
+            return self._before if t_host_ns < self._changed_ns else None

@@ -141,6 +141,18 @@ def test_frames_of_a_time_of_flight_camera_have_its_range() -> None:
     assert {(frame.sensor, frame.modulation) for frame in receiver.frames} == {("tof", "high"), ("color", "")}
 
 
+def test_frames_of_an_uncertain_range_are_dropped_and_counted() -> None:
+    connection = replace(live_connection(), modulation=lambda role, t: None if role.sensor == "tof" else "")
+    device, receiver = OakDevice(connection, time.monotonic_ns), RecordingSink()
+    try:
+        device.start(receiver)
+        receiver.wait(lambda: len(receiver.frames) > 2)
+    finally:
+        device.close()
+    assert {frame.sensor for frame in receiver.frames} == {"color"}
+    assert device.counters["range_changes"] > 2
+
+
 def test_images_bring_the_pose_of_their_view() -> None:
     camera = parse_simulated("simulated://sheet?sensors=tof&tof=32x24").build()
     frame = next(frame for frame in camera.frames(0) if frame.kind == Kind.DEPTH)
