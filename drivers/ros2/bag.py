@@ -61,7 +61,8 @@ class Ros2Bag:
         self._bag = Bag(path)
         topics = self._bag.topics()
         images = sorted((topic for topic, one in topics.items() if is_image(one.type) and one.count), key=_preference)
-        self._streams = {stream.topic: stream for stream in self._find(images)}
+        infos = {_info_topic(topic) for topic in images} & {topic for topic, one in topics.items() if one.count}
+        self._streams = {stream.topic: stream for stream in self._find(images, self._firsts({*images, *infos}))}
         self.total = sum(topics[topic].count for topic in self._streams)
         reference = next(stream for stream in self._streams.values() if stream.kind == Kind.DEPTH)
         try:
@@ -113,20 +114,18 @@ class Ros2Bag:
             undistorted=stream.rectified,
         )
 
-    def _find(self, topics: list[str]) -> Iterator[_Stream]:
-        """Image topics that can be used.
+    def _find(self, topics: list[str], firsts: Mapping[str, Any]) -> Iterator[_Stream]:
+        """Image topics that can be used, with the first message of each topic.
 
         Raises:
             ForeignRecordingError: none of them has depth; says why each was left out.
         """
-        infos = {topic: _info_topic(topic) for topic in topics}
-        firsts = self._firsts({*topics, *infos.values()})
         found: dict[tuple[str, Kind], str] = {}
         left_out: list[str] = []
         for topic in topics:
             try:
-                if infos[topic] not in firsts:
-                    raise ImageError(f"there is no {infos[topic]}")
+                if _info_topic(topic) not in firsts:
+                    raise ImageError(f"there is no {_info_topic(topic)}")
                 kind, _, _ = decode(firsts[topic])
             except ImageError as error:
                 left_out.append(f"{topic}: {error}")
@@ -137,7 +136,7 @@ class Ros2Bag:
             raise ForeignRecordingError(f"{self._path}: it has no depth images that can be used; {why}")
         names = _names({namespace for namespace, _ in found})
         for (namespace, kind), topic in found.items():
-            yield _Stream(topic, names[namespace], kind, firsts[infos[topic]], firsts[topic].header.frame_id)
+            yield _Stream(topic, names[namespace], kind, firsts[_info_topic(topic)], firsts[topic].header.frame_id)
 
     def _firsts(self, topics: set[str]) -> dict[str, Any]:
         """First message of each topic."""

@@ -43,7 +43,7 @@ class Bag:
             ForeignRecordingError: the bag cannot be read, or `rosbags` is not installed.
         """
         with self._reader() as reader:
-            return {one.topic: Topic(one.msgtype, one.msgcount) for one in reader.connections}
+            return {name: Topic(one.msgtype or "", one.msgcount) for name, one in reader.topics.items()}
 
     def messages(self, topics: Collection[str]) -> Iterator[Message]:
         """Messages of topics in order of recording.

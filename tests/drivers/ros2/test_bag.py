@@ -12,6 +12,7 @@ import pytest
 from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
+from drivers.opening import open_recording
 from drivers.ros2.bag import Ros2Bag
 from drivers.ros2.images import ImageError, decode
 from tests.drivers.ros2.take import LENS, STAMP_NS, Take
@@ -41,7 +42,7 @@ def write(path: Path, storage: str = "MCAP") -> Path:
 def test_images_and_cameras_of_both_kinds_of_files(tmp_path: Path, storage: str, whole: bool) -> None:
     folder = write(tmp_path / "take", storage)
     (file,) = (path for path in folder.iterdir() if path.suffix in {".mcap", ".db3"})
-    read = Ros2Bag(folder if whole else file)
+    read = open_recording("ros2", folder if whole else file)
     frames = list(read.frames())
     assert read.total == len(frames) == 3
     first, color, second = frames
