@@ -26,7 +26,6 @@ class ColorSettings:
         self._warn = warn
         self._exposure_s = math.nan
 
-    @property
     def exposure_s(self) -> float:
         """Exposure time [s]; NaN if it is automatic or was never read."""
         return self._exposure_s

@@ -50,16 +50,16 @@ class Kinect1Device:
         self._streams = streams
         self._plane = self._camera.reference_plane()
         self.info = info
-        self._colors = ColorSettings(self._camera, self._warn)
+        infos = tuple(stream_info(stream, info.serial) for stream in streams)
+        self._gate = FrameGate(infos, CAUSES)
+        # Nothing that the device holds refers to it: the handles of USB go with the last reference.
+        self._colors = ColorSettings(self._camera, self._gate.warn)
         self.controls = _controls(self._camera, streams, self._colors.read)
-        self.capabilities = Capabilities(
-            tuple(stream_info(stream, info.serial) for stream in streams), self.controls.infos
-        )
+        self.capabilities = Capabilities(infos, self.controls.infos)
         self.cameras: Mapping[str, Camera] = {
             described.sensor: camera_of(stream, self._plane)
             for stream, described in zip(streams, self.capabilities.streams)
         }
-        self._gate = FrameGate(self.capabilities.streams, CAUSES)
         self._decoders: Mapping[int, StreamDecoder] = {}
         self._thread = threading.Thread()
 
@@ -113,8 +113,9 @@ class Kinect1Device:
             raise
 
     def _stream(self, stop: threading.Event) -> None:
+        exposures = {Stream.COLOR: self._colors.exposure_s}
         decoders = {
-            stream.form.endpoint: StreamDecoder(stream, self.info.serial, self._plane, self._exposure(stream))
+            stream.form.endpoint: StreamDecoder(stream, self.info.serial, self._plane, exposures.get(stream, _unknown))
             for stream in self._streams
         }
         self._decoders = decoders
@@ -149,15 +150,13 @@ class Kinect1Device:
                 count()
                 losses.update(delivered, sum(counted.values()))
 
-    def _exposure(self, stream: Stream) -> Callable[[], float]:
-        return (lambda: self._colors.exposure_s) if stream == Stream.COLOR else (lambda: math.nan)
-
-    def _warn(self, condition: str, message: str) -> None:
-        self._gate.warn(condition, message)
-
     def _end(self, stream: Stream) -> None:
         with suppress(DeviceError):  # it may be gone
             self._camera.stop(stream)
+
+
+def _unknown() -> float:
+    return math.nan
 
 
 def _controls(camera: KinectCamera, streams: tuple[Stream, ...], changed: Callable[[], None]) -> Controls:
