@@ -113,8 +113,8 @@ class Sink(Protocol):
 class Device(Protocol):
     """A source of frames, opened. All methods may be called from any thread.
 
-    Driver threads never block: a frame that cannot be delivered is dropped and counted by cause. Incomplete frames and
-    frames of the wrong size are never delivered.
+    Driver threads never block: a frame that cannot be delivered is dropped and counted by cause. Frames of the wrong
+    size are never delivered, nor are incomplete ones, unless all that they lack is marked as no return.
     """
 
     @property

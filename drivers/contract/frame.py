@@ -99,7 +99,8 @@ class Frame:
         undistorted: True if the device removed the lens distortion.
         aligned_to: sensor to whose view the device registered the image, "" if it is in the sensor's own view.
         filters: filters applied by the device, in order.
-        incomplete, saturated: flags of the device.
+        incomplete: True if a part of the image was lost on the way; its pixels have no return.
+        saturated: flag of the device.
         host_clock: which host's clock the host times are of, see `drivers.contract.host_clock`; "" for this one's.
         t_received_ns: time at which this process received the frame from another one, on this host's CLOCK_MONOTONIC
             [ns]; None for a device of this process.

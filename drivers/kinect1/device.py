@@ -1,16 +1,18 @@
 """An opened Kinect as a device: one thread reads and delivers its streams."""
 
+import math
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 
 from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities
-from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls
+from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
 from drivers.contract.frame_gate import FrameGate
 from drivers.kinect1.assembly import CAUSES
 from drivers.kinect1.camera import LINE_S, LONGEST_LINES, KinectCamera, Stream
+from drivers.kinect1.color_settings import ColorSettings
 from drivers.kinect1.stream_decoder import StreamDecoder, camera_of, stream_info
 from drivers.kinect1.transport.commands import Commands
 from drivers.kinect1.transport.loss_monitor import LossMonitor
@@ -48,15 +50,16 @@ class Kinect1Device:
         self._streams = streams
         self._plane = self._camera.reference_plane()
         self.info = info
-        self.controls = _controls(self._camera, streams)
-        self.capabilities = Capabilities(
-            tuple(stream_info(stream, info.serial) for stream in streams), self.controls.infos
-        )
+        infos = tuple(stream_info(stream, info.serial) for stream in streams)
+        self._gate = FrameGate(infos, CAUSES)
+        # Nothing that the device holds refers to it: the handles of USB go with the last reference.
+        self._colors = ColorSettings(self._camera, self._gate.warn)
+        self.controls = _controls(self._camera, streams, self._colors.read)
+        self.capabilities = Capabilities(infos, self.controls.infos)
         self.cameras: Mapping[str, Camera] = {
             described.sensor: camera_of(stream, self._plane)
             for stream, described in zip(streams, self.capabilities.streams)
         }
-        self._gate = FrameGate(self.capabilities.streams, CAUSES)
         self._decoders: Mapping[int, StreamDecoder] = {}
         self._thread = threading.Thread()
 
@@ -110,8 +113,10 @@ class Kinect1Device:
             raise
 
     def _stream(self, stop: threading.Event) -> None:
+        exposures = {Stream.COLOR: self._colors.exposure_s}
         decoders = {
-            stream.form.endpoint: StreamDecoder(stream, self.info.serial, self._plane) for stream in self._streams
+            stream.form.endpoint: StreamDecoder(stream, self.info.serial, self._plane, exposures.get(stream, _unknown))
+            for stream in self._streams
         }
         self._decoders = decoders
         counted = dict.fromkeys(CAUSES, 0)
@@ -130,6 +135,8 @@ class Kinect1Device:
             for stream in self._streams:
                 ending.callback(self._end, stream)
                 self._camera.start(stream)
+            if Stream.COLOR in self._streams:
+                self._colors.read()
             self._gate.report_state(DeviceState.STREAMING, "the camera delivers")
             while not stop.is_set():
                 for transfer in reader.read(_READ_TIMEOUT_S):
@@ -148,7 +155,18 @@ class Kinect1Device:
             self._camera.stop(stream)
 
 
-def _controls(camera: KinectCamera, streams: tuple[Stream, ...]) -> Controls:
+def _unknown() -> float:
+    return math.nan
+
+
+def _controls(camera: KinectCamera, streams: tuple[Stream, ...], changed: Callable[[], None]) -> Controls:
+    def then_read(write: Callable[[Value], None]) -> Callable[[Value], None]:
+        def written(value: Value) -> None:
+            write(value)
+            changed()
+
+        return written
+
     controls = [
         Control(
             ControlInfo("infrared_gain", ControlKind.WHOLE, minimum=1, maximum=50),
@@ -162,17 +180,17 @@ def _controls(camera: KinectCamera, streams: tuple[Stream, ...]) -> Controls:
             Control(
                 ControlInfo("exposure_s", ControlKind.NUMBER, **limits),
                 camera.exposure_s,
-                lambda value: camera.set_exposure_s(float(value)),
+                then_read(lambda value: camera.set_exposure_s(float(value))),
             ),
             Control(
                 ControlInfo("auto_exposure", ControlKind.SWITCH),
                 camera.auto_exposure,
-                lambda value: camera.set_auto_exposure(bool(value)),
+                then_read(lambda value: camera.set_auto_exposure(bool(value))),
             ),
             Control(
                 ControlInfo("auto_white_balance", ControlKind.SWITCH),
                 camera.auto_white_balance,
-                lambda value: camera.set_auto_white_balance(bool(value)),
+                then_read(lambda value: camera.set_auto_white_balance(bool(value))),
             ),
         ]
     return Controls(controls)

@@ -1,6 +1,7 @@
 """Decodes the packets of one stream into frames."""
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from drivers.contract.capabilities import ClockInfo, StreamInfo
 from drivers.contract.clock import DeviceClock
 from drivers.contract.frame import Frame, Geometry, Kind, Reference
 from drivers.kinect1 import unpacking
-from drivers.kinect1.assembly import Assembler, RawImage
+from drivers.kinect1.assembly import LONGEST_GAP, Assembler, RawImage
 from drivers.kinect1.camera import Stream
 from drivers.kinect1.reference_plane import DEPTH_SCALE, ReferencePlane
 from drivers.kinect1.transport.packets import TICK_HZ
@@ -53,14 +54,20 @@ class StreamDecoder:
         stream: the stream.
         serial: of the camera.
         plane: its calibration.
+        exposure_s: the exposure time [s], NaN if unknown.
     """
 
-    def __init__(self, stream: Stream, serial: str, plane: ReferencePlane) -> None:
+    def __init__(
+        self, stream: Stream, serial: str, plane: ReferencePlane, exposure_s: Callable[[], float] = lambda: math.nan
+    ) -> None:
         self.info = stream_info(stream, serial)
         self._stream = stream
+        self._exposure_s = exposure_s
         self._table = plane.table()
         self._calib_id = camera_of(stream, plane).calib_id
-        self._assembler = Assembler(stream.form)
+        # Only depth has a value for pixels without a measurement.
+        self._assembler = Assembler(stream.form, LONGEST_GAP if stream == Stream.DEPTH else 0)
+        self._incomplete = 0
         self._clock = DeviceClock(self.info.clock)
 
     @property
@@ -70,10 +77,11 @@ class StreamDecoder:
 
     @property
     def gauges(self) -> Mapping[str, float]:
-        """Clock mapping and number of lost packets."""
+        """Clock mapping, and numbers of lost packets and of images that were delivered without some."""
         return {
             **{f"clock.{'/'.join(self.info.key)}.{name}": value for name, value in self._clock.gauges.items()},
             f"{self.info.stream}.missing_packets": float(self._assembler.missing),
+            f"{self.info.stream}.incomplete_images": float(self._incomplete),
         }
 
     def decode(self, transfer: Transfer, epoch: int) -> Iterator[StampedFrame]:
@@ -82,6 +90,7 @@ class StreamDecoder:
             # The timestamp is that of the first packet; the last one arrives a period later.
             stamp = self._clock.stamp(image.ticks, transfer.arrival_ns(image.row))
             is_depth = self._stream == Stream.DEPTH
+            self._incomplete += bool(image.gone)
             yield StampedFrame(
                 Frame(
                     sensor=self.info.sensor,
@@ -101,7 +110,9 @@ class StreamDecoder:
                     clock_domain=self.info.clock.domain,
                     t_sigma_ns=stamp.t_sigma_ns,
                     t_reference=Reference.END,
+                    exposure_s=self._exposure_s(),
                     calib_id=self._calib_id,
+                    incomplete=bool(image.gone),
                 ),
                 stamp.stepped,
             )
@@ -110,7 +121,10 @@ class StreamDecoder:
         form = self._stream.form
         match self._stream:
             case Stream.DEPTH:
-                return unpacking.depth(image.data, self._table, form.height, form.width)
+                depth = unpacking.depth(image.data, self._table, form.height, form.width)
+                for place in image.gone:
+                    depth.reshape(-1)[form.pixels(place)] = 0
+                return depth
             case Stream.IR:
                 return unpacking.infrared(image.data, form.height, form.width)
         return image.data.reshape(form.height, form.width).copy()

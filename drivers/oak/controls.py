@@ -6,6 +6,7 @@ from typing import Any
 from drivers.contract.controls import Control, ControlInfo, ControlKind, Controls, Value
 from drivers.contract.device import DeviceError
 from drivers.oak.address import Address
+from drivers.oak.range_profile import RangeProfile
 from drivers.oak.source.pipelines import Outputs
 
 #: Limits of manual exposure supported by every camera of the family: time [s], and ISO speed over 100.
@@ -13,16 +14,17 @@ _EXPOSURE_S = (20e-6, 33e-3)
 _GAIN = (1.0, 16.0)
 
 
-def make(dai: Any, device: Any, outputs: Outputs, address: Address) -> Controls:
+def make(dai: Any, device: Any, outputs: Outputs, address: Address, profile: RangeProfile) -> Controls:
     """The controls: exposure of the cameras, brightness of the projector, range of the time-of-flight camera.
 
-    Controls of the depth cameras have no prefix, those of the colour camera have the prefix `color.`.
+    Controls of the depth cameras have no prefix, those of the colour camera have the prefix `color.`. Changes of the
+    range are noted in `profile`.
     """
     controls: list[Control] = []
     for prefix, inputs in outputs.cameras.items():
         controls += _Exposure(dai, [port.createInputQueue() for port in inputs]).controls(prefix)
     if outputs.tof is not None:
-        controls.append(_modulation(dai, outputs.tof.createInputQueue(), address.range))
+        controls.append(_modulation(dai, outputs.tof.createInputQueue(), profile))
     if device.getIrDrivers():
         lights = {"laser_power": device.setIrLaserDotProjectorIntensity, "flood_power": device.setIrFloodLightIntensity}
         for (name, write), first in zip(lights.items(), (address.dots, address.flood)):
@@ -69,18 +71,16 @@ class _Exposure:
             queue.send(message)
 
 
-def _modulation(dai: Any, queue: Any, first: str) -> Control:
-    state = {"range": first}
-
+def _modulation(dai: Any, queue: Any, profile: RangeProfile) -> Control:
     def write(value: Value) -> None:
         config = dai.ToFConfig()
         config.setProfilePreset(getattr(dai.ToFConfig.Profile, f"{str(value).upper()}_RANGE"))
         config.enableOpticalCorrection = True
         queue.send(config)
-        state["range"] = str(value)
+        profile.change(str(value))
 
     info = ControlInfo("modulation", ControlKind.CHOICE, choices=("low", "mid", "high"))
-    return Control(info, lambda: state["range"], write)
+    return Control(info, lambda: profile.current, write)
 
 
 def _sync(dai: Any, device: Any, first: str) -> Control:

@@ -54,7 +54,7 @@ class OakDevice:
             self._release()
             raise
         self.capabilities = Capabilities(streams, connection.controls.infos, connection.sync_roles)
-        self._gate = FrameGate(streams, causes=["undecodable"])
+        self._gate = FrameGate(streams, causes=["undecodable", "range_changes"])
 
     @property
     def state(self) -> DeviceState:
@@ -63,7 +63,7 @@ class OakDevice:
 
     @property
     def counters(self) -> Mapping[str, int]:
-        """`frames` delivered, and `undecodable` messages."""
+        """`frames` delivered; `undecodable` messages; `range_changes`: images of an uncertain range, after a change."""
         return self._gate.counters
 
     @property
@@ -153,7 +153,11 @@ class OakDevice:
         if stamp.stepped:
             self._gate.begin_epoch()
         times = {"t_host_ns": stamp.t_host_ns, "t_sigma_ns": stamp.t_sigma_ns, "t_arrival_ns": t_arrival_ns}
-        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch))
+        modulation = self._connection.modulation(role, stamp.t_host_ns)
+        if modulation is None:
+            self._gate.drop("range_changes")
+            return
+        self._gate.deliver(replace(made, **times, epoch=self._gate.epoch, modulation=modulation))
 
 
 def _join(threads: Sequence[threading.Thread]) -> None:

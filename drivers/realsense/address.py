@@ -7,8 +7,12 @@ from urllib.parse import parse_qsl, urlsplit
 
 from drivers.contract.device import AddressError
 
-_DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "recording": ""}
-_SIZE = re.compile(r"([1-9]\d{1,3})x([1-9]\d{1,3})")
+_DEFAULTS = {"depth": "640x480", "color": "640x480", "fps": "30", "ir": "1", "confidence": "1", "recording": ""}
+_RATE = r"[1-9]\d{0,2}"
+_MODE = re.compile(rf"([1-9]\d{{1,3}})x([1-9]\d{{1,3}})(?:@({_RATE}))?")
+
+#: Width and height [px], and images per second.
+Mode = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,18 +22,17 @@ class Address:
     Attributes:
         uri: the address itself.
         serial: serial number, "" for the only camera.
-        depth, color: image sizes of depth, infra-red and confidence, and of colour [px]; None for no colour.
-        fps: exposures per second.
-        ir: True to stream infra-red images.
+        depth, color, ir, confidence: modes of the streams, None for no such stream; which of them go together is for
+            librealsense and the camera to say.
         recording: file of librealsense's recorder, played instead of a camera; None for a camera.
     """
 
     uri: str
     serial: str
-    depth: tuple[int, int]
-    color: tuple[int, int] | None
-    fps: int
-    ir: bool
+    depth: Mode
+    color: Mode | None
+    ir: Mode | None
+    confidence: Mode | None
     recording: Path | None
 
 
@@ -47,23 +50,31 @@ def parse(uri: str) -> Address:
         values[key] = value
     if parts.path.strip("/"):
         raise AddressError(f"{uri}: a serial number is all that may stand before the '?'")
-    if values["ir"] not in {"0", "1"}:
-        raise AddressError(f"{uri}: ir = {values['ir']!r} must be 0 or 1")
-    if not re.fullmatch(r"[1-9]\d{0,2}", values["fps"]):
+    if not re.fullmatch(_RATE, values["fps"]):
         raise AddressError(f"{uri}: fps = {values['fps']!r} must be a whole number from 1 to 999")
+    fps = int(values["fps"])
+    depth = _mode(uri, "depth", values["depth"], fps)
     return Address(
         uri=uri,
         serial=parts.netloc,
-        depth=_size(uri, "depth", values["depth"]),
-        color=None if values["color"] == "0" else _size(uri, "color", values["color"]),
-        fps=int(values["fps"]),
-        ir=values["ir"] == "1",
+        depth=depth,
+        color=None if values["color"] == "0" else _mode(uri, "color", values["color"], fps),
+        ir=_beside(uri, "ir", values["ir"], depth),
+        confidence=_beside(uri, "confidence", values["confidence"], depth),
         recording=Path(values["recording"]) if values["recording"] else None,
     )
 
 
-def _size(uri: str, key: str, text: str) -> tuple[int, int]:
-    match = _SIZE.fullmatch(text)
+def _beside(uri: str, key: str, text: str, depth: Mode) -> Mode | None:
+    """Mode of a stream that is as depth unless the address says otherwise."""
+    if text in {"0", "1"}:
+        return depth if text == "1" else None
+    return _mode(uri, key, text, depth[2], "0, 1 (as depth) or ")
+
+
+def _mode(uri: str, key: str, text: str, fps: int, others: str = "") -> Mode:
+    match = _MODE.fullmatch(text)
     if match is None:
-        raise AddressError(f"{uri}: {key} = {text!r} must be a width and a height [px], such as 640x480")
-    return int(match[1]), int(match[2])
+        what = "a width and a height [px], such as 640x480, with a rate of its own 640x480@60"
+        raise AddressError(f"{uri}: {key} = {text!r} must be {others}{what}")
+    return int(match[1]), int(match[2]), int(match[3] or fps)

@@ -7,7 +7,7 @@ undocumented; with the opposite one, depth and colour edges of a real recording 
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,9 @@ from drivers.contract.frame import Frame, Kind, Reference
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.realsense.picture import unpadded
 from drivers.realsense.ros import Bag
-from drivers.realsense.streams import ROLES, Role, StreamError, camera
+from drivers.realsense.streams import Role, StreamError, camera, role_beside
 
-_STREAM = r"/device_0/sensor_\d+/(?P<type>[A-Za-z]+)_(?P<index>\d+)/"
+_STREAM = r"/device_0/sensor_(?P<number>\d+)/(?P<type>[A-Za-z]+)_(?P<index>\d+)/"
 _DEPTH_UNITS = r"/device_0/sensor_\d+/option/Depth Units/value"
 _INFO_TOPICS = rf"{_STREAM}(?P<what>image/metadata|info/camera_info|tf/0)|{_DEPTH_UNITS}"
 _IMAGES = f"{_STREAM}image/data"
@@ -65,7 +65,7 @@ class RealsenseBag:
         self._path = path
         self._bag = Bag(path)
         counts = self._bag.counts()
-        self._roles = {topic: role for topic in counts if (role := _role(topic)) is not None}
+        self._roles = {topic: role for topic in counts if (role := _role(topic, counts)) is not None}
         if not self._roles:
             raise ForeignRecordingError(
                 f"{path}: there are no images of a RealSense in this bag, its topics are {sorted(counts)}"
@@ -159,10 +159,13 @@ def pixels(kind: Kind, image: Any) -> tuple[str, NDArray[np.generic]]:
     return encoding, unpadded(image.data, encoding, image.width, image.height, image.step)
 
 
-def _role(topic: str) -> Role | None:
+def _role(topic: str, topics: Iterable[str]) -> Role | None:
     """Stream of a topic; None for unused topics, such as those of a second device."""
     match = re.fullmatch(_IMAGES, topic)
-    return ROLES.get((match["type"].lower(), int(match["index"]))) if match else None
+    if match is None:
+        return None
+    others = [other for one in topics if (other := re.fullmatch(_IMAGES, one)) and other["number"] == match["number"]]
+    return role_beside((match["type"].lower(), int(match["index"])), {other["type"].lower() for other in others})
 
 
 def _number(metadata: Mapping[str, str], key: str, default: float) -> float:

@@ -15,6 +15,7 @@ from calib.camera import Camera
 from drivers.contract.capabilities import Capabilities, StreamInfo, SyncRole
 from drivers.contract.clock import DeviceClock
 from drivers.contract.device import DeviceError, DeviceInfo, DeviceState, Sink
+from drivers.contract.frame import Kind
 from drivers.contract.frame_gate import FrameGate
 from drivers.realsense import controls
 from drivers.realsense.frame_queue import FrameQueue
@@ -41,6 +42,12 @@ class UsedSensor:
 
     sensor: Any
     streams: Sequence[Stream]
+
+    @property
+    def role(self) -> Role:
+        """The role that names its controls: of colour only if it has no other stream."""
+        roles = [stream.role for stream in self.streams]
+        return next((role for role in roles if role.kind != Kind.COLOR), roles[0])
 
 
 class RealsenseDevice:
@@ -77,7 +84,7 @@ class RealsenseDevice:
         except ValueError as error:
             raise DeviceError(f"{info.uri}: {error}") from error
         with translated_errors(info.uri):
-            sensors = {number: (one.sensor, one.streams[0].role) for number, one in enumerate(used)}
+            sensors = {number: (one.sensor, one.role) for number, one in enumerate(used)}
             self.controls = controls.make(rs, info.uri, sensors)
             roles = tuple(SyncRole) if controls.can_sync(rs, sensors) else (SyncRole.FREE,)
         infos = tuple(_info(stream) for stream in streams)

@@ -1,6 +1,6 @@
 """Selection of stream profiles, and their cameras."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +10,17 @@ from calib import pose
 from calib.camera import Camera
 from drivers.contract.device import DeviceError
 from drivers.contract.frame import Kind
-from drivers.realsense.address import Address
+from drivers.realsense.address import Address, Mode
 from drivers.realsense.picture import FORMATS
-from drivers.realsense.streams import ROLES, Role, camera
+from drivers.realsense.streams import Role, StreamError, camera, role_beside
+
+#: Requested mode of a stream, by its kind; None if it is not wanted.
+_MODES: Mapping[Kind, Callable[[Address], Mode | None]] = {
+    Kind.DEPTH: lambda address: address.depth,
+    Kind.COLOR: lambda address: address.color,
+    Kind.IR: lambda address: address.ir,
+    Kind.CONFIDENCE: lambda address: address.confidence,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,10 +35,11 @@ class Stream:
 def of_sensor(sensor: Any) -> list[Stream]:
     """All supported stream profiles of a sensor."""
     found = []
-    for profile in sensor.get_stream_profiles():
-        kind = profile.stream_type().name
+    profiles = sensor.get_stream_profiles()
+    kinds = {profile.stream_type().name for profile in profiles}
+    for profile in profiles:
         # A single colour or depth stream has index 0; infra-red of a software device may have index 0.
-        role = ROLES.get((kind, profile.stream_index()))
+        role = role_beside((profile.stream_type().name, profile.stream_index()), kinds)
         if role is not None and profile.is_video_stream_profile() and profile.format().name in FORMATS[role.kind]:
             encoding = FORMATS[role.kind][profile.format().name]
             found.append(Stream(role, profile.as_video_stream_profile(), encoding))
@@ -40,20 +49,20 @@ def of_sensor(sensor: Any) -> list[Stream]:
 def wanted(offers: Sequence[Stream], address: Address) -> list[Stream]:
     """Profiles requested by an address: each stream once, formats in the order of preference of `FORMATS`.
 
+    Every stream may have a mode of its own; librealsense refuses what a sensor cannot stream together when opening it.
+
     Raises:
         DeviceError: an unsupported size or rate; names the supported ones.
     """
     chosen = []
     for role in dict.fromkeys(offer.role for offer in offers):
-        size = address.color if role.kind == Kind.COLOR else address.depth
-        if size is None or (role.kind == Kind.IR and not address.ir):
+        mode = _MODES[role.kind](address)
+        if mode is None:
             continue
-        fitting = [offer for offer in offers if offer.role == role and _mode(offer) == (*size, address.fps)]
+        fitting = [offer for offer in offers if offer.role == role and _mode(offer.profile) == mode]
         if not fitting:
-            modes = sorted({_mode(offer) for offer in offers if offer.role == role})
-            there_are = ", ".join(f"{width}x{height} at {fps}" for width, height, fps in modes)
-            name, asked = f"{role.sensor}/{role.stream}", f"{size[0]}x{size[1]} at {address.fps}"
-            raise DeviceError(f"{address.uri}: {name} has no {asked}; it has: {there_are}")
+            there_are = ", ".join(map(_text, sorted({_mode(offer.profile) for offer in offers if offer.role == role})))
+            raise DeviceError(f"{address.uri}: {role.sensor}/{role.stream} has no {_text(mode)}; it has: {there_are}")
         preferred = list(FORMATS[role.kind])
         chosen.append(min(fitting, key=lambda offer: preferred.index(offer.profile.format().name)))
     return chosen
@@ -63,11 +72,17 @@ def cameras(streams: Iterable[Stream]) -> Mapping[str, Camera]:
     """Cameras by head; the rig's frame is that of depth, or of the first stream without depth.
 
     Raises:
-        StreamError: an invalid camera.
+        StreamError: an invalid camera, or streams of one head that differ in size.
     """
     first: dict[str, Any] = {}
     for stream in streams:
-        first.setdefault(stream.role.sensor, stream.profile)
+        sensor, profile = stream.role.sensor, stream.profile
+        size, width, height = _mode(first.setdefault(sensor, profile))[:2], profile.width(), profile.height()
+        if size != (width, height):
+            name, theirs = f"{sensor}/{stream.role.stream}", f"{size[0]}x{size[1]}"
+            raise StreamError(
+                f"{name} has {width}x{height} pixels and the others of its head {theirs}: choose one size"
+            )
     reference = first.get("depth", next(iter(first.values()), None))
     return {sensor: _camera(sensor, profile, reference) for sensor, profile in first.items()}
 
@@ -83,5 +98,10 @@ def _camera(sensor: str, profile: Any, reference: Any) -> Camera:
     return camera(sensor, size, matrix, intrinsics.model.name.replace("_", " "), intrinsics.coeffs, T_rs)
 
 
-def _mode(offer: Stream) -> tuple[int, int, int]:
-    return offer.profile.width(), offer.profile.height(), offer.profile.fps()
+def _mode(profile: Any) -> Mode:
+    return profile.width(), profile.height(), profile.fps()
+
+
+def _text(mode: Mode) -> str:
+    width, height, fps = mode
+    return f"{width}x{height} at {fps}"

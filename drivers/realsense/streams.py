@@ -1,7 +1,7 @@
 """Streams and cameras of librealsense."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,6 +49,22 @@ ROLES: Mapping[tuple[str, int], Role] = {
     ("infrared", 2): Role("right", "ir", Kind.IR),
     ("color", 0): Role("color", "color", Kind.COLOR, exposure_unit_s=1e-4),  # unit of USB video devices
 }
+
+
+def role_beside(key: tuple[str, int], kinds: Collection[str]) -> Role | None:
+    """Role of a stream of a sensor; None if it is not supported.
+
+    The D405 has no colour camera: its colours are a stream of the depth sensor, which has the exposure's option and
+    metadata, in microseconds (librealsense, src/ds/d400/d400-color.cpp).
+
+    Args:
+        key: the SDK's type and index of the stream.
+        kinds: types of all streams of the same sensor.
+    """
+    role = ROLES.get(key)
+    if role is None or "depth" not in kinds:
+        return role
+    return replace(role, exposure_unit_s=ROLES["depth", 0].exposure_unit_s)
 
 
 def camera(

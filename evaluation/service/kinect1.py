@@ -1,6 +1,7 @@
 """CPU time and losses of receiving a Kinect v1, through unmodified libusb from an emulated camera.
 
-Statistic: share of whole images among those that no packet was lost of and that were in time; CPU time of a stream.
+Statistic: share of the shown images that arrived, where no packet was lost; CPU time of a stream. Images that came too
+late, because this process was not scheduled, are lost like any other, and told beside.
 Goal: at least 99 % in every case.
 Seeds: none; one run of 20 s for each case.
 """
@@ -49,8 +50,8 @@ CASES = (
 )
 
 _COLUMNS = (
-    Column("cameras"), Column("streams"), Column("packets lost", "", ".0%"), Column("whole images", "", ".2%"),
-    Column("whole of those in time", "", ".2%"), Column("CPU per stream", "of a core", ".1%"),
+    Column("cameras"), Column("streams"), Column("packets lost", "", ".0%"), Column("images that arrived", "", ".2%"),
+    Column("late images, warm-up included"), Column("CPU per stream", "of a core", ".1%"),
     Column("emulator", "of a core", ".1%"),
 )  # fmt: skip
 
@@ -67,10 +68,10 @@ def run(settings: Settings, context: Context) -> Findings:
     for streams, losses in CASES[: settings.cases]:
         context.progress(f"{streams}, {len(losses)} cameras")
         rows.append(_row(streams, losses, settings.duration_s))
-    in_time = [float(row[4]) for row, (_, losses) in zip(rows, CASES) if not any(losses)]  # type: ignore[arg-type]
+    arrived = [float(row[3]) for row, (_, losses) in zip(rows, CASES) if not any(losses)]  # type: ignore[arg-type]
     text = f"Unpacking a depth image and looking up its distances takes {_unpacking_ms():.2f} ms."
     return Findings(
-        (at_least("Whole images of those in time without lost packets, the lowest share", min(in_time), 0.99),),
+        (at_least("Images that arrived where no packet was lost, the lowest share", min(arrived), 0.99),),
         (Section("Received images", (Table("Every case", _COLUMNS, tuple(rows)), text)),),
         {"rows": rows},
     )
@@ -79,10 +80,10 @@ def run(settings: Settings, context: Context) -> Findings:
 def _row(streams: str, losses: tuple[float, ...], duration_s: float) -> tuple[Cell, ...]:
     outcomes = _measure(streams, losses, duration_s)
     delivered, shown = sum(one.delivered for one in outcomes), sum(one.shown for one in outcomes)
-    in_time = shown - sum(one.late for one in outcomes)
+    late = sum(one.late for one in outcomes)
     count = len(losses) * len(streams.split(","))
     cpu, emulator = (each / count / outcomes[0].duration_s for each in (outcomes[0].cpu_s, outcomes[0].emulator_cpu_s))
-    return (len(losses), streams, losses[0], delivered / shown, min(delivered / in_time, 1.0), cpu, emulator)
+    return (len(losses), streams, losses[0], delivered / shown, late, cpu, emulator)
 
 
 def _measure(streams: str, losses: tuple[float, ...], duration_s: float) -> list[Outcome]:

@@ -26,8 +26,7 @@ def test_two_kinects_and_a_time_of_flight_camera_track_the_sheet_that_all_of_the
     errors_mm = np.array([estimate["error_mm"] for estimate in estimates], float)
     tracking = np.array([estimate["status"] == "TRACKING" for estimate in estimates])  # with every camera
     print(f"{tracking.sum()} of {len(estimates)} estimates with all cameras, {np.nanmean(errors_mm):.1f} mm; {reasons}")
-    # Whatever arrives, the estimate is near the sheet; how much of it arrives in time is up to the machine.
+    # Whatever arrives, the estimate is near the sheet.
     assert np.nanmedian(errors_mm) < 20
-    if tracking.sum() < ESTIMATES:
-        pytest.skip(f"too busy a machine for three cameras in real time: {reasons} of {len(estimates)}")
+    assert tracking.sum() >= ESTIMATES, f"three cameras in real time are too much here: {reasons} of {len(estimates)}"
     assert np.nanmean(errors_mm[tracking]) < 8

@@ -21,8 +21,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "rigs"
 #: Those that need recordings or images which are not in the repository.
 WITH_FILES = {"replay", "image_folder"}
 WITHOUT_TRACKER = {"record_only"}
-#: Those that need cameras; `test_kinects.py` has such a rig on emulated ones.
-WITH_CAMERAS = {"kinect"}
+#: Those that need cameras; `test_kinects.py` has a rig of emulated ones.
+WITH_CAMERAS = {"kinect", "oak_stereo", "oak_tof", "realsense"}
 LIVE = sorted(
     path.stem for path in EXAMPLES.glob("*.toml") if path.stem not in WITH_FILES | WITHOUT_TRACKER | WITH_CAMERAS
 )

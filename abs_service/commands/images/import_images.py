@@ -7,7 +7,8 @@
   abs-service import kinect.mkv --layout azure --out kinect.mcap
 
 Recordings of other programs bring their own calibration: `azure` (Azure Kinect, MKV), `o3r` (ifm O3R, buffers of its
-process interface), `oak` (depthai, MCAP) and `realsense` (librealsense, ROS 1 bag). See docs/how-to/devices.md.
+process interface), `oak` (depthai, MCAP), `realsense` (librealsense, ROS 1 bag) and `ros2` (ROS 2 bag of any camera).
+See docs/how-to/devices.md.
 
 Folders hold images. Layout `pairs`: images of one exposure share the last number in their names. They carry no time, so
 the recording begins in 1970. Layout `tum`: the lists depth.txt and rgb.txt of the TUM RGB-D benchmark name the images
@@ -51,7 +52,7 @@ from drivers.opening import open_recording
 #: Metres per unit of depth images whose camera file does not tell.
 DEPTH_SCALES = {"pairs": 0.001, "tum": 1 / 5000}
 #: Layouts that are one file and know their cameras.
-RECORDINGS = ("azure", "o3r", "oak", "realsense")
+RECORDINGS = ("azure", "o3r", "oak", "realsense", "ros2")
 
 
 class ImportOptionError(Exception):

@@ -45,6 +45,11 @@ class PacketFormat:
         """Packets of an image."""
         return -(-self.image_bytes // self.payload)
 
+    def pixels(self, place: int) -> slice:
+        """Pixels of an image, row by row, that have a bit in the packet at a place."""
+        begin, end = place * self.payload, min((place + 1) * self.payload, self.image_bytes)
+        return slice(8 * begin // self.bits, -(-8 * end // self.bits))
+
     @property
     def period_ticks(self) -> int:
         """Ticks from one image to the next."""

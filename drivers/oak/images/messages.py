@@ -5,6 +5,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from drivers.oak.cameras.eeprom import Extrinsics, extrinsics_of
 from drivers.oak.images.picture import Picture, PictureError, number
 
 _NS = timedelta(microseconds=1)
@@ -36,10 +37,12 @@ class OutputQueue:
 
     Args:
         queue: `dai.MessageQueue`.
+        socket: of the camera whose view the images are, where the pipeline decides it; None: as the images say.
     """
 
-    def __init__(self, queue: Any) -> None:
+    def __init__(self, queue: Any, socket: int | None = None) -> None:
         self._queue = queue
+        self._socket = socket
 
     def get(self, timeout_s: float) -> Picture | None:
         """See `Queue.get`."""
@@ -47,7 +50,7 @@ class OutputQueue:
             message = self._queue.get(timedelta(seconds=timeout_s))
         except Exception as error:  # QueueException, whose module cannot be named without importing depthai
             raise QueueClosed(str(error)) from error
-        return None if message is None else from_img_frame(message)
+        return None if message is None else from_img_frame(message, self._socket)
 
     def clear(self) -> None:
         """See `Queue.clear`."""
@@ -57,19 +60,23 @@ class OutputQueue:
             raise QueueClosed(str(error)) from error
 
 
-def from_img_frame(message: Any) -> Picture:
+def from_img_frame(message: Any, socket: int | None = None) -> Picture:
     """Picture of a `dai.ImgFrame`; pixels are not copied.
+
+    Args:
+        message: the image.
+        socket: see `OutputQueue`.
 
     Raises:
         PictureError: malformed message.
     """
     try:
-        return _picture(message)
+        return _picture(message, socket)
     except (AttributeError, RuntimeError, TypeError, ValueError) as error:  # exceptions of depthai for invalid contents
         raise PictureError(f"{type(message).__name__} is no image: {error}") from error
 
 
-def _picture(message: Any) -> Picture:
+def _picture(message: Any, socket: int | None) -> Picture:
     transformation = message.getTransformation()
     return Picture(
         type=message.getType().name,
@@ -83,11 +90,18 @@ def _picture(message: Any) -> Picture:
         exposure_s=number(message.getExposureTime().total_seconds()),
         gain=number(message.getSensitivity() / 100),
         temperature_c=number(message.getSensorTemperature() or 0.0, 200.0),
-        socket=message.getInstanceNum(),
+        socket=message.getInstanceNum() if socket is None else socket,
         matrix=np.array(transformation.getIntrinsicMatrix(), np.float64),
         model=transformation.getDistortionModel().name.upper(),
         coefficients=tuple(transformation.getDistortionCoefficients()),
+        extrinsics=_extrinsics(transformation.getExtrinsics()),
     )
+
+
+def _extrinsics(extrinsics: Any) -> Extrinsics:
+    t = extrinsics.translation
+    socket, unit = extrinsics.toCameraSocket.value, extrinsics.lengthUnit.value
+    return extrinsics_of(extrinsics.rotationMatrix, (t.x, t.y, t.z), socket, unit)
 
 
 def _ns(time: timedelta) -> int:

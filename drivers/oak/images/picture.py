@@ -9,12 +9,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from calib import pose
 from calib.camera import Camera
 from calib.lenses.fisheye import KannalaBrandt
-from calib.lenses.lens import Lens
 from calib.pose import Pose
 from drivers.contract.frame import Frame, Geometry, Kind
+from drivers.oak.cameras.eeprom import UNKNOWN, Extrinsics
+from drivers.oak.images.lens import fitted
 from drivers.oak.roles import Role
+
+#: Greatest error of a lens with thin-prism or tilt coefficients, which `calib` has not [px]. Corners of boards are
+#: detected to about as much.
+LENS_ERROR_PX = 0.1
 
 #: Supported lens models of depthai. The first has up to 14 coefficients in OpenCV's order.
 PERSPECTIVE, FISHEYE = "PERSPECTIVE", "FISHEYE"
@@ -41,6 +47,7 @@ class Picture:
         matrix: camera matrix (3, 3) of this image, crops and scaling included.
         model: name of the lens model.
         coefficients: of the lens model; empty if the device has undistorted the image.
+        extrinsics: pose of the image's view, rectification and alignment included; `UNKNOWN` without.
     """
 
     type: str
@@ -58,6 +65,7 @@ class Picture:
     matrix: NDArray[np.float64]
     model: str
     coefficients: tuple[float, ...]
+    extrinsics: Extrinsics = UNKNOWN
 
     @property
     def half_exposure_ns(self) -> int:
@@ -76,17 +84,21 @@ def camera(picture: Picture, T_rs: Pose) -> Camera:
         raise PictureError("the image comes without a camera matrix")
     if picture.model not in {PERSPECTIVE, FISHEYE}:
         raise PictureError(f"lens model {picture.model} is neither {PERSPECTIVE} nor {FISHEYE}")
-    if picture.model == PERSPECTIVE and np.any(values[8:]):
-        raise PictureError(
-            "lenses with thin-prism or tilt coefficients are not supported; let the device undistort: undistort=1"
-        )
-    matrix = picture.matrix
+    matrix, size = picture.matrix, (picture.width, picture.height)
     try:
-        lens = KannalaBrandt(values[:4]) if picture.model == FISHEYE and np.any(values) else Lens(values[:8])
-        size = picture.width, picture.height
-        fx, fy, cx, cy = (float(matrix[index]) for index in ((0, 0), (1, 1), (0, 2), (1, 2)))
-        return Camera(*size, fx, fy, cx, cy, lens, T_rs)
-    except ValueError as error:
+        if picture.model == FISHEYE and np.any(values):
+            fx, fy, cx, cy = (float(matrix[index]) for index in ((0, 0), (1, 1), (0, 2), (1, 2)))
+            return Camera(*size, fx, fy, cx, cy, KannalaBrandt(values[:4]), T_rs)
+        near = fitted(values, matrix, size)
+        if not near.worst_px <= LENS_ERROR_PX:
+            raise PictureError(
+                f"the thin-prism and tilt coefficients of the lens cannot be had without an error of "
+                f"{near.worst_px:.2g} px, more than {LENS_ERROR_PX} px; let the device undistort: undistort=1"
+            )
+        return Camera(*size, *near.matrix, near.lens, T_rs @ pose.inverse(near.T_fitted_camera))
+    except PictureError:
+        raise
+    except (ValueError, cv2.error) as error:
         raise PictureError(f"the image's camera is none: {error}") from error
 
 

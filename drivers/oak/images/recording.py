@@ -17,13 +17,12 @@ from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
 from mcap.reader import make_reader
 
-from calib import pose
 from calib.camera import Camera
 from calib.files import limited
 from drivers.contract.frame import Frame
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import NO_SOCKET, UNITS_M, EepromError, Extrinsics, Poses
+from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses, extrinsics_of
 from drivers.oak.cameras.heads import cameras
 from drivers.oak.images.picture import Picture, PictureError, frame, number
 from drivers.oak.roles import ROLES, Role
@@ -126,19 +125,13 @@ def picture(message: Any) -> Picture:
         matrix=own @ source if source.shape == own.shape == (3, 3) else np.zeros((0, 0)),
         model=_name(transformation, "distortionModel"),
         coefficients=tuple(transformation.distortionCoefficients.values),
+        extrinsics=_extrinsics(transformation.extrinsics),
     )
 
 
 def _extrinsics(extrinsics: Any) -> Extrinsics:
-    rotation = _matrix(extrinsics.rotationMatrix)
-    if rotation.shape != (3, 3):
-        return Extrinsics(NO_SOCKET, pose.identity())
-    t = extrinsics.translation
-    unit = UNITS_M[extrinsics.lengthUnit] if extrinsics.lengthUnit < len(UNITS_M) else np.nan
-    try:
-        return Extrinsics(extrinsics.toCameraSocket, pose.from_rotation(rotation, unit * np.array([t.x, t.y, t.z])))
-    except ValueError:
-        return Extrinsics(NO_SOCKET, pose.identity())
+    t, rotation = extrinsics.translation, _matrix(extrinsics.rotationMatrix)
+    return extrinsics_of(rotation, (t.x, t.y, t.z), extrinsics.toCameraSocket, extrinsics.lengthUnit)
 
 
 def _matrix(matrix: Any) -> np.ndarray:

@@ -53,6 +53,7 @@ class Connection:
         host_times: factory of clock mappings, called for every stream at every start.
         ended: reason if the end of a queue is a regular end, "" if it is a failure.
         filters: filters that the device applies, by stream.
+        modulation: range profile of a stream's exposure at a host time [ns], "" if it has none; None while it changes.
         stamp: maps an image and its arrival [ns] to the host time paired with its device time [ns].
         controls: controls of the device.
         sync_roles: supported synchronisation roles.
@@ -67,6 +68,7 @@ class Connection:
     host_times: Callable[[], HostTimes]
     ended: str = ""
     filters: Mapping[Role, tuple[str, ...]] = field(default_factory=dict)
+    modulation: Callable[[Role, int], str | None] = lambda role, t_host_ns: ""
     stamp: Callable[[Picture, int], int] = arrival
     controls: Controls = field(default_factory=Controls)
     sync_roles: tuple[SyncRole, ...] = (SyncRole.FREE,)

@@ -3,6 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
@@ -16,6 +17,7 @@ from drivers.oak.cameras import eeprom
 from drivers.oak.cameras.eeprom import EepromError
 from drivers.oak.controls import make
 from drivers.oak.images.messages import OutputQueue
+from drivers.oak.range_profile import RangeProfile
 from drivers.oak.source.connection import CLOCK, Connection, synchronised
 from drivers.oak.source.pipelines import build
 
@@ -23,6 +25,8 @@ from drivers.oak.source.pipelines import build
 _QUEUE = 4
 #: Polling interval of the temperature [s].
 TEMPERATURE_S = 5.0
+#: Models as far as they are known without opening the device: by the platform that answers.
+_PLATFORMS = {"X_LINK_MYRIAD_X": "OAK (RVC2)", "X_LINK_RVC3": "OAK (RVC3)", "X_LINK_RVC4": "OAK (RVC4)"}
 _LINKS = {"SUPER_PLUS": "USB 3, 10 Gbit/s", "SUPER": "USB 3, 5 Gbit/s", "HIGH": "USB 2, 480 Mbit/s"}
 
 
@@ -72,10 +76,11 @@ def _run(dai: Any, device: Any, address: Address) -> Connection:
     pipeline = dai.Pipeline(device)
     outputs = build(dai, device, pipeline, address)
     queues = {
-        role: OutputQueue(output.createOutputQueue(maxSize=_QUEUE, blocking=False))
+        role: OutputQueue(output.createOutputQueue(maxSize=_QUEUE, blocking=False), outputs.views.get(role))
         for role, output in outputs.streams.items()
     }
-    controls = make(dai, device, outputs, address)
+    profile = RangeProfile(address.range, time.monotonic_ns)
+    controls = make(dai, device, outputs, address, profile)
     pipeline.start()
 
     def close() -> None:
@@ -85,11 +90,12 @@ def _run(dai: Any, device: Any, address: Address) -> Connection:
     return Connection(
         info=_info(device, address),
         queues=queues,
-        poses=poses,
+        poses=replace(poses, pair=poses.pair or outputs.pair),
         rate_hz=address.fps,
         close=close,
         host_times=lambda: DeviceClock(CLOCK),
         filters=outputs.filters,
+        modulation=lambda role, t_host_ns: profile.at(t_host_ns) if role.sensor == "tof" else "",
         stamp=synchronised,
         controls=controls,
         sync_roles=(SyncRole.FREE, SyncRole.MASTER, SyncRole.SLAVE),
@@ -133,8 +139,8 @@ class Thermometer:
 
 def _found(dai: Any, info: Any) -> Found:
     serial = info.deviceId
-    link = "network" if info.protocol == dai.XLinkProtocol.X_LINK_TCP_IP else "USB"
-    who = DeviceInfo(f"oak://{serial}", "OAK", serial, link=link)
+    link = "network" if info.protocol == dai.XLinkProtocol.X_LINK_TCP_IP else "USB, speed known once opened"
+    who = DeviceInfo(f"oak://{serial}", _PLATFORMS.get(info.platform.name, "OAK"), serial, link=link)
     if info.status == dai.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS:
         return Found(who, Availability.NO_PERMISSION, "this user may not open it", UDEV_REMEDY)
     if info.state == dai.XLinkDeviceState.X_LINK_BOOTED:

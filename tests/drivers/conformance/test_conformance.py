@@ -229,7 +229,8 @@ def test_lost_data_is_counted_and_never_delivered_torn(bench: Bench) -> None:
         assert eventually(lambda: dropped(device) > 0)
         assert sink.receives(2)
     assert all(frame.data.shape[:2] == sizes[frame.key] for frame in sink.frames)
-    assert not any(frame.incomplete for frame in sink.frames)
+    for frame in sink.frames:  # nothing is torn: what is lacking has no return
+        assert not frame.incomplete or (frame.kind == Kind.DEPTH and np.isnan(frame.si()).any())
 
 
 def test_a_device_that_stalls_can_be_stopped_and_started_again(bench: Bench) -> None:

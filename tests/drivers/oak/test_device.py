@@ -130,6 +130,44 @@ def test_malformed_messages_are_counted_and_the_stream_continues() -> None:
         device.close()
 
 
+def test_frames_of_a_time_of_flight_camera_have_its_range() -> None:
+    connection = replace(live_connection(), modulation=lambda role, t: "high" if role.sensor == "tof" else "")
+    device, receiver = OakDevice(connection, time.monotonic_ns), RecordingSink()
+    try:
+        device.start(receiver)
+        receiver.wait(lambda: {frame.sensor for frame in receiver.frames} == {"tof", "color"})
+    finally:
+        device.close()
+    assert {(frame.sensor, frame.modulation) for frame in receiver.frames} == {("tof", "high"), ("color", "")}
+
+
+def test_frames_of_an_uncertain_range_are_dropped_and_counted() -> None:
+    connection = replace(live_connection(), modulation=lambda role, t: None if role.sensor == "tof" else "")
+    device, receiver = OakDevice(connection, time.monotonic_ns), RecordingSink()
+    try:
+        device.start(receiver)
+        receiver.wait(lambda: len(receiver.frames) > 2)
+    finally:
+        device.close()
+    assert {frame.sensor for frame in receiver.frames} == {"color"}
+    assert device.counters["range_changes"] > 2
+
+
+def test_images_bring_the_pose_of_their_view() -> None:
+    camera = parse_simulated("simulated://sheet?sensors=tof&tof=32x24").build()
+    frame = next(frame for frame in camera.frames(0) if frame.kind == Kind.DEPTH)
+    message = oak.message(frame, camera.heads["tof"].camera, 2)
+    assert from_img_frame(message).extrinsics.to == -1
+    transformation = message.getTransformation()
+    turn = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    transformation.setExtrinsics(dai.Extrinsics(turn, dai.Point3f(7.5, 0, 1), dai.CameraBoardSocket.CAM_A))
+    message.setTransformation(transformation)
+    picture = from_img_frame(message, socket=1)
+    assert (picture.socket, picture.extrinsics.to) == (1, 0)
+    np.testing.assert_allclose(picture.extrinsics.T_to_camera[:3, 3], (0.075, 0, 0.01), atol=1e-7)
+    np.testing.assert_allclose(picture.extrinsics.T_to_camera[:3, :3], turn)
+
+
 def test_the_calibration_is_depthais_own() -> None:
     simulation = parse_simulated("simulated://sheet?tof=88x72&color=128x96").build()
     cameras = {0: simulation.heads["tof"].camera, 2: simulation.heads["color"].camera}

@@ -11,6 +11,7 @@ from drivers.contract.frame import Kind
 from drivers.oak import library
 from drivers.oak.address import parse
 from drivers.oak.controls import make
+from drivers.oak.range_profile import RangeProfile
 from drivers.oak.roles import ROLES
 from drivers.oak.source import live, pipelines
 
@@ -41,6 +42,10 @@ def mock_device(platform: str, tof: bool) -> Any:
     return device
 
 
+def profile() -> RangeProfile:
+    return RangeProfile("mid", lambda: 0)
+
+
 def mock_pipeline() -> tuple[Any, list[Any]]:
     """A mock whose nodes have the methods and outputs of the real ones."""
     nodes: list[Any] = []
@@ -64,7 +69,7 @@ def test_time_of_flight_takes_depth_before_the_filters_where_it_exists(platform:
     assert built.streams[ROLES["tof_depth"]] is getattr(tof, output)
     assert built.streams[ROLES["tof_amplitude"]] is tof.amplitude
     assert (ROLES["tof_confidence"] in built.streams) == (platform == "RVC4")
-    assert bool(built.filters) == (platform == "RVC4")
+    assert ("temporal noise reduction" in built.filters[ROLES["tof_depth"]]) == (platform == "RVC4")
     tof.build.assert_called_once_with(dai.CameraBoardSocket.CAM_A, profile=dai.ToFConfig.Profile.LOW_RANGE, fps=20.0)
     assert tof.setInitialConfig.call_args[0][0].enableOpticalCorrection is True
     assert built.streams[ROLES["color"]] is color.requestOutput.return_value
@@ -80,6 +85,45 @@ def test_stereo_gives_depth_in_the_view_of_the_left_image() -> None:
     assert built.streams[ROLES["left"]] is stereo.rectifiedLeft
     aligned = stereo.setDepthAlign.call_args[0][0]
     assert aligned == dai.StereoDepthConfig.AlgorithmControl.DepthAlign.RECTIFIED_LEFT
+    assert built.views == {ROLES["depth"]: 1, ROLES["left"]: 1, ROLES["right"]: 3}
+
+
+def test_no_filter_of_stereo_mixes_pixels() -> None:
+    """The configuration that the default preset leaves, as depthai-core 3.4 has it in setRvc2ProfilePreset."""
+    config = dai.StereoDepthConfig()
+    filters = config.postProcessing
+    mixing = [filters.spatialFilter, filters.temporalFilter, filters.speckleFilter]
+    mixing += [filters.holeFilling, filters.adaptiveMedianFilter]
+    for one in mixing:
+        one.enable = True
+    filters.decimationFilter.decimationFactor = 2
+    filters.thresholdFilter.maxRange = 15000
+    config.setMedianFilter(dai.MedianFilter.KERNEL_7x7)
+    pipeline, nodes = mock_pipeline()
+    create = pipeline.create.side_effect
+
+    def with_config(kind: Any) -> Any:
+        node = create(kind)
+        if kind is dai.node.StereoDepth:
+            node.initialConfig = config
+        return node
+
+    pipeline.create.side_effect = with_config
+    built = pipelines.build(dai, mock_device("RVC2", tof=False), pipeline, parse("oak://?color=0"))
+    assert nodes[2].initialConfig is config
+    left = config.postProcessing
+    for one in (
+        left.spatialFilter,
+        left.temporalFilter,
+        left.speckleFilter,
+        left.holeFilling,
+        left.adaptiveMedianFilter,
+    ):
+        assert not one.enable
+    assert left.decimationFilter.decimationFactor == 1
+    assert left.thresholdFilter.maxRange == 65535
+    assert config.getMedianFilter() == dai.MedianFilter.MEDIAN_OFF
+    assert built.filters == {ROLES["depth"]: ("left-right check", "confidence threshold")}
 
 
 @pytest.mark.parametrize(("mode", "tof"), [("tof", False), ("stereo", True)])
@@ -91,7 +135,7 @@ def test_an_unsupported_mode_raises_with_the_existing_cameras(mode: str, tof: bo
 def test_controls_reach_every_camera_behind_depth() -> None:
     device, (pipeline, nodes) = mock_device("RVC2", tof=False), mock_pipeline()
     address = parse("oak://?dots=0.4")
-    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address, profile())
     assert controls.get("laser_power") == 0.4
     device.setIrLaserDotProjectorIntensity.assert_called_once_with(0.4)
     controls.set("exposure_s", 0.004)
@@ -108,17 +152,18 @@ def test_controls_reach_every_camera_behind_depth() -> None:
 def test_the_range_can_be_changed_while_it_runs() -> None:
     device, (pipeline, nodes) = mock_device("RVC2", tof=True), mock_pipeline()
     address = parse("oak://")
-    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    ranges = profile()
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address, ranges)
     controls.set("modulation", "high")
     (config,) = nodes[0].inputConfig.createInputQueue.return_value.send.call_args[0]
     assert config.profile == dai.ToFConfig.Profile.HIGH_RANGE
-    assert controls.get("modulation") == "high"
+    assert controls.get("modulation") == ranges.current == "high"
 
 
 def test_a_rejected_sync_role_leaves_the_control_unchanged() -> None:
     device, (pipeline, _) = mock_device("RVC2", tof=True), mock_pipeline()
     address = parse("oak://")
-    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address)
+    controls = make(dai, device, pipelines.build(dai, device, pipeline, address), address, profile())
     device.setExternalFrameSyncRole.return_value = (True, "")
     controls.set("sync_role", "slave")
     device.setExternalFrameSyncRole.assert_called_once_with(dai.ExternalFrameSyncRole.SLAVE)
@@ -140,10 +185,12 @@ def test_attached_devices_have_availability_and_remedy(
     monkeypatch: pytest.MonkeyPatch, status: str, state: str, availability: Availability
 ) -> None:
     info = dai.DeviceInfo("18443010E1A2B3C4")
+    info.platform, info.protocol = dai.XLinkPlatform.X_LINK_RVC4, dai.XLinkProtocol.X_LINK_USB_VSC
     info.status, info.state = getattr(dai.XLinkError_t, status), getattr(dai.XLinkDeviceState, state)
     monkeypatch.setattr(dai.Device, "getAllConnectedDevices", lambda: [info])
     (found,) = live.discover(0.1)
     assert (found.availability, found.info.uri) == (availability, "oak://18443010E1A2B3C4")
+    assert (found.info.model, found.info.link) == ("OAK (RVC4)", "USB, speed known once opened")
     assert bool(found.remedy) == (availability != Availability.READY)
 
 

@@ -15,21 +15,17 @@ from calib import pose
 from drivers.contract.frame import Frame, Geometry, Kind
 from drivers.encoding.foreign_recording import ForeignRecordingError
 from drivers.oak.cameras import eeprom
-from drivers.oak.cameras.eeprom import EepromError, Extrinsics, Poses
-from drivers.oak.cameras.heads import cameras
-from drivers.oak.images.picture import Picture, PictureError, camera, frame, pixels
+from drivers.oak.cameras.eeprom import EepromError
+from drivers.oak.images.picture import PictureError, camera, frame, pixels
 from drivers.oak.images.recording import OakRecording
 from drivers.oak.roles import ROLES
 from drivers.simulated.address import parse
+from tests.drivers.oak.pictures import DEPTH
 from tests.sample.sample import DEVICE, EXPOSURES
 
 SAMPLE = Path(__file__).parents[3] / "recordings" / "sample_oak"
 TYPES = ["RAW16", "RAW8", "GRAY8", "BGR888i", "RGB888i", "BGR888p", "RGB888p", "NV12", "YUV420p", "RAW10", ""]
 COLORS = np.random.default_rng(3).integers(256, size=(6, 8, 3), dtype=np.uint8)
-MATRIX = np.array([[9.0, 0, 4], [0, 8, 3], [0, 0, 1]])
-DEPTH = Picture(
-    "RAW16", 8, 6, 16, np.arange(96, dtype=np.uint8), 5, 10**9, 7 * 10**8, 2e-3, 1.5, 40.0, 0, MATRIX, "PERSPECTIVE", ()
-)
 
 
 def test_depth_is_in_millimetres_along_z_and_stamped_in_the_middle_of_its_exposure() -> None:
@@ -101,34 +97,6 @@ def test_arbitrary_parameters_are_a_camera_or_rejected(
     with contextlib.suppress(PictureError):
         made = camera(replace(DEPTH, coefficients=tuple(coefficients), matrix=numbers, model=model), pose.identity())
         assert made.fx > 0
-
-
-def test_tilted_lenses_are_rejected_with_the_remedy() -> None:
-    with pytest.raises(PictureError, match="undistort=1"):
-        camera(replace(DEPTH, coefficients=(*[0.1] * 8, 0, 0, 0, 0, 0.01, 0)), pose.identity())
-
-
-def test_stereo_images_have_rectified_poses() -> None:
-    """The rectified cameras are parallel, with the right one on the x axis of the left one."""
-    R1 = pose.from_rotation_vector([0, 0.02, 0.01], [0, 0, 0])
-    T_rect_left_right = pose.from_rotation_vector([0, 0, 0], [0.075, 0, 0])
-    R2 = pose.from_rotation_vector([0.01, -0.01, 0], [0, 0, 0])
-    T_left_right = pose.inverse(R1) @ T_rect_left_right @ R2
-    poses = Poses({1: Extrinsics(-1, pose.identity()), 2: Extrinsics(1, T_left_right)}, {1: R1, 2: R2})
-    gray = replace(DEPTH, type="GRAY8", stride=8, socket=1)
-    found = cameras(
-        {ROLES["depth"]: replace(DEPTH, socket=1), ROLES["left"]: gray, ROLES["right"]: replace(gray, socket=2)}, poses
-    )
-    assert set(found) == {"depth", "right"}
-    np.testing.assert_allclose(found["right"].T_rs, T_rect_left_right, atol=1e-12)
-
-
-def test_unconnected_and_circular_extrinsics_are_rejected() -> None:
-    with pytest.raises(EepromError, match="nothing is known of where camera 1 is relative to camera 0"):
-        Poses({}).between(0, 1)
-    circle = Poses({0: Extrinsics(1, pose.identity()), 1: Extrinsics(0, pose.identity())})
-    with pytest.raises(EepromError, match="circle"):
-        circle.between(0, 1)
 
 
 CALIBRATION = (SAMPLE / "calibration.json").read_bytes()

@@ -20,6 +20,7 @@ class SoftwareCamera:
         model: of its lenses.
         fault: what goes wrong.
         after: from which exposure on.
+        separate: False if colours are a stream of the depth sensor, like a D405's.
 
     Attributes:
         device: `rs.software_device`.
@@ -27,7 +28,13 @@ class SoftwareCamera:
     """
 
     def __init__(
-        self, serial: str = "0001", model: str = "brown_conrady", fault: Fault = Fault.NONE, after: int = 0
+        self,
+        serial: str = "0001",
+        model: str = "brown_conrady",
+        fault: Fault = Fault.NONE,
+        after: int = 0,
+        *,
+        separate: bool = True,
     ) -> None:
         self.rs = rs = library.load()
         self.fault = fault
@@ -35,7 +42,8 @@ class SoftwareCamera:
         self.device = rs.software_device()
         self.device.register_info(rs.camera_info.serial_number, serial)
         self.device.register_info(rs.camera_info.name, "software camera")
-        self._depth, self._color = self.device.add_sensor("depth"), self.device.add_sensor("colour")
+        self._depth = self.device.add_sensor("depth")
+        self._color = self.device.add_sensor("colour") if separate else self._depth
         kinds = (
             (self._depth, "depth", "z16", 2, 1),
             (self._depth, "infrared", "y8", 1, 2),
@@ -76,6 +84,7 @@ class SoftwareCamera:
             frame.profile = self.profiles[kind]
             if kind == "depth":
                 frame.depth_units = 0.0005
+            sensor.set_metadata(rs.frame_metadata_value.actual_exposure, 80)
             sensor.on_video_frame(frame)
 
     def run(self, rate_hz: float = 100.0) -> None:

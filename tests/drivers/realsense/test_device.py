@@ -16,13 +16,11 @@ from drivers.contract.controls import ControlKind
 from drivers.contract.device import AddressError, ControlError, DeviceError, DeviceState, SdkMissingError
 from drivers.contract.frame import Geometry, Kind
 from drivers.realsense import library, open_device
-from drivers.realsense.address import parse
 from drivers.realsense.controls import make
 from drivers.realsense.device import RealsenseDevice
 from drivers.realsense.frame_queue import FrameQueue
 from drivers.realsense.opening import device_info, discover, of_device
 from drivers.realsense.picture import Picture, pixels
-from drivers.realsense.profiles import Stream, wanted
 from drivers.realsense.streams import ROLES, StreamError
 from tests.drivers.realsense.software_camera import SIZE, SoftwareCamera
 from tests.drivers.recording_sink import RecordingSink
@@ -64,6 +62,25 @@ def test_every_stream_arrives_in_si_units_on_the_cameras_clock(camera: SoftwareC
     assert frames[Kind.COLOR, 3].data.shape == (48, 64, 3)
     assert device.info.serial == "0001"
     assert device.counters["frames"] == 20
+
+
+@pytest.mark.parametrize(("separate", "color_s"), [(True, 8e-3), (False, 80e-6)])
+def test_exposures_are_in_the_unit_of_the_sensor(separate: bool, color_s: float) -> None:
+    """Colours from the depth sensor (D405) have its microseconds; a colour camera has units of 100 µs."""
+    software = SoftwareCamera(separate=separate)
+    device = of_device(rs, software.device, device_info(rs, software.device), time.monotonic_ns)
+    receiver = RecordingSink()
+    try:
+        device.start(receiver)
+        software.show(0, 1000.0)
+        software.show(1, 1033.0)
+        receiver.wait(lambda: len(receiver.frames) >= 8)
+    finally:
+        device.close()
+    exposures = {frame.kind: frame.exposure_s for frame in receiver.frames if frame.seq == 1}
+    assert exposures[Kind.DEPTH] == pytest.approx(80e-6)
+    assert exposures[Kind.COLOR] == pytest.approx(color_s)
+    assert [info.name for info in device.controls.infos if "exposure" in info.name] == ["exposure_s"]
 
 
 def test_the_extrinsics_of_the_colour_camera(camera: SoftwareCamera, device: RealsenseDevice) -> None:
@@ -140,10 +157,11 @@ def test_recordings_of_librealsense_are_played(tmp_path: Path, camera: SoftwareC
 @pytest.mark.parametrize(
     ("uri", "complaint"),
     [
-        ("realsense://?speed=2", "unknown key 'speed'; allowed are color, depth"),
+        ("realsense://?speed=2", "unknown key 'speed'; allowed are color, confidence, depth"),
         ("realsense://?depth=big", "depth = 'big' must be a width and a height"),
         ("realsense://?fps=0", "fps = '0' must be a whole number from 1 to 999"),
-        ("realsense://?ir=2", "ir = '2' must be 0 or 1"),
+        ("realsense://?ir=2", r"ir = '2' must be 0, 1 \(as depth\) or a width and a height"),
+        ("realsense://?color=640x480@", "color = '640x480@' must be a width and a height"),
         ("realsense://1/2", "all that may stand before"),
         ("realsense://?recording=nowhere.db3", "nowhere.db3 cannot be played"),
     ],
@@ -159,23 +177,6 @@ def test_no_camera_raises() -> None:
         open_device("realsense://", time.monotonic_ns)
     with pytest.raises(DeviceError, match="realsense://123 is not attached"):
         open_device("realsense://123", time.monotonic_ns)
-
-
-def offer(kind: str, size: tuple[int, int], fps: int, encoding: str) -> Stream:
-    profile = SimpleNamespace(
-        width=lambda: size[0], height=lambda: size[1], fps=lambda: fps, format=lambda: SimpleNamespace(name=encoding)
-    )
-    return Stream(ROLES[kind, 0], profile, encoding)
-
-
-def test_the_address_selects_one_profile_per_stream() -> None:
-    offers = [offer("depth", (640, 480), fps, "z16") for fps in (30, 60)]
-    offers += [offer("color", (640, 480), 30, name) for name in ("y16", "bgr8", "rgb8")]
-    offers += [offer("infrared", (640, 480), 30, "y8")]
-    assert wanted(offers, parse("realsense://")) == [offers[0], offers[4], offers[5]]
-    assert wanted(offers, parse("realsense://?fps=60&color=0&ir=0")) == [offers[1]]
-    with pytest.raises(DeviceError, match="depth/depth has no 1280x720 at 30; it has: 640x480 at 30, 640x480 at 60"):
-        wanted(offers, parse("realsense://?depth=1280x720"))
 
 
 class Options:
