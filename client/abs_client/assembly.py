@@ -87,7 +87,7 @@ class Assembly:
             return
         topology = self._topologies.get((number[0], mesh.mesh_version))
         self.lacks_topology = topology is None and bool(mesh.vertices_f32)
-        if self.lacks_topology:
+        if self.lacks_topology or (topology and len(topology.rest_vertices_f32) != len(mesh.vertices_f32)):
             return
         self.skipped += self._newest is not None
         self._newest = Whole(state, mesh, topology or MeshTopology(), self._clock())

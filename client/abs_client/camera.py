@@ -31,6 +31,6 @@ class Camera:
 
 def camera(model: SensorModel) -> Camera:
     """The camera in a message."""
-    K = np.array([[model.fx, 0, model.cx], [0, model.fy, model.cy], [0, 0, 1]])
+    K = np.array([[model.fx, 0.0, model.cx], [0.0, model.fy, model.cy], [0.0, 0.0, 1.0]])
     pose = np.array(model.T_rs).reshape(4, 4)
     return Camera(model.width, model.height, K, tuple(model.lens), model.lens_model or "brown_conrady", pose, model)

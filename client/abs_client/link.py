@@ -4,6 +4,7 @@ import json
 import re
 import threading
 import weakref
+from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import zenoh
+from google.protobuf.message import DecodeError
 
 #: Where a rig listens unless its file says otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
@@ -31,7 +33,7 @@ class ClientError(Exception):
     """Anything that this package complains about."""
 
 
-class UnreachableError(ClientError):
+class UnreachableError(ClientError, ConnectionError):
     """Nothing answers at an endpoint, or it refuses this program."""
 
 
@@ -75,6 +77,10 @@ class Link:
         rig: its name.
         tls: for a rig with `[bus.tls]`.
 
+    Attributes:
+        rig: its name.
+        malformed: messages that could not be read, by key; they are left out.
+
     Raises:
         UnknownNameError: `endpoint` or `rig` cannot be one.
         UnreachableError: nothing answers there.
@@ -84,6 +90,7 @@ class Link:
         if not _ENDPOINT.fullmatch(endpoint):
             raise UnknownNameError(f"{endpoint!r} is no endpoint: write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}")
         self.rig = checked(rig)
+        self.malformed: Counter[str] = Counter()
         self._threads: list[threading.Thread] = []
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, tls))))
@@ -141,7 +148,8 @@ class Link:
 
     def _start(self, receive: Callable[..., None], source: Any, on_message: Callable[[Received], None]) -> None:
         # A daemon, because the interpreter waits for all others before it calls what would end them.
-        thread = threading.Thread(target=receive, args=(source, on_message), name="abs_client", daemon=True)
+        take = partial(_take, on_message, self.malformed)
+        thread = threading.Thread(target=receive, args=(source, take), name="abs_client", daemon=True)
         self._threads[:] = [one for one in self._threads if one.is_alive()]
         self._threads.append(thread)
         thread.start()
@@ -185,6 +193,13 @@ def _receive_answers(ask: Callable[[], Any], on_message: Callable[[Received], No
         for answer in ask():
             if answer.ok is not None:
                 on_message(_received(answer.ok))
+
+
+def _take(on_message: Callable[[Received], None], malformed: Counter[str], one: Received) -> None:
+    try:
+        on_message(one)
+    except DecodeError:
+        malformed[one.key] += 1
 
 
 def _received(sample: zenoh.Sample) -> Received:

@@ -1,5 +1,6 @@
 """A running rig: its estimates, images and calibrations, and commands to it."""
 
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Self
 
@@ -58,6 +59,11 @@ class Rig:
 
     def __init__(self, endpoint: str = DEFAULT_ENDPOINT, rig: str = "demo", tls: Tls | None = None) -> None:
         self._link = Link(endpoint, rig, tls)
+
+    @property
+    def malformed(self) -> Mapping[str, int]:
+        """Messages so far that could not be read, by key; they are left out."""
+        return dict(self._link.malformed)
 
     def states(self, tracker: str, largest_age_s: float = LARGEST_AGE_S) -> Stream[State]:
         """The estimates of a tracker, see `subscribe`."""
