@@ -37,7 +37,6 @@ class Assembly:
         clock: this host's monotonic clock [ns].
 
     Attributes:
-        skipped: whole estimates that newer ones have replaced before they were taken.
         lacks_topology: whether the newest vertices wait for their topology.
     """
 
@@ -49,7 +48,6 @@ class Assembly:
         self._topologies: OrderedDict[Numbered, MeshTopology] = OrderedDict()
         self._newest: Whole | None = None
         self._last: Numbered = ("", -1)
-        self.skipped = 0
         self.lacks_topology = False
 
     def add_state(self, state: DeformationState) -> None:
@@ -89,7 +87,6 @@ class Assembly:
         self.lacks_topology = topology is None and bool(mesh.vertices_f32)
         if self.lacks_topology or (topology and len(topology.rest_vertices_f32) != len(mesh.vertices_f32)):
             return
-        self.skipped += self._newest is not None
         self._newest = Whole(state, mesh, topology or MeshTopology(), self._clock())
         self._last = number
         for waiting in (self._states, self._meshes):

@@ -54,26 +54,29 @@ class StateSource:
         self._ages = Ages(clock, self._ask_clock)
         self._last, self._arrived_ns = _NOTHING, 0
         self._stale_ns = clock() + round(largest_age_s * 1e9)
-        self._asked_ns = 0
-        self._too_old = 0
+        self._skipped = 0
         # What receives holds neither the source nor the link, so that both end with their stream.
         self._subscriptions = _subscribe(link, tracker, self._assembly, wake)
+        self._asked_ns = clock()
+        link.ask(f"{tracker}/topology", _topology_into(self._assembly, wake))  # there is one already, most often
 
     @property
     def skipped(self) -> int:
         """See `stream.Source`."""
-        return self._assembly.skipped + self._too_old
+        return self._skipped
 
     def take(self) -> State | None:
         """The newest estimate, or a STALE one after every `largest_age_s` without."""
         self._ask_for_topology()
         if (whole := self._assembly.take()) is not None:
             age_s = self._ages.age_s(whole.state, whole.arrived_ns)
-            self._last, self._arrived_ns = received(whole.state, whole.mesh, whole.topology, age_s), whole.arrived_ns
+            newest, self._arrived_ns = received(whole.state, whole.mesh, whole.topology, age_s), whole.arrived_ns
+            self._count_between(self._last.message.header, newest.message.header)
+            self._last = newest
             if age_s <= self._largest_age_s:
                 self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
                 return self._last
-            self._too_old += 1
+            self._skipped += 1
         if self._clock() < self._stale_ns:
             return None
         self._stale_ns = self._clock() + round(self._largest_age_s * 1e9)
@@ -87,6 +90,10 @@ class StateSource:
         """Receives nothing any more."""
         for end in self._subscriptions:
             end()
+
+    def _count_between(self, before: Header, newest: Header) -> None:
+        if before.boot_id == newest.boot_id:
+            self._skipped += newest.seq - before.seq - 1
 
     def _stale(self) -> State:
         if self._last is _NOTHING:

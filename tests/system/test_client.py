@@ -55,13 +55,14 @@ def test_a_slow_reader_gets_the_newest(run, endpoint):
         until(states, tracks)
         numbers = []
         for _ in range(5):
-            time.sleep(0.5)
+            time.sleep(1.0)
             given = next(states)
-            numbers.append(given.seq)
             newest = listener.states()[-1][1].header.seq
             assert newest - given.seq <= 5
-        assert np.diff(numbers).min() >= 5
-        assert states.skipped > 20
+            numbers.append(given.seq)
+        left_out = np.diff(numbers) - 1
+        assert left_out.min() >= 1
+        assert states.skipped >= left_out.sum()  # each estimate is given, or counted
 
 
 def test_a_rig_that_is_started_again_is_found_again(rig_file, endpoint, launch):
