@@ -1,5 +1,6 @@
 """The client as others install it: a wheel of its own that needs the messages, zenoh and NumPy, and nothing else."""
 
+import ast
 import subprocess
 import sys
 import tomllib
@@ -46,6 +47,15 @@ def test_the_client_has_the_version_and_the_requirements_of_the_service(wheel):
     assert NEEDED == ["eclipse-zenoh", "foxglove-schemas-protobuf", "numpy", "protobuf"]
     strip = {Requirement(line).name: Requirement(line).specifier for line in SERVICE["dependencies"]}
     assert {Requirement(line).specifier == strip[Requirement(line).name] for line in CLIENT["dependencies"]} == {True}
+
+
+def test_what_the_client_imports_is_required():
+    """But pytest, which is there when it loads the plugin."""
+    nodes = [node for path in (ROOT / "client").rglob("*.py") for node in ast.walk(ast.parse(path.read_text("utf-8")))]
+    plain = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    named = plain | {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    own = {"abs_client", "absmsg", "pytest", *sys.stdlib_module_names}
+    assert {name.split(".")[0] for name in named} - own == {"foxglove_schemas_protobuf", "google", "numpy", "zenoh"}
 
 
 @pytest.mark.slow
