@@ -16,6 +16,8 @@ from typing import Any, Self
 import zenoh
 from google.protobuf.message import DecodeError
 
+from abs_client.wake import Wake
+
 #: Where a rig listens unless its file says otherwise.
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 #: By when a rig must answer that is connected to, and a query [s].
@@ -92,11 +94,21 @@ class Link:
         self.rig = checked(rig)
         self.malformed: Counter[str] = Counter()
         self._threads: list[threading.Thread] = []
+        self._waiting: weakref.WeakSet[Wake] = weakref.WeakSet()
         try:
             self._session = zenoh.open(zenoh.Config.from_json5(json.dumps(_settings(endpoint, tls))))
         except zenoh.ZError as error:
             raise UnreachableError(f"nothing answers at {endpoint} within {CONNECT_S:g} s: is it running?") from error
         self._end = weakref.finalize(self, _end, self._session, self._threads)
+
+    @property
+    def closed(self) -> bool:
+        """True after `close`."""
+        return not self._end.alive
+
+    def wake_at_end(self, wake: Wake) -> None:
+        """Signals `wake` when the link is closed, so that nobody waits for it any more."""
+        self._waiting.add(wake)
 
     def subscribe(self, topic: str, on_message: Callable[[Received], None]) -> Callable[[], None]:
         """Calls `on_message`, which must not hold this link, from a thread of its own for the messages of a topic.
@@ -104,6 +116,7 @@ class Link:
         Returns:
             What ends it; to be called once.
         """
+        self._check_open()
         channel = zenoh.handlers.RingChannel(WAITING)
         subscriber = self._session.declare_subscriber(self.key(topic), channel)
         self._start(_receive, subscriber, on_message)
@@ -121,12 +134,14 @@ class Link:
             topic: what is asked for.
             payload, message: of a command: the message and its full name.
         """
+        self._check_open()
         details: dict[str, Any] = {"payload": payload, "encoding": f"application/protobuf;{message}"} if message else {}
         answers = self._session.get(self.key(topic), target=zenoh.QueryTarget.ALL, timeout=QUERY_S, **details)
         return [_received(answer.ok) for answer in answers if answer.ok is not None]
 
     def tokens(self, topic: str) -> list[str]:
         """Keys of the liveliness tokens there are."""
+        self._check_open()
         answers = self._session.liveliness().get(self.key(topic), timeout=QUERY_S)
         return [str(answer.ok.key_expr) for answer in answers if answer.ok is not None]
 
@@ -137,6 +152,8 @@ class Link:
     def close(self) -> None:
         """Ends the session and all that receives on it; may be called again."""
         self._end()
+        for wake in list(self._waiting):
+            wake.signal()
 
     def __enter__(self) -> Self:
         return self
@@ -145,6 +162,10 @@ class Link:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _check_open(self) -> None:
+        if self.closed:
+            raise UnreachableError("the connection to the rig was closed")
 
     def _start(self, receive: Callable[..., None], source: Any, on_message: Callable[[Received], None]) -> None:
         # A daemon, because the interpreter waits for all others before it calls what would end them.

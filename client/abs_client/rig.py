@@ -33,7 +33,7 @@ def subscribe(
     """The estimates of a tracker for `for` or `async for`: always the newest, and what belongs together.
 
     A reader that is slow gets fewer, not older ones. When no estimate younger than `largest_age_s` came for so long, it
-    gets a STALE state, again after every `largest_age_s`, until there are new ones.
+    gets a STALE state, again after every `largest_age_s`, until there are new ones. Connecting may take some seconds.
 
     Args:
         endpoint: `bus.endpoint` of the rig.

@@ -54,6 +54,7 @@ class Stream(Generic[T]):
         self._link = link
         self._close = weakref.finalize(self, close)
         self._closed = threading.Event()
+        link.wake_at_end(wake)
 
     @property
     def skipped(self) -> int:
@@ -67,11 +68,15 @@ class Stream(Generic[T]):
             NothingReceivedError: there was none within `timeout_s`, or the stream was closed.
         """
         end_s = monotonic() + timeout_s
-        while not self._closed.is_set() and (left_s := end_s - monotonic()) > 0:
+        while not self._ended and (left_s := end_s - monotonic()) > 0:
             if (item := self._source.take()) is not None:
                 return item
             self._wake.wait(min(left_s, self._source.due_s()))
         raise NothingReceivedError(f"nothing came within {timeout_s:g} s")
+
+    @property
+    def _ended(self) -> bool:
+        return self._closed.is_set() or self._link.closed
 
     def close(self) -> None:
         """Ends the iteration; from any thread, again if you like."""
@@ -83,7 +88,7 @@ class Stream(Generic[T]):
         return self
 
     def __next__(self) -> T:
-        while not self._closed.is_set():
+        while not self._ended:
             if (item := self._source.take()) is not None:
                 return item
             self._wake.wait(self._source.due_s())
@@ -93,7 +98,7 @@ class Stream(Generic[T]):
         return self
 
     async def __anext__(self) -> T:
-        while not self._closed.is_set():
+        while not self._ended:
             if (item := self._source.take()) is not None:
                 return item
             await self._wake.wait_async(self._source.due_s())

@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from contextlib import suppress
 
 
 class Wake:
@@ -18,7 +19,8 @@ class Wake:
             self._signalled.set()
             if self._task is not None:
                 loop, woken = self._task
-                loop.call_soon_threadsafe(woken.set)
+                with suppress(RuntimeError):  # the loop was closed while its task waited
+                    loop.call_soon_threadsafe(woken.set)
 
     def wait(self, timeout_s: float) -> None:
         """Returns after a signal, or after `timeout_s`."""

@@ -4,22 +4,27 @@ import threading
 
 import numpy as np
 import pytest
-from abs_client import NothingReceivedError, RefusedError, Rig
+from abs_client import NothingReceivedError, RefusedError, Rig, Tls, UnreachableError
 from abs_client.images import ImageError, read
 from abs_client.link import Received
 from absmsg.v1.common_pb2 import Header
 from absmsg.v1.sensor_model_pb2 import SensorModel
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
-from abs_service.bus import keys
+from abs_service.bus import keys as topics
 from abs_service.bus.contract import IMAGES
 from abs_service.bus.health import Health
+from abs_service.bus.session import Role
 from abs_service.bus.stamps import HeaderFactory, WallClock
 from abs_service.wire import commands
 from drivers.encoding import codec
 from drivers.simulated.address import parse
 from tests.client.publishing import PERIOD_S
+from tests.conftest import encrypted
 
+POSE = np.array([[1.0, 0, 0, 0.05], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+MODEL = SensorModel(sensor="tof", width=4, height=3, fx=5, fy=6, cx=1, cy=2, lens=[0.1], T_rs=POSE.ravel())
+NAMES = ("viewer", "operator")
 REGION = '[trackers.sheet.region]\ntype = "seed"\n'
 SIMULATION = parse("simulated://sheet?sensors=tof,color,bayer").build()
 
@@ -59,7 +64,7 @@ def test_what_is_no_image_is_told(change):
 
 def test_the_next_image_of_a_stream(bus, rig):
     frame = SIMULATION.frames(0)[0]
-    images = bus.publisher(keys.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES)
+    images = bus.publisher(topics.image("tof", "depth"), codec.IMAGE_SCHEMA, IMAGES)
     enough = threading.Event()
 
     def put():
@@ -78,13 +83,10 @@ def test_the_next_image_of_a_stream(bus, rig):
 
 
 def test_the_calibration_of_a_sensor(bus, rig):
-    pose = np.eye(4)
-    pose[0, 3] = 0.05
-    model = SensorModel(sensor="tof", width=4, height=3, fx=5, fy=6, cx=1, cy=2, lens=[0.1], T_rs=pose.ravel())
-    bus.answer_queries(keys.model("tof"), SensorModel.DESCRIPTOR.full_name, model.SerializeToString)
+    bus.answer_queries(topics.model("tof"), SensorModel.DESCRIPTOR.full_name, MODEL.SerializeToString)
     camera = rig.camera("tof")
     np.testing.assert_array_equal(camera.K, [[5, 0, 1], [0, 6, 2], [0, 0, 1]])
-    np.testing.assert_array_equal(camera.T_rs, pose)
+    np.testing.assert_array_equal(camera.T_rs, POSE)
     assert (camera.width, camera.height, camera.lens, camera.lens_model) == (4, 3, (0.1,), "brown_conrady")
     with pytest.raises(NothingReceivedError, match="'color'"):
         rig.camera("color")
@@ -123,6 +125,29 @@ def test_the_recorder_records_and_waits(bus, rig, headers):
 def test_a_command_that_nobody_answers_is_told(rig):
     with pytest.raises(NothingReceivedError, match="nobody answers on sheet/reinitialize"):
         rig.reinitialize("sheet")
+
+
+def test_a_closed_connection_ends_its_streams_and_says_so(rig):
+    states = rig.states("sheet", largest_age_s=60.0)
+    threading.Timer(0.2, rig.close).start()
+    assert list(states) == []
+    with pytest.raises(UnreachableError, match="was closed"):
+        rig.camera("tof")
+
+
+def test_a_viewer_reads_and_only_an_operator_commands(secured, keys, endpoint, headers):
+    bus = secured("rig", Role.ROUTER)
+    bus.answer_queries(topics.model("tof"), SensorModel.DESCRIPTOR.full_name, MODEL.SerializeToString)
+    commands.answer_reinitialize(bus, "sheet", headers, Health(bus, "track/sheet", headers), lambda seed: "")
+    files = {name: [keys / f"{part}" for part in ("authority.pem", f"{name}.pem", f"{name}.key")] for name in NAMES}
+    viewer, operator = (Rig(encrypted(endpoint), tls=Tls(*files[name])) for name in NAMES)
+    with viewer, operator:
+        assert viewer.camera("tof").width == operator.camera("tof").width == 4
+        with pytest.raises(NothingReceivedError):
+            viewer.reinitialize("sheet")
+        assert operator.reinitialize("sheet") == ""
+    with pytest.raises(UnreachableError):
+        Rig(encrypted(endpoint))
 
 
 def test_the_processes_that_live(bus, rig):
